@@ -1,0 +1,111 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The messages of the rig as plain values, one class per topic, no ROS needed.
+
+The laws, drivers and loops of this package exchange these; nodes translate
+them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
+(``bags/codecs.py``). SI units, pressures absolute. ``stamp_ns`` is the
+``header.stamp``: the time of the measurement, integer nanoseconds.
+"""
+
+from dataclasses import dataclass
+import math
+
+
+@dataclass(frozen=True, slots=True)
+class Pressure:
+    """Absolute pressure [Pa]: topics pressure, pressure_command, supply_pressure."""
+
+    stamp_ns: int
+    pressure_pa: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contraction:
+    """Contraction [m] and its rate [m/s] (NaN where not measured): topic contraction."""
+
+    stamp_ns: int
+    contraction_m: float
+    velocity_m_per_s: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Force:
+    """Force along the muscle [N], pull positive: topics force and external_force."""
+
+    stamp_ns: int
+    force_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Wanted contraction [m] and its rate [m/s]: topic reference."""
+
+    stamp_ns: int
+    contraction_m: float
+    velocity_m_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceTrajectory:
+    """
+    Wanted contraction known ahead: topic reference_trajectory.
+
+    Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length.
+    """
+
+    stamp_ns: int
+    time_from_start_ns: tuple
+    contraction_m: tuple
+    velocity_m_per_s: tuple
+
+
+@dataclass(frozen=True, slots=True)
+class ValveSignal:
+    """
+    What goes to the valve: topic valve_signal.
+
+    PPR: names ``('ppr_voltage',)``, efforts in V. HSV: ``('fill_duty', 'vent_duty')``,
+    efforts 0..1, mean opening of the next PWM period.
+    """
+
+    stamp_ns: int
+    names: tuple
+    efforts: tuple
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerState:
+    """Every internal of one controller tick as named numbers: topic controller_state."""
+
+    stamp_ns: int
+    names: tuple
+    values: tuple
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """
+    One diagnostic status: topic /diagnostics.
+
+    ``level`` 0 ok, 1 warning, 2 error, 3 stale; ``values`` is a tuple of (key, text) pairs.
+    """
+
+    stamp_ns: int
+    level: int
+    name: str
+    message: str
+    values: tuple = ()

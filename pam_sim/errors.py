@@ -1,0 +1,37 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The one error a user's mistake raises, anywhere in the two packages."""
+
+
+class InputError(ValueError):
+    """
+    A mistake in something the user gave: file, option, parameter, message.
+
+    The command line prints the text as one sentence and exits with code 2; a
+    node logs it. It is never used for a fault of the program itself.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, with the offending value and what is allowed.
+    where : str, optional
+        Place of the mistake: ``file:line``, parameter name or topic.
+
+    """
+
+    def __init__(self, problem: str, where: str = ''):
+        self.problem = problem
+        self.where = where
+        super().__init__(f'{where}: {problem}' if where else problem)
