@@ -12,3 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""Control, driving, recording and replay of pneumatic artificial muscles; nodes on ROS 2."""
+
+__version__ = '0.1.0'

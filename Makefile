@@ -1,0 +1,55 @@
+# Two commands on a fresh machine with Python 3.11 or 3.12, git and make:
+#
+#   make demo    run the rig on real ROS 2 nodes and show what comes out
+#   make test    run every test
+#
+# Both create the environment first (.venv, once, and again when setup.py changes).
+#   PYTHON=/path/to/python3.12    use this interpreter
+#   VENV=folder                   put the environment elsewhere
+#   ARGS="..."                    further arguments of `pam demo` or pytest
+
+VENV ?= .venv
+ARGS ?=
+BIN := $(VENV)/bin
+STAMP := $(VENV)/installed
+
+# Nothing of a run leaves this machine, and one thread per process is fastest here.
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export OPENBLAS_NUM_THREADS := 1
+
+.PHONY: help demo test env clean
+
+help:
+	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
+
+demo: $(STAMP)
+	@$(BIN)/pam demo $(ARGS)
+
+test: $(STAMP)
+	@$(BIN)/python -m pytest $(ARGS)
+
+env: $(STAMP)
+
+clean:
+	rm -rf $(VENV) build install log *.egg-info .pytest_cache
+
+# A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
+$(STAMP): setup.py setup.cfg pyproject.toml
+	@found=''; \
+	for python in $(if $(PYTHON),'$(PYTHON)',python3.12 python3.11 python3 python); do \
+	  if "$$python" -c 'import sys, venv, ensurepip; \
+	  sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1; then \
+	    found="$$python"; break; \
+	  fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	  echo 'No usable Python: this project needs Python 3.11 or 3.12 with the venv module' >&2; \
+	  echo '$(if $(PYTHON),(PYTHON=$(PYTHON) is not one or does not start).,(on Debian and Ubuntu: apt install python3-venv). Name one with: make PYTHON=/path/to/python3.12)' >&2; \
+	  exit 1; \
+	fi; \
+	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
+	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
+	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' \
+	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
+	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
+	touch '$@'

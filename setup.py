@@ -1,0 +1,106 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Installs pam_actuation and pam_sim, with colcon as a ROS 2 package or with pip alone."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'pam_actuation'
+VERSION = '0.1.0'
+HERE = Path(__file__).parent
+
+# Read or shown at run time; found again by pam_actuation/resources.py.
+SHARED_FOLDERS = ('config', 'launch', 'msg_docs')
+
+# Everything but the live nodes works with these alone. The lower bounds are
+# the versions of Ubuntu 24.04, the platform of ROS 2 Jazzy, where it has them.
+RUN_REQUIRES = [
+    'numpy>=1.26',
+    'scipy>=1.11',
+    'numba>=0.58',
+    'PyYAML>=6.0',
+    'mcap>=1.1',
+    'rosbags>=0.10.4',
+    'plotly>=5.15',
+    'joblib>=1.3',
+    'tqdm>=4.66',
+]
+
+# An extra, never a requirement: where ROS 2 is installed these would shadow it.
+ROS_REQUIRES = [
+    'ros-jazzy-rclpy',
+    'ros-jazzy-common-interfaces',
+    'ros-jazzy-lifecycle-msgs',
+    'ros-jazzy-rmw-fastrtps-cpp',
+]
+
+TEST_REQUIRES = [
+    'pytest>=7.4',
+    'pytest-timeout>=2.1',
+    'hypothesis>=6.98',
+    'mcap-ros2-support>=0.5',
+    'catkin_pkg>=1.0',
+    'colcon-common-extensions>=0.3',
+]
+
+
+def shared_files():
+    """Return (target folder, files) pairs that put SHARED_FOLDERS below share/pam_actuation."""
+    pairs = []
+    for name in SHARED_FOLDERS:
+        folders = [HERE / name] + sorted(p for p in (HERE / name).rglob('*') if p.is_dir())
+        for folder in folders:
+            if folder.name == '__pycache__':
+                continue
+            files = sorted(str(p.relative_to(HERE)) for p in folder.iterdir() if p.is_file())
+            if files:
+                pairs.append((f'share/{PACKAGE}/{folder.relative_to(HERE).as_posix()}', files))
+    return pairs
+
+
+setup(
+    name=PACKAGE,
+    version=VERSION,
+    packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
+    package_data={'pam_sim': ['presets/*.yaml', 'muscle/*.csv']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+        *shared_files(),
+    ],
+    python_requires='>=3.11,<3.13',
+    install_requires=RUN_REQUIRES,
+    extras_require={'ros': ROS_REQUIRES, 'test': TEST_REQUIRES},
+    zip_safe=True,
+    maintainer='pam_actuation developers',
+    maintainer_email='pam_actuation@example.org',
+    description='Control, simulation and model correction of pneumatic artificial muscles',
+    long_description=(HERE / 'README.md').read_text(encoding='utf-8')
+    if (HERE / 'README.md').exists() else '',
+    long_description_content_type='text/markdown',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'valve_driver = pam_actuation.nodes.valve_driver:main',
+            'plant_simulator = pam_actuation.nodes.plant_simulator:main',
+            'sofc_controller = pam_actuation.nodes.sofc_controller:main',
+            'pid_controller = pam_actuation.nodes.pid_controller:main',
+            'reference_generator = pam_actuation.nodes.reference_generator:main',
+            'experiment_recorder = pam_actuation.nodes.experiment_recorder:main',
+            'pam = pam_actuation.cli.main:main',
+        ],
+    },
+)
