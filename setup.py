@@ -61,9 +61,8 @@ def shared_files():
     """Return (target folder, files) pairs that put SHARED_FOLDERS below share/pam_actuation."""
     pairs = []
     for name in SHARED_FOLDERS:
-        folders = [HERE / name] + sorted(p for p in (HERE / name).rglob('*') if p.is_dir())
-        for folder in folders:
-            if folder.name == '__pycache__':
+        for folder in [HERE / name, *sorted((HERE / name).rglob('*'))]:
+            if not folder.is_dir() or folder.name == '__pycache__':
                 continue
             files = sorted(str(p.relative_to(HERE)) for p in folder.iterdir() if p.is_file())
             if files:
