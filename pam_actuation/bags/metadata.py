@@ -1,0 +1,84 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a bag says about its experiment: the ``pam_experiment`` record."""
+
+import importlib.metadata
+
+from pam_sim.errors import InputError
+
+# Units of the values on the wire, per topic; the text goes into every bag.
+UNITS = (
+    'pressure, pressure_command, supply_pressure: Pa absolute; '
+    'contraction, reference, reference_trajectory: m, m/s; '
+    'force, external_force: N; '
+    'valve_signal: ppr_voltage V, fill_duty and vent_duty 1; '
+    'time: header.stamp, ns'
+)
+VALVES = ('ppr', 'hsv')
+
+
+def software_version():
+    """Return the version of the installed package, 'unknown' in a bare source tree."""
+    try:
+        return importlib.metadata.version('pam_actuation')
+    except importlib.metadata.PackageNotFoundError:
+        return 'unknown'
+
+
+def experiment_metadata(experiment=None, rig=None, controller=None, valve='', seed=None,
+                        experiment_name='', **more):
+    """
+    Return the texts of the ``pam_experiment`` record.
+
+    Parameters
+    ----------
+    experiment, rig, controller : object or str, optional
+        YAML text, or anything with ``to_yaml()``; left out where there is none.
+    valve : str
+        'ppr' or 'hsv'; by default that of the rig.
+    seed : int, optional
+        Seed of the simulated sensors.
+    experiment_name : str
+        By default the name of the experiment.
+    more : str
+        Further texts, kept under their own keys (``origin='live'``).
+
+    Raises
+    ------
+    InputError
+        Unknown valve type.
+
+    """
+    valve = valve or getattr(rig, 'valve', '')
+    if valve and valve not in VALVES:
+        raise InputError(f'valve type {valve!r} is unknown, give ppr or hsv', 'valve')
+    texts = {
+        'experiment_name': experiment_name or str(getattr(experiment, 'name', '')),
+        'valve': valve,
+        'software_version': software_version(),
+        'seed': '' if seed is None else str(int(seed)),
+        'units': UNITS,
+        'experiment': _yaml(experiment),
+        'rig': _yaml(rig),
+        'controller': _yaml(controller),
+    }
+    texts.update({key: str(value) for key, value in more.items()})
+    return {key: text for key, text in texts.items() if text}
+
+
+def _yaml(thing):
+    if thing is None:
+        return ''
+    return thing if isinstance(thing, str) else thing.to_yaml()

@@ -1,0 +1,297 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The recorder without ROS: a bounded queue, one writer thread, an honest count.
+
+A node hands over every serialized message together with its time stamps and
+the sequence number that the publisher gave it. Handing over never blocks: when
+the disk cannot follow, the newest messages are dropped and counted.
+"""
+
+from collections import deque
+from dataclasses import asdict, dataclass, field
+import threading
+
+from pam_sim.errors import InputError
+
+RECORDING_RECORD = 'pam_recording'
+
+
+@dataclass
+class TopicCounts:
+    """
+    What happened to the messages of one topic.
+
+    ``received`` = ``written`` + ``dropped`` once the recorder is closed.
+    ``dropped`` came too fast or after a write error; ``lost`` never arrived, by
+    gaps in the publishers' sequence numbers, and ``missed_at_start`` were
+    published before the first one that arrived. The last two are None where the
+    middleware gives no numbers or they cannot be told apart by publisher.
+    """
+
+    received: int = 0
+    written: int = 0
+    dropped: int = 0
+    lost: int | None = None
+    missed_at_start: int | None = None
+    publishers: int = 0
+
+
+@dataclass
+class RecordingSummary:
+    """
+    What ``RecorderCore.close`` returns.
+
+    ``complete`` is True when every message that was published after the
+    recorder was connected is in the bag and the bag was finished.
+    """
+
+    path: str
+    counts: dict = field(default_factory=dict)
+    write_error: str = ''
+
+    @property
+    def received(self):
+        """Return how many messages arrived on all topics."""
+        return sum(counts.received for counts in self.counts.values())
+
+    @property
+    def written(self):
+        """Return how many messages are in the bag."""
+        return sum(counts.written for counts in self.counts.values())
+
+    @property
+    def dropped(self):
+        """Return how many messages arrived but are not in the bag."""
+        return sum(counts.dropped for counts in self.counts.values())
+
+    @property
+    def lost(self):
+        """Return how many messages are known never to have arrived."""
+        return sum(counts.lost or 0 for counts in self.counts.values())
+
+    @property
+    def complete(self):
+        """Return whether nothing is missing."""
+        return not (self.write_error or self.dropped or self.lost)
+
+    def to_dict(self):
+        """Return the summary as plain data for JSON."""
+        return {
+            'path': self.path, 'complete': self.complete, 'write_error': self.write_error,
+            'received': self.received, 'written': self.written, 'dropped': self.dropped,
+            'lost': self.lost,
+            'topics': {name: asdict(counts) for name, counts in self.counts.items()}}
+
+
+class SequenceCheck:
+    """
+    Finds gaps in sequence numbers that count from 1 per publisher.
+
+    Several publishers of one topic are told apart by the ``publisher`` given
+    with each number or else by continuity: a number continues the publisher
+    that expects it, one lower than every expected number begins a new
+    publisher, and any other is the smallest possible gap.
+    """
+
+    def __init__(self):
+        self.lost = 0
+        self.missed_at_start = 0
+        self.publishers = 0
+        self._expected = {}
+
+    def add(self, sequence, publisher=None):
+        """Take the sequence number of the next message of the topic."""
+        expected = self._expected.setdefault(publisher, [])
+        # The publisher heard last is tried first.
+        for i in range(len(expected) - 1, -1, -1):
+            if expected[i] == sequence:
+                expected.append(expected.pop(i) + 1)
+                return
+        below = [number for number in expected if number < sequence]
+        if below:
+            nearest = max(below)
+            self.lost += sequence - nearest
+            expected.remove(nearest)
+        else:
+            self.publishers += 1
+            self.missed_at_start += max(sequence - 1, 0)
+        expected.append(sequence + 1)
+
+
+class RecorderCore:
+    """
+    Takes messages from subscription callbacks and writes them in its own thread.
+
+    Parameters
+    ----------
+    writer : BagWriter
+        The open bag; the recorder closes it.
+    max_queued : int
+        Messages that may wait for the disk (default 20 000: about ten seconds of a rig).
+    flush_every_s : float
+        How often finished chunks are handed to the operating system.
+
+    """
+
+    def __init__(self, writer, max_queued=20_000, flush_every_s=1.0):
+        if max_queued < 1:
+            raise InputError(f'{max_queued} is below 1 message', 'max_queued')
+        self._writer = writer
+        self._max_queued = max_queued
+        self._flush_every_s = flush_every_s
+        self._queue = deque()
+        self._wake = threading.Condition()
+        self._counts = {}
+        self._checks = {}
+        self._closing = False
+        self._summary = None
+        self.write_error = ''
+        self._thread = threading.Thread(target=self._run, name='bag_writer', daemon=True)
+        self._thread.start()
+
+    def add_topic(self, full_name, type_name, check_sequence=None, qos=None):
+        """
+        Announce a topic before its messages.
+
+        ``check_sequence`` says whether sequence numbers are watched for gaps; by
+        default everywhere but on ``/diagnostics``, where many nodes publish.
+        """
+        with self._wake:
+            self._writer.add_topic(full_name, type_name, qos)
+            self._counts.setdefault(full_name, TopicCounts())
+            watch = full_name != '/diagnostics' if check_sequence is None else check_sequence
+            if watch:
+                self._checks.setdefault(full_name, SequenceCheck())
+
+    def receive(self, full_name, data, source_timestamp_ns, receive_timestamp_ns,
+                sequence=None, publisher=None):
+        """
+        Take one serialized message; returns False if it had to be dropped.
+
+        Parameters
+        ----------
+        full_name : str
+            Announced topic.
+        data : bytes
+            CDR bytes as they came from the wire.
+        source_timestamp_ns, receive_timestamp_ns : int
+            Send and receive time [ns]; a send time of 0 (unknown) becomes the receive time.
+        sequence : int, optional
+            The publisher's sequence number of this message, counted from 1; 0 or
+            None where the middleware has none.
+        publisher : hashable, optional
+            Who sent it, where the middleware tells.
+
+        """
+        with self._wake:
+            counts = self._counts[full_name]
+            counts.received += 1
+            check = self._checks.get(full_name)
+            if check is not None and sequence:
+                check.add(sequence, publisher)
+                counts.lost = check.lost
+                counts.missed_at_start = check.missed_at_start
+                counts.publishers = check.publishers
+            if self.write_error or self._closing or len(self._queue) >= self._max_queued:
+                counts.dropped += 1
+                return False
+            self._queue.append((
+                full_name, data, receive_timestamp_ns,
+                source_timestamp_ns or receive_timestamp_ns))
+            if len(self._queue) == 1:
+                self._wake.notify()
+            return True
+
+    @property
+    def counts(self):
+        """Return a copy of the counts of every topic, by full name."""
+        with self._wake:
+            return {name: TopicCounts(**asdict(counts)) for name, counts in self._counts.items()}
+
+    @property
+    def queued(self):
+        """Return how many messages wait for the disk."""
+        return len(self._queue)
+
+    def add_metadata(self, name, values):
+        """Put a named record of texts into the bag."""
+        with self._wake:
+            self._writer.add_metadata(name, values)
+
+    def close(self):
+        """Write what is queued, finish the bag and return the RecordingSummary."""
+        if self._summary is not None:
+            return self._summary
+        with self._wake:
+            self._closing = True
+            self._wake.notify()
+        self._thread.join()
+        counts = self.counts
+        try:
+            if not self.write_error:
+                self._writer.add_metadata(RECORDING_RECORD, _as_texts(counts))
+            self._writer.close()
+        except OSError as error:
+            self._fail(error)
+        self._summary = RecordingSummary(
+            str(self._writer.directory), counts, self.write_error)
+        return self._summary
+
+    def _fail(self, error):
+        if not self.write_error:
+            self.write_error = (
+                f'{self._writer.file}: writing failed ({error.strerror or error}); the bag ends '
+                'early, free some space or record elsewhere')
+
+    def _run(self):
+        while True:
+            with self._wake:
+                if not self._queue and not self._closing:
+                    self._wake.wait(self._flush_every_s)
+                batch, self._queue = self._queue, deque()
+                finished = self._closing and not batch
+            if finished:
+                return
+            self._write(batch)
+
+    def _write(self, batch):
+        written = {}
+        dropped = {}
+        try:
+            while batch:
+                name, data, log_time_ns, publish_time_ns = batch.popleft()
+                # Counted as lost until the writer has taken it.
+                dropped[name] = 1
+                self._writer.write(name, bytes(data), log_time_ns, publish_time_ns)
+                written[name] = written.get(name, 0) + 1
+                del dropped[name]
+            self._writer.flush()
+        except OSError as error:
+            self._fail(error)
+            for name, *_ in batch:
+                dropped[name] = dropped.get(name, 0) + 1
+        with self._wake:
+            for name, number in written.items():
+                self._counts[name].written += number
+            for name, number in dropped.items():
+                self._counts[name].dropped += number
+
+
+def _as_texts(counts):
+    """Return the counts as flat texts: ``<topic>.received`` and so on."""
+    return {
+        f'{name}.{key}': 'unknown' if value is None else str(value)
+        for name, topic in counts.items() for key, value in asdict(topic).items()}
