@@ -1,0 +1,329 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+YAML that remembers where every value stands, for errors a person can act on.
+
+Numbers follow YAML 1.2 (``2e-10`` is a number, ``on`` is a text), duplicate
+keys are refused, and :class:`Located` checks type, range and spelling with the
+file and line in the message.
+"""
+
+from collections.abc import Mapping
+import difflib
+import math
+import os
+import re
+
+from pam_sim.errors import InputError
+import yaml
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe loader with the YAML 1.2 core scalars only."""
+
+    yaml_implicit_resolvers: dict = {}
+
+
+for _tag, _pattern, _first in (
+    ('bool', r'^(?:true|True|TRUE|false|False|FALSE)$', 'tTfF'),
+    ('null', r'^(?:~|null|Null|NULL|)$', ['~', 'n', 'N', '']),
+    ('int', r'^[-+]?[0-9]+$', '-+0123456789'),
+    ('float', r'^(?:[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?'
+              r'|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$', '-+.0123456789'),
+):
+    _Loader.add_implicit_resolver(
+        f'tag:yaml.org,2002:{_tag}', re.compile(_pattern), list(_first))
+
+
+class Located(Mapping):
+    """
+    A YAML mapping that knows the line of each of its keys.
+
+    Read it like a dict; values that are mappings are ``Located`` themselves,
+    values that are sequences are :class:`LocatedList`.
+
+    Parameters
+    ----------
+    values : dict
+        Key to value.
+    lines : dict
+        Key to line number, counted from 1.
+    name : str
+        File name used in messages.
+    line : int
+        Line on which the mapping itself begins.
+
+    """
+
+    def __init__(self, values, lines=None, name='<text>', line=1):
+        self._values = dict(values)
+        self._lines = dict(lines or {})
+        self.name = name
+        self.line = line
+
+    def __getitem__(self, key):
+        """Return the value of a key."""
+        return self._values[key]
+
+    def __iter__(self):
+        """Iterate over the keys in file order."""
+        return iter(self._values)
+
+    def __len__(self):
+        """Return the number of keys."""
+        return len(self._values)
+
+    def where(self, key=None):
+        """Return ``file:line`` of a key, or of the mapping itself."""
+        return f'{self.name}:{self._lines.get(key, self.line)}'
+
+    def error(self, problem, key=None):
+        """Return an ``InputError`` placed at a key, ready to be raised."""
+        return InputError(problem, self.where(key))
+
+    def check_keys(self, allowed, what='key'):
+        """
+        Refuse keys that are not in ``allowed``.
+
+        Raises
+        ------
+        InputError
+            With place, the nearest allowed spelling and all allowed keys.
+
+        """
+        allowed = list(allowed)
+        for key in self._values:
+            if key not in allowed:
+                near = difflib.get_close_matches(str(key), allowed, n=1)
+                hint = f' (did you mean `{near[0]}`?)' if near else ''
+                raise self.error(
+                    f'unknown {what} `{key}`{hint}; allowed: {", ".join(allowed) or "none"}', key)
+        return self
+
+    def require(self, key, type=None, lower=None, upper=None, choices=None, unit=''):
+        """
+        Return a value that must be there.
+
+        Parameters
+        ----------
+        key : str
+        type : type, optional
+            ``float`` (takes integers, refuses nan, inf and booleans), ``int``,
+            ``str``, ``bool``, ``Located``/``dict`` or ``LocatedList``/``list``.
+        lower, upper : float, optional
+            Inclusive range of a number.
+        choices : sequence, optional
+            The values allowed.
+        unit : str
+            Unit shown in the message.
+
+        Raises
+        ------
+        InputError
+            Missing key, wrong type, out of range or not among the choices.
+
+        """
+        if key not in self._values:
+            raise self.error(f'`{key}` is missing')
+        return check_value(
+            self._values[key], f'`{key}`', self.where(key), type, lower, upper, choices, unit)
+
+    def get(self, key, type=None, default=None, lower=None, upper=None, choices=None, unit=''):
+        """Return a checked value as :meth:`require` does, or ``default`` if the key is absent."""
+        if key not in self._values:
+            return default
+        return self.require(key, type, lower, upper, choices, unit)
+
+    def plain(self):
+        """Return nested plain dicts and lists."""
+        return {key: _plain(value) for key, value in self._values.items()}
+
+
+class LocatedList(list):
+    """A YAML sequence that knows the line of each item."""
+
+    def __init__(self, items=(), lines=(), name='<text>', line=1):
+        super().__init__(items)
+        self._lines = list(lines)
+        self.name = name
+        self.line = line
+
+    def where(self, index=None):
+        """Return ``file:line`` of an item, or of the sequence itself."""
+        known = index is not None and 0 <= index < len(self._lines)
+        return f'{self.name}:{self._lines[index] if known else self.line}'
+
+    def require(self, index, type=None, lower=None, upper=None, choices=None, unit=''):
+        """Return item ``index`` checked as :meth:`Located.require` does."""
+        if not 0 <= index < len(self):
+            raise InputError(f'item {index + 1} is missing', self.where())
+        return check_value(
+            self[index], f'item {index + 1}', self.where(index), type, lower, upper, choices, unit)
+
+
+_TYPE_NAMES = {float: 'a number', int: 'a whole number', str: 'a text', bool: 'true or false',
+               dict: 'a mapping (key: value)', list: 'a list'}
+
+
+def _has_type(value, wanted):
+    if wanted is float:
+        return (isinstance(value, (int, float)) and not isinstance(value, bool)
+                and math.isfinite(value))
+    if wanted is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    if wanted is dict:
+        return isinstance(value, Mapping)
+    return isinstance(value, wanted)
+
+
+def check_value(value, what, where, type=None, lower=None, upper=None, choices=None, unit=''):
+    """
+    Return ``value`` (a number as ``float`` where ``type`` is float) or raise.
+
+    ``what`` names the value in the message, ``where`` is its place; the other
+    arguments are those of :meth:`Located.require`.
+
+    Raises
+    ------
+    InputError
+        Wrong type, out of range or not among the choices.
+
+    """
+    wanted = {Located: dict, LocatedList: list}.get(type, type)
+    if wanted is not None and not _has_type(value, wanted):
+        raise InputError(
+            f'{what} must be {_TYPE_NAMES.get(wanted, wanted.__name__)}, not {_shown(value)}'
+            + _range_text(lower, upper, unit), where)
+    if choices is not None and value not in choices:
+        raise InputError(
+            f'{what} is {_shown(value)}, allowed: {", ".join(map(str, choices))}', where)
+    if lower is not None and value < lower or upper is not None and value > upper:
+        raise InputError(f'{what} is {value!r}' + _range_text(lower, upper, unit), where)
+    return float(value) if wanted is float else value
+
+
+def _shown(value):
+    if isinstance(value, Mapping):
+        return 'a mapping'
+    if isinstance(value, list):
+        return 'a list'
+    return f'`{value}`' if isinstance(value, str) else repr(value)
+
+
+def _range_text(lower, upper, unit):
+    unit = f' {unit}' if unit else ''
+    if lower is not None and upper is not None:
+        return f'; allowed {lower:g} to {upper:g}{unit}'
+    if lower is not None:
+        return f'; allowed from {lower:g}{unit}'
+    return f'; allowed up to {upper:g}{unit}' if upper is not None else ''
+
+
+def _plain(value):
+    if isinstance(value, Located):
+        return value.plain()
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def load_yaml(path_or_text, name=None):
+    """
+    Read a YAML mapping with the place of every value.
+
+    Parameters
+    ----------
+    path_or_text : str or os.PathLike
+        A file, or YAML text (recognised by a line break or a ``key: value``).
+    name : str, optional
+        Name shown in messages; the file name by default.
+
+    Returns
+    -------
+    Located
+
+    Raises
+    ------
+    InputError
+        Missing file, not UTF-8 text, not YAML, duplicate key, not a mapping.
+
+    """
+    is_text = isinstance(path_or_text, str) and (
+        '\n' in path_or_text or ': ' in path_or_text) and not os.path.exists(path_or_text)
+    if is_text:
+        text, name = path_or_text, name or '<text>'
+    else:
+        path = os.fspath(path_or_text)
+        name = name or path
+        try:
+            with open(path, 'rb') as file:
+                text = file.read().decode('utf-8')
+        except OSError as error:
+            raise InputError(f'cannot be read ({error.strerror})', name) from error
+        except UnicodeDecodeError as error:
+            raise InputError('is not a text file (UTF-8 expected)', name) from error
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            raise InputError('is empty; a mapping (key: value) is expected', name)
+        if not isinstance(node, yaml.MappingNode):
+            raise InputError('a mapping (key: value) is expected',
+                             f'{name}:{node.start_mark.line + 1}')
+        return _convert(loader, node, name)
+    except yaml.MarkedYAMLError as error:
+        line = f':{error.problem_mark.line + 1}' if error.problem_mark else ''
+        raise InputError(f'is not valid YAML: {error.problem}', f'{name}{line}') from error
+    except yaml.YAMLError as error:
+        raise InputError('is not a text file of YAML', name) from error
+    except RecursionError as error:
+        raise InputError('is nested too deeply', name) from error
+
+
+def _convert(loader, node, name):
+    line = node.start_mark.line + 1
+    if isinstance(node, yaml.MappingNode):
+        values, lines = {}, {}
+        for key_node, value_node in node.value:
+            key_line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise InputError('a key must be a plain word', f'{name}:{key_line}')
+            key = loader.construct_object(key_node)
+            if key in values:
+                raise InputError(f'`{key}` is given twice', f'{name}:{key_line}')
+            values[key] = _convert(loader, value_node, name)
+            lines[key] = key_line
+        return Located(values, lines, name, line)
+    if isinstance(node, yaml.SequenceNode):
+        return LocatedList(
+            [_convert(loader, item, name) for item in node.value],
+            [item.start_mark.line + 1 for item in node.value], name, line)
+    return loader.construct_object(node)
+
+
+def dump_yaml(data):
+    """Return deterministic YAML text of nested dicts, lists and scalars (keys keep order)."""
+    return yaml.safe_dump(
+        _dumpable(data), sort_keys=False, default_flow_style=False, allow_unicode=True, width=99)
+
+
+def _dumpable(value):
+    if isinstance(value, Mapping):
+        return {key: _dumpable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_dumpable(item) for item in value]
+    if hasattr(value, 'tolist'):      # numpy scalars and arrays
+        return _dumpable(value.tolist())
+    return value

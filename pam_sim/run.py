@@ -1,0 +1,205 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A recorded or simulated run as named arrays with units: what every analysis starts from."""
+
+from dataclasses import dataclass, field
+
+from pam_sim.errors import InputError
+import numpy as np
+
+# Signals that hold their value until the next message (zero-order hold).
+HELD_TOPICS = ('valve_signal', 'reference', 'pressure_command', 'controller_state')
+
+
+@dataclass
+class Series:
+    """
+    One topic of a run.
+
+    Parameters
+    ----------
+    stamp_ns : ndarray of int64, shape (N,)
+        Header stamps, nanoseconds, in the order of recording.
+    values : dict of str to ndarray of float64, shape (N,)
+        Field name to samples, SI.
+    unit : dict of str to str
+        Field name to SI unit.
+
+    """
+
+    stamp_ns: np.ndarray
+    values: dict
+    unit: dict = field(default_factory=dict)
+
+    def __len__(self):
+        """Return the number of messages."""
+        return len(self.stamp_ns)
+
+    def time_s(self, origin_ns=0):
+        """Return stamps in seconds after ``origin_ns``, shape (N,)."""
+        return (np.asarray(self.stamp_ns, dtype=np.int64) - int(origin_ns)) * 1e-9
+
+
+@dataclass
+class Run:
+    """
+    Topics of one run by short name (``pressure``, ``valve_signal``, …) with its metadata.
+
+    Parameters
+    ----------
+    topics : dict of str to Series
+        Short names: pressure, contraction, force, pressure_command,
+        valve_signal, reference, supply_pressure, external_force,
+        controller_state; absent topics are absent keys.
+    metadata : dict of str to str
+        The ``pam_experiment`` record; empty for foreign bags.
+    namespace : str
+        Namespace the topics had.
+    path : str
+        Where the run came from.
+
+    """
+
+    topics: dict
+    metadata: dict = field(default_factory=dict)
+    namespace: str = ''
+    path: str = ''
+
+    def __contains__(self, topic):
+        """Return whether a topic is there with at least one message."""
+        return topic in self.topics and len(self.topics[topic]) > 0
+
+    def require(self, topic):
+        """
+        Return the series of a topic.
+
+        Raises
+        ------
+        InputError
+            The topic is absent or empty.
+
+        """
+        if topic not in self:
+            have = ', '.join(sorted(name for name in self.topics if name in self)) or 'none'
+            raise InputError(f'has no `{topic}` messages; topics with messages: {have}', self.path)
+        return self.topics[topic]
+
+    @property
+    def start_ns(self):
+        """Earliest stamp of any topic [ns]; 0 for an empty run."""
+        return min((int(np.min(s.stamp_ns)) for s in self.topics.values() if len(s)), default=0)
+
+    @property
+    def end_ns(self):
+        """Latest stamp of any topic [ns]; 0 for an empty run."""
+        return max((int(np.max(s.stamp_ns)) for s in self.topics.values() if len(s)), default=0)
+
+    @property
+    def duration_s(self):
+        """Seconds from the first to the last stamp."""
+        return (self.end_ns - self.start_ns) * 1e-9
+
+    def on_grid(self, dt_s=0.001, start_ns=None, end_ns=None, topics=None):
+        """
+        Resample topics on one common time grid.
+
+        Measurements are interpolated linearly; commands, references and
+        controller states are held. Before its first message a held signal has
+        its first value.
+
+        Parameters
+        ----------
+        dt_s : float
+            Grid step, s.
+        start_ns, end_ns : int, optional
+            Ends of the grid; by default the span common to ``topics``.
+        topics : iterable of str, optional
+            Which topics; all with messages by default.
+
+        Returns
+        -------
+        Grid
+
+        Raises
+        ------
+        InputError
+            A wanted topic is missing, or the topics have no common time span.
+
+        """
+        names = list(topics) if topics is not None else [n for n in self.topics if n in self]
+        series = {name: self.require(name) for name in names}
+        if not series:
+            raise InputError('has no messages', self.path)
+        if start_ns is None:
+            start_ns = max(int(np.min(s.stamp_ns)) for s in series.values())
+        if end_ns is None:
+            end_ns = min(int(np.max(s.stamp_ns)) for s in series.values())
+        if end_ns <= start_ns:
+            raise InputError('its topics have no common time span', self.path)
+        count = int((end_ns - start_ns) * 1e-9 / dt_s + 1e-9) + 1
+        time_s = np.arange(count) * dt_s
+        values = {}
+        for name, one in series.items():
+            stamp, order = np.unique(np.asarray(one.stamp_ns, dtype=np.int64), return_index=True)
+            seconds = (stamp - int(start_ns)) * 1e-9
+            values[name] = {
+                key: _resample(time_s, seconds, np.asarray(samples, float)[order],
+                               name in HELD_TOPICS)
+                for key, samples in one.values.items()}
+        return Grid(int(start_ns), dt_s, time_s, values)
+
+
+@dataclass
+class Grid:
+    """
+    A run on a common time grid.
+
+    Parameters
+    ----------
+    start_ns : int
+        Stamp of ``time_s`` = 0.
+    dt_s : float
+    time_s : ndarray, shape (N,)
+    values : dict of str to dict of str to ndarray, shape (N,)
+        Topic to field to samples; ``grid['pressure', 'pressure_pa']`` is short for it.
+
+    """
+
+    start_ns: int
+    dt_s: float
+    time_s: np.ndarray
+    values: dict
+
+    def __getitem__(self, key):
+        """Return one field by ``(topic, field)``, or the dict of a topic."""
+        if isinstance(key, tuple):
+            return self.values[key[0]][key[1]]
+        return self.values[key]
+
+    def __contains__(self, topic):
+        """Return whether the topic is on the grid."""
+        return topic in self.values
+
+    def __len__(self):
+        """Return the number of grid points."""
+        return len(self.time_s)
+
+
+def _resample(time_s, stamp_s, samples, held):
+    if not held:
+        return np.interp(time_s, stamp_s, samples)
+    # A nanosecond of slack: a message stamped on a grid point is in force there.
+    index = np.searchsorted(stamp_s, time_s + 1e-9, side='right') - 1
+    return samples[np.clip(index, 0, len(samples) - 1)]
