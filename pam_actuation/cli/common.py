@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What all verbs share: exit codes, output for people or programs, progress."""
+
+import json
+import os
+import sys
+
+from tqdm import tqdm
+
+EXIT_DONE = 0
+EXIT_FINDING = 1       # the verb worked and found something the user should look at
+EXIT_BAD_INPUT = 2
+
+
+def emit(args, payload, text):
+    """
+    Print the result of a verb.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``json``: print ``payload`` as one JSON document instead of the text.
+    payload : dict
+        The result for programs, plain data.
+    text : str
+        The result for people.
+
+    """
+    print(json.dumps(payload, indent=2, default=str) if args.json else text)
+
+
+def progress(args, total, unit='', description=''):
+    """
+    Return a tqdm bar on stderr; silent with ``--json`` or when stderr is no terminal.
+
+    A log file gets no thousand redrawn lines; set PAM_PROGRESS=1 to force the bar.
+    """
+    quiet = args.json or not (sys.stderr.isatty() or os.environ.get('PAM_PROGRESS'))
+    return tqdm(
+        total=total, unit=unit, desc=description, disable=quiet, file=sys.stderr,
+        bar_format='{desc}: {percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}')
+
+
+def add_rig_options(parser):
+    """Add the options that choose the rig, as used by several verbs."""
+    parser.add_argument(
+        '--rig', default='dmsp_5_300_realistic', metavar='NAME|FILE',
+        help='rig preset or model YAML (default: %(default)s)')
+    parser.add_argument(
+        '--valve', metavar='ppr|hsv', default=None,
+        help='valve type; default: the one of the rig')
+
+
+def add_controller_options(parser):
+    """Add the options that choose the controller, as used by several verbs."""
+    parser.add_argument(
+        '--controller', default=None, metavar='NAME|FILE',
+        help='controller preset or YAML (default: sofc_ppr or sofc_hsv, after the valve)')
+    parser.add_argument(
+        '--rules', default=None, metavar='FILE', help='rule file to start from')
+    parser.add_argument(
+        '--freeze', action='store_true', help='keep the rules frozen: no learning')
+
+
+def default_controller(args, valve):
+    """Return the controller the options name, or the preset that fits the valve."""
+    return args.controller or f'sofc_{valve}'

@@ -1,0 +1,75 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Entry point of ``pam``: finds the verbs, parses, runs, turns mistakes into exit code 2."""
+
+import argparse
+import importlib
+import os
+import sys
+
+from pam_actuation.cli.common import EXIT_BAD_INPUT
+from pam_sim.errors import InputError
+
+VERBS = ('demo', 'run', 'simulate', 'replay', 'tune', 'gap', 'report', 'info')
+
+
+def build_parser():
+    """Return the argument parser with one sub-parser per verb."""
+    from pam_actuation import __version__
+    parser = argparse.ArgumentParser(
+        prog='pam', description='Simulate, run, record, replay and tune a pneumatic muscle rig.',
+        epilog='Start with "pam demo", or "pam simulate sine_quarter_hz --out runs/first".')
+    parser.add_argument('--version', action='version', version=f'pam_actuation {__version__}')
+    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
+    for name in VERBS:
+        module = importlib.import_module(f'pam_actuation.cli.{name}')
+        sub = verbs.add_parser(
+            name, help=module.HELP, description=module.HELP, epilog=f'Example: {module.EXAMPLE}',
+            formatter_class=argparse.RawDescriptionHelpFormatter)
+        sub.add_argument(
+            '--json', action='store_true', help='print the result as JSON, for programs')
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv=None):
+    """
+    Run one verb.
+
+    Returns
+    -------
+    int
+        0 done, 1 finding, 2 bad input.
+
+    """
+    # BLAS threads only get in the way of small matrices and worker processes.
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    args = build_parser().parse_args(argv)
+    try:
+        return args.run(args)
+    except InputError as mistake:
+        print(f'pam {args.verb}: {mistake}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        print(f'pam {args.verb}: stopped', file=sys.stderr)
+        return 130
+    except BrokenPipeError:   # e.g. "pam info BAG | head"
+        sys.stderr.close()
+        return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,42 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam replay``: step controller and plant offline on what was recorded."""
+
+from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+
+HELP = 'Step controller and plant offline on the recorded inputs and compare with the recording.'
+EXAMPLE = 'pam replay runs/first'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('bag', help='bag directory, or a lone .mcap file')
+    parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bag')
+    parser.add_argument(
+        '--set', dest='controller', default=None, metavar='FILE',
+        help='another controller YAML: what would this tuning have commanded')
+    parser.add_argument(
+        '--out', default=None, metavar='FILE', help='write the replayed signals as an .npz file')
+
+
+def run(args):
+    """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
+    from pam_actuation.bags.load import load_run
+    from pam_actuation.replay.compare import replay_run
+    result = replay_run(load_run(args.bag, namespace=args.namespace), controller=args.controller)
+    if args.out:
+        result.save(args.out)
+    emit(args, result.to_dict(), result.text())
+    return EXIT_FINDING if result.unexpected_difference else EXIT_DONE

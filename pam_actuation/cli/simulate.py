@@ -1,0 +1,62 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam simulate``: an experiment without ROS, faster than real time."""
+
+import os
+import time
+
+from pam_actuation.cli.common import (
+    add_controller_options, add_rig_options, default_controller, emit, EXIT_DONE, progress)
+
+HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
+EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('experiment', help='experiment name or YAML file')
+    add_rig_options(parser)
+    add_controller_options(parser)
+    parser.add_argument('--out', default=None, metavar='DIR',
+                        help='bag directory (default: runs/EXPERIMENT_VALVE)')
+    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
+
+
+def run(args):
+    """Simulate and say what was recorded."""
+    from pam_actuation.control.config import load_controller
+    from pam_actuation.experiments import load_experiment
+    from pam_actuation.experiments.offline import simulate_experiment
+    from pam_sim import load_rig
+    experiment = load_experiment(args.experiment)
+    rig = load_rig(args.rig, valve=args.valve)
+    controller = None
+    if experiment.domain == 'contraction':
+        controller = load_controller(
+            default_controller(args, rig.valve), rig, rules_file=args.rules)
+    out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
+    started = time.perf_counter()
+    with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
+        result = simulate_experiment(
+            experiment, rig, controller, out, seed=args.seed, learning=not args.freeze,
+            overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n))
+        bar.update(experiment.duration_s - bar.n)
+    result['wall_s'] = time.perf_counter() - started
+    emit(args, result, (
+        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig.name} '
+        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n'
+        f'next: pam report {result["bag"]}'))
+    return EXIT_DONE

@@ -1,0 +1,175 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run an experiment without ROS: the live loops on a virtual clock, into the same bag.
+
+The loops are the ones the nodes call, so what is seen here is what the live
+rig does, less transport. Same input, same bits: all randomness comes from the
+seed, all stamps from the virtual clock.
+"""
+
+from collections import Counter
+import os
+
+from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.experiments.reference import ReferenceLoop
+from pam_actuation.messages import Status
+from pam_actuation.plant_loop import PlantLoop
+
+START_NS = 1_000_000_000 * 1_000_000_000   # virtual clocks start here, not at the date of the run
+PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
+STATUS_EVERY_NS = 500_000_000
+NAMESPACE = '/muscle'
+
+
+class _Recorder:
+    """Encode messages into a bag and count them, as publisher and recorder at once."""
+
+    def __init__(self, writer, namespace):
+        self._writer, self._namespace = writer, namespace
+        self._known, self.counts = set(), Counter()
+
+    def write(self, topic, message, now_ns):
+        """Write one message under its full topic name."""
+        name = '/diagnostics' if topic == 'diagnostics' else f'{self._namespace}/{topic}'
+        if name not in self._known:
+            self._writer.add_topic(name, TOPIC_TYPES[topic])
+            self._known.add(name)
+        self._writer.write(name, encode(topic, message), now_ns, now_ns)
+        self.counts[name] += 1
+
+
+def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
+                        overwrite=False, progress=None, namespace=NAMESPACE):
+    """
+    Simulate an experiment and record it as a bag.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What to ask for. In the pressure domain the controller is not used.
+    rig : pam_sim.rig.Rig
+        The simulated rig, valve included.
+    controller : object or None
+        Anything ``control.config.load_controller`` returns.
+    out : path
+        Directory of the bag.
+    seed : int
+        Seed of sensor noise and stamp jitter.
+    learning : bool
+        False keeps the rules frozen.
+    progress : callable, optional
+        Called with simulated seconds done.
+
+    Returns
+    -------
+    dict
+        ``bag`` (path), ``duration_s``, ``counts`` per topic.
+
+    Raises
+    ------
+    InputError
+        The experiment asks for more than the rig's stroke; the bag directory exists.
+
+    """
+    experiment.check_reachable(rig)
+    metadata = experiment_metadata(
+        experiment=experiment.to_yaml(), rig=rig.to_yaml(),
+        controller=controller.to_yaml() if controller is not None else '', valve=rig.valve,
+        experiment_name=experiment.name, seed=seed)
+    writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
+    recorder = _Recorder(writer, namespace)
+    try:
+        _run(experiment, rig, controller, seed, learning, recorder, progress, namespace)
+    finally:
+        writer.close()
+    return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
+            'counts': dict(recorder.counts)}
+
+
+def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace):
+    """Call every loop at its rate, in order of time, until the experiment is over."""
+    plant = PlantLoop(rig, seed=seed)
+    reference = ReferenceLoop(experiment)
+    driver = DriverLoop(rig.valve)
+    control = None
+    if experiment.domain == 'contraction':
+        control = ControllerLoop(controller)
+
+    def tick_plant(now):
+        plant.advance_to(now)
+        for topic, message in plant.sample(now).items():
+            recorder.write(topic, message, now)
+            if topic == 'pressure':
+                driver.on_pressure(message)
+            elif topic == 'supply_pressure':
+                driver.on_supply(message)
+            if control is not None:
+                handler = getattr(control, f'on_{topic}', None)
+                if handler:
+                    handler(message)
+
+    def tick_reference(now):
+        for topic, message in reference.tick(now).items():
+            recorder.write(topic, message, now)
+            if topic == 'pressure_command':
+                driver.on_command(message)
+            else:
+                getattr(control, f'on_{topic}')(message)
+
+    def tick_control(now):
+        command, state = control.tick(now, learning)
+        driver.on_command(command)
+        recorder.write('pressure_command', command, now)
+        recorder.write('controller_state', state, now)
+
+    last_status = [-STATUS_EVERY_NS]
+
+    def tick_driver(now):
+        signal, status = driver.tick(now)
+        plant.set_signal(signal)
+        recorder.write('valve_signal', signal, now)
+        if now - last_status[0] >= STATUS_EVERY_NS:
+            last_status[0] = now
+            recorder.write('diagnostics', status, now)
+
+    # At equal times: measure, then want, then decide, then act.
+    loops = [(PUBLISH_RATE_HZ, tick_plant), (reference.rate_hz, tick_reference)]
+    if control is not None:
+        loops.append((controller.rate_hz, tick_control))
+    loops.append((driver.rate_hz, tick_driver))
+    periods = [round(1e9 / rate) for rate, _ in loops]
+    due = [START_NS] * len(loops)
+    end = START_NS + round(experiment.duration_s * 1e9)
+    reported = 0
+    while True:
+        k = due.index(min(due))
+        now = due[k]
+        if now > end:
+            break
+        loops[k][1](now)
+        due[k] = now + periods[k]
+        if progress and (now - START_NS) // 1_000_000_000 > reported:
+            reported = (now - START_NS) // 1_000_000_000
+            progress(reported)
+    counts = {f'published.{name}': count for name, count in recorder.counts.items()}
+    recorder.write('diagnostics', Status(
+        end, 0, f'{namespace}/simulation', 'finished',
+        tuple((key, str(value)) for key, value in counts.items()
+              if not key.endswith('/diagnostics'))), end)

@@ -1,0 +1,150 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Primitives and experiment files: continuity, rates, seeds, and every way to get a file wrong."""
+
+import math
+
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.primitives import make_primitive, PRIMITIVES
+from pam_sim.errors import InputError
+import pytest
+
+EXAMPLES = {
+    'rest': {'duration_s': 1.0},
+    'hold': {'duration_s': 1.0},
+    'step': {'to_m': 0.01, 'duration_s': 1.0},
+    'ramp': {'to_m': 0.01, 'duration_s': 1.0},
+    'sine': {'center_m': 0.01, 'amplitude_m': 0.004, 'frequency_hz': 0.5, 'cycles': 2},
+    'chirp': {'center_m': 0.01, 'amplitude_m': 0.004, 'from_hz': 0.1, 'to_hz': 2.0,
+              'duration_s': 5.0},
+    'triangle': {'low_m': 0.002, 'high_m': 0.02, 'period_s': 4.0, 'cycles': 2},
+    'staircase': {'low_m': 0.0, 'high_m': 0.02, 'steps': 4, 'hold_s': 1.0},
+    'random_steps': {'low_m': 0.0, 'high_m': 0.02, 'min_hold_s': 0.2, 'max_hold_s': 0.9,
+                     'duration_s': 5.0, 'seed': 3},
+    'multisine': {'center_m': 0.01, 'amplitude_m': 0.005, 'min_hz': 0.1, 'max_hz': 2.0,
+                  'lines': 8, 'duration_s': 6.0, 'seed': 3},
+}
+SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'multisine')
+NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification')
+
+
+def make(name):
+    """Build the example of a primitive, starting from 3 mm."""
+    return make_primitive(name, EXAMPLES[name], 0.003, 0.0, 'm')
+
+
+def test_every_primitive_has_an_example():
+    assert set(EXAMPLES) == set(PRIMITIVES)
+
+
+@pytest.mark.parametrize('name', SMOOTH)
+def test_rate_is_the_derivative_of_the_value(name):
+    primitive = make(name)
+    for k in range(1, 100):
+        t = primitive.duration_s * k / 100
+        if name == 'multisine' and min(abs(t - 1), abs(primitive.duration_s - 1 - t)) < 1e-3:
+            continue                                # corner of the fade
+        numeric = (primitive.at(t + 1e-6)[0] - primitive.at(t - 1e-6)[0]) / 2e-6
+        assert primitive.at(t)[1] == pytest.approx(numeric, abs=1e-7)
+
+
+def test_triangle_rate_and_turning_points():
+    primitive = make('triangle')
+    assert primitive.at(0.0) == (0.002, pytest.approx(0.009))
+    assert primitive.at(2.0)[0] == pytest.approx(0.02)
+    assert primitive.at(3.0) == (pytest.approx(0.011), pytest.approx(-0.009))
+    assert primitive.end == pytest.approx(0.002)
+
+
+def test_ramp_is_at_rest_at_both_ends_and_starts_where_the_last_ended():
+    primitive = make('ramp')
+    assert primitive.at(0.0) == (0.003, 0.0)
+    assert primitive.at(1.0) == (pytest.approx(0.01), pytest.approx(0.0, abs=1e-12))
+
+
+def test_random_steps_follow_their_seed():
+    same, other = make('random_steps'), dict(EXAMPLES['random_steps'], seed=4)
+    times = [0.01 * k for k in range(500)]
+    first = [make('random_steps').at(t)[0] for t in times]
+    assert first == [same.at(t)[0] for t in times]
+    different = make_primitive('random_steps', other, 0.0, 0.0, 'm')
+    assert first != [different.at(t)[0] for t in times]
+    assert all(0.0 <= v <= 0.02 for v in first)
+
+
+def test_multisine_keeps_its_peak_bound():
+    primitive = make('multisine')
+    values = [primitive.at(0.001 * k)[0] for k in range(6001)]
+    assert max(abs(v - 0.01) for v in values) <= 0.005 * 1.02
+
+
+@pytest.mark.parametrize('name', NAMED)
+def test_named_experiments_load_and_round_trip(name):
+    experiment = load_experiment(name)
+    again = load_experiment(experiment.to_yaml())
+    assert experiment.name == name
+    times = [0.05 * k for k in range(int(experiment.duration_s / 0.05))]
+    assert [experiment.at(t) for t in times] == [again.at(t) for t in times]
+
+
+def test_sine_experiment_states_its_cycles():
+    start, period, count = load_experiment('sine_quarter_hz').cycles
+    assert (start, period, count) == (3.0, 4.0, 10)
+
+
+def test_experiment_is_continuous_but_for_steps():
+    experiment = load_experiment('sine_quarter_hz')
+    values = [experiment.at(0.001 * k)[0] for k in range(int(1000 * experiment.duration_s))]
+    assert max(abs(b - a) for a, b in zip(values, values[1:])) < 2e-5
+
+
+BAD = {
+    'domain: torque\n': '`domain` is `torque`, allowed: contraction, pressure',
+    'sorts: 1\n': 'unknown key `sorts`',
+    'segments: []\n': 'empty',
+    'segments:\n  - jump: {to_m: 0.01}\n': 'unknown primitive "jump"',
+    'segments:\n  - step: {to_pa: 0.01, duration_s: 1.0}\n': 'unknown key "to_pa" of step',
+    'segments:\n  - step: {to_m: 0.01}\n': 'step lacks duration_s',
+    'segments:\n  - step: {to_m: 0.3, duration_s: 1.0}\n': 'allowed for contraction is 0 to 0.25',
+    'segments:\n  - step: {to_m: .nan, duration_s: 1.0}\n': 'finite number',
+    'segments:\n  - hold: {duration_s: -1.0}\n': 'allowed is above 0',
+    'segments:\n  - 7\n': 'one "primitive: {keys}" entry',
+}
+
+
+@pytest.mark.parametrize('body', sorted(BAD))
+def test_mistakes_are_refused_with_their_place(tmp_path, body):
+    path = tmp_path / 'bad.yaml'
+    text = 'name: bad\n' + body
+    if 'segments' not in body:
+        text += 'segments:\n  - rest: {duration_s: 1.0}\n'
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_experiment(str(path))
+    assert BAD[body] in str(caught.value)
+    assert 'bad.yaml' in str(caught.value)
+
+
+def test_unknown_name_lists_what_exists():
+    with pytest.raises(InputError) as caught:
+        load_experiment('no_such_thing')
+    assert 'sine_quarter_hz' in str(caught.value)
+
+
+def test_before_and_after_the_experiment_the_reference_rests():
+    experiment = load_experiment('short_sine')
+    assert experiment.at(-1.0)[1] == 0.0
+    assert experiment.at(1e6) == (pytest.approx(0.006), 0.0)
+    assert math.isfinite(experiment.duration_s)

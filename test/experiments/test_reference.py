@@ -1,0 +1,63 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The reference loop: what goes on the wire, and when."""
+
+from pam_actuation.experiments import load_experiment, ReferenceLoop
+
+T0 = 1_700_000_000_000_000_000
+
+
+def run(name, seconds):
+    """Collect (now, messages) of a reference loop at 100 Hz."""
+    loop = ReferenceLoop(load_experiment(name))
+    period = 10_000_000
+    return loop, [(T0 + k * period, loop.tick(T0 + k * period))
+                  for k in range(int(seconds * 100))]
+
+
+def test_trajectory_keeps_the_rules_of_the_wire():
+    _, ticks = run('sine_quarter_hz', 8)
+    sent = [(now, m['reference_trajectory']) for now, m in ticks if 'reference_trajectory' in m]
+    gaps = [b[0] - a[0] for a, b in zip(sent, sent[1:])]
+    assert max(gaps) <= 200_000_000                                  # at least 5 Hz
+    for now, message in sent:
+        offsets = message.time_from_start_ns
+        assert message.stamp_ns == now
+        assert max(b - a for a, b in zip(offsets, offsets[1:])) <= 20_000_000
+        assert offsets[-1] - offsets[0] >= 500_000_000
+
+
+def test_trajectory_announces_the_later_reference():
+    _, ticks = run('sine_quarter_hz', 8)
+    later = {now: m['reference'].contraction_m for now, m in ticks}
+    for now, messages in ticks:
+        message = messages.get('reference_trajectory')
+        if message is None:
+            continue
+        for offset, value in zip(message.time_from_start_ns, message.contraction_m):
+            if now + offset in later:
+                assert value == later[now + offset]
+
+
+def test_pressure_experiments_command_pressure():
+    _, ticks = run('pressure_identification', 2)
+    assert all(set(m) == {'pressure_command'} for _, m in ticks)
+    assert ticks[150][1]['pressure_command'].pressure_pa == 401325.0
+
+
+def test_finishes_after_its_duration():
+    loop, ticks = run('short_sine', 6.5)
+    assert not loop.finished(T0 + int(5.9e9))
+    assert loop.finished(T0 + int(6.0e9))
