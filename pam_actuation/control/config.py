@@ -1,0 +1,158 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Controllers from YAML: a preset name, a file, or the text a recording carries.
+
+::
+
+    controller: sofc              # or pid
+    settings:                     # only what differs from the defaults
+      lead_s: 0.1
+      index_form: linear          # or table
+    rules: learned.json           # optional: rules to start from, path relative to this file
+
+Written by ``to_yaml`` for recordings, which must not depend on anything else:
+``rig`` (identity), ``static_inverse`` (table) and ``initial_rules`` (content of a
+rule file).
+"""
+
+import os
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import dump_yaml, load_yaml
+
+from pam_actuation.control.pid import PidController
+from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
+from pam_actuation.control.sofc.persistence import (
+    load_rules, rules_from_mapping, rules_to_mapping)
+from pam_actuation.control.static_inverse import tabulate_static_inverse
+
+_KINDS = ('sofc', 'pid')
+_KEYS = ('controller', 'rig', 'settings', 'rules', 'static_inverse', 'initial_rules')
+_INDEX_FORMS = ('linear', 'table')
+
+
+def rig_identity(rig):
+    """Return the text that ties rules to a rig: its name and valve."""
+    return f'{rig.name}/{rig.valve}'
+
+
+def load_controller(name_or_path_or_text, rig=None):
+    """
+    Build a controller.
+
+    Parameters
+    ----------
+    name_or_path_or_text : str or os.PathLike
+        Preset of ``config/controllers`` (``sofc_ppr``), path of a YAML file, or YAML text.
+    rig : pam_sim.rig.Rig, optional
+        Gives the static inverse at nominal load and the identity the rules are tied to. May
+        be None for text that brings its own ``static_inverse``.
+
+    Returns
+    -------
+    SelfOrganizingFuzzyController or PidController
+
+    Raises
+    ------
+    InputError
+        Unknown preset, missing file, unknown key, value out of range (each with file and
+        line), rules that do not fit.
+
+    """
+    text = os.fspath(name_or_path_or_text)
+    folder = '.'
+    if '\n' in text:
+        tree = load_yaml(text, name='controller text')
+    else:
+        from pam_actuation.resources import find_config
+        path = find_config('controllers', text)
+        folder = os.path.dirname(path)
+        tree = load_yaml(path)
+    return controller_from_tree(tree, rig, folder)
+
+
+def controller_from_tree(tree, rig=None, folder='.'):
+    """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
+    tree.check_keys(_KEYS)
+    kind = tree.require('controller', str, choices=_KINDS)
+    located = tree.get('settings', dict)
+    settings = dict(located.plain()) if located is not None else {}
+    where = located.where if located is not None else tree.where
+    if kind == 'sofc' and isinstance(settings.get('index_form'), str):
+        form = located.require('index_form', str, choices=_INDEX_FORMS)
+        settings['index_form'] = float(_INDEX_FORMS.index(form))
+    inverse = _static_inverse(tree, rig)
+    identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
+    if kind == 'pid':
+        for key in ('rules', 'initial_rules'):
+            if key in tree:
+                raise tree.error(f'a pid controller has no `{key}`', key)
+        return PidController(inverse, settings, identity, where)
+    controller = SelfOrganizingFuzzyController(
+        inverse, settings, rig_name=identity, where=where)
+    if 'rules' in tree and 'initial_rules' in tree:
+        raise tree.error('give either `rules` or `initial_rules`, not both', 'rules')
+    rules = None
+    if 'rules' in tree:
+        path = os.path.join(folder, os.path.expanduser(tree.require('rules', str)))
+        rules = load_rules(path, controller.rules)
+    elif 'initial_rules' in tree:
+        mapping = tree.require('initial_rules', dict).plain()
+        rules = rules_from_mapping(mapping, tree.where('initial_rules'), controller.rules)
+    if rules is not None:
+        controller.rules.assign(rules)
+    return controller
+
+
+def _static_inverse(tree, rig):
+    """Return the table of the file, else that of the rig."""
+    if 'static_inverse' in tree:
+        table = tree.require('static_inverse', dict)
+        table.check_keys(('lower_m', 'step_m', 'pressure_pa'))
+        lower_m = table.require('lower_m', float, lower=-0.1, upper=0.3, unit='m')
+        step_m = table.require('step_m', float, lower=1e-6, upper=0.1, unit='m')
+        nodes = table.require('pressure_pa', list)
+        if len(nodes) < 2:
+            raise table.error('`pressure_pa` needs at least two values', 'pressure_pa')
+        values = [nodes.require(i, float, lower=0.0, upper=1e7, unit='Pa')
+                  for i in range(len(nodes))]
+        return np.array([lower_m, step_m] + values)
+    if rig is None:
+        raise InputError(
+            'without a rig the controller text must bring its `static_inverse`', tree.where())
+    return tabulate_static_inverse(rig)
+
+
+def controller_to_yaml(controller):
+    """
+    Return YAML text that rebuilds a controller bit for bit, its present rules included.
+
+    A recording keeps this text, so that it can be replayed without rig, preset or rule file.
+    """
+    settings = dict(controller.settings)
+    if 'index_form' in settings:
+        settings['index_form'] = _INDEX_FORMS[int(round(settings['index_form']))]
+    inverse = controller.static_inverse.tolist()
+    data = {
+        'controller': controller.kind,
+        'rig': controller.rig_name,
+        'settings': settings,
+        'static_inverse': {
+            'lower_m': inverse[0], 'step_m': inverse[1], 'pressure_pa': inverse[2:]}}
+    if controller.rules is not None:
+        data['initial_rules'] = rules_to_mapping(controller.rules)
+    return dump_yaml(data)

@@ -1,0 +1,193 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The controller on a clock: messages in, pressure command and controller state out.
+
+No ROS inside; the node and the offline simulation use the same class.
+
+Faults of the inputs, all self-resuming:
+
+=============================================  ==========================================
+input                                          what the loop does
+=============================================  ==========================================
+no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
+than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
+range a muscle can reach
+no reference yet                               vents
+reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
+reference silent for more than 0.5 s           holds the last position, learning frozen
+reference silent for more than 2 s             vents
+a reference or trajectory that is not finite   that message is ignored
+pressure, force missing, stale or not finite   not used (they only guard start and learning)
+the loop itself stood still over 0.25 s        starts bumplessly
+=============================================  ==========================================
+"""
+
+import math
+
+from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.tick import TickCore, TickInputs
+from pam_actuation.messages import ControllerState, Pressure
+
+MAX_AGE_NS = 100_000_000
+MAX_AHEAD_NS = 20_000_000
+STALL_NS = 250_000_000
+
+
+class ControllerLoop:
+    """
+    Collects the newest inputs, checks them and runs the controller once per tick.
+
+    Parameters
+    ----------
+    controller : SelfOrganizingFuzzyController or PidController
+        As ``load_controller`` gives it.
+    contraction_range_m : tuple of float
+        Measurements outside are implausible: the sensor is wrong, not the muscle.
+
+    """
+
+    def __init__(self, controller, contraction_range_m=(-0.01, 0.1)):
+        self.controller = controller
+        self.contraction_range_m = contraction_range_m
+        self.references = ReferenceBuffer()
+        self.rejected_references = 0
+        self.reason = codes.REASONS[codes.NO_CONTRACTION]
+        self.valid = False
+        self._core = TickCore(controller)
+        self._contraction = None
+        self._pressure = None
+        self._force = None
+        self._last_tick_ns = None
+        self._used_contraction_ns = None
+
+    @property
+    def rate_hz(self):
+        """Rate [Hz] at which ``tick`` is to be called."""
+        return self.controller.rate_hz
+
+    @property
+    def ticks(self):
+        """Number of ticks run."""
+        return self._core.ticks
+
+    def on_contraction(self, message):
+        """Take a ``Contraction``."""
+        self._contraction = message
+
+    def on_pressure(self, message):
+        """Take a measured ``Pressure``."""
+        self._pressure = message
+
+    def on_force(self, message):
+        """Take a ``Force``."""
+        self._force = message
+
+    def on_reference(self, message):
+        """Take a ``Reference``; one that is not finite is ignored and counted."""
+        self.rejected_references += not self.references.set_reference(message)
+
+    def on_reference_trajectory(self, message):
+        """Take a ``ReferenceTrajectory``; an unusable one is ignored and counted."""
+        self.rejected_references += not self.references.set_trajectory(message)
+
+    def tick(self, now_ns, learning=True):
+        """
+        Run one tick at a time of the clock the stamps come from.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of the tick, stamp of both results.
+        learning : bool
+            Whether the rules may change; the controller's ``freeze_learning`` also counts.
+
+        Returns
+        -------
+        command : Pressure
+            Wanted muscle pressure, absolute; atmosphere while an input is invalid.
+        state : ControllerState
+            Every input used and every internal of the tick.
+
+        """
+        inputs = self._gather(now_ns, learning)
+        command_pa, values = self._core.run(inputs)
+        self.valid = inputs.reason in codes.RUNNING
+        self.reason = codes.REASONS[inputs.reason]
+        return (Pressure(now_ns, command_pa),
+                ControllerState(now_ns, self._core.names, values))
+
+    def _contraction_reason(self, now_ns):
+        """Return the code for the newest contraction, OK if it can be used."""
+        message = self._contraction
+        if message is None:
+            return codes.NO_CONTRACTION
+        if now_ns - message.stamp_ns > MAX_AGE_NS:
+            return codes.CONTRACTION_OLD
+        if message.stamp_ns - now_ns > MAX_AHEAD_NS:
+            return codes.CONTRACTION_AHEAD
+        if not math.isfinite(message.contraction_m):
+            return codes.CONTRACTION_NOT_FINITE
+        lowest, highest = self.contraction_range_m
+        if not lowest <= message.contraction_m <= highest:
+            return codes.CONTRACTION_IMPLAUSIBLE
+        return codes.OK
+
+    def _gather(self, now_ns, learning):
+        """Return the ``TickInputs`` of now."""
+        stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
+        self._last_tick_ns = now_ns
+        reason = self._contraction_reason(now_ns)
+        references = self.references
+        if reason == codes.OK:
+            reason = {
+                reference_buffer.NONE: codes.NO_REFERENCE,
+                reference_buffer.FRESH: codes.OK,
+                reference_buffer.HELD: codes.REFERENCE_HELD,
+                reference_buffer.LOST: codes.REFERENCE_LOST}[references.state(now_ns)]
+        may_learn = bool(
+            learning and reason == codes.OK and not self.controller.freeze_learning)
+        inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
+        if reason not in codes.RUNNING:
+            self._used_contraction_ns = None
+            return inputs
+        measured_ns = self._contraction.stamp_ns
+        inputs.contraction_m = self._contraction.contraction_m
+        # The error belongs to the time of the measurement, the preview to now.
+        inputs.reference_m, inputs.reference_m_per_s = references.at(now_ns, measured_ns)
+        inputs.lead_reference_m, inputs.lead_reference_m_per_s = references.at(
+            now_ns, now_ns + round(self.controller.lead_s * 1e9))
+        if self._used_contraction_ns is not None:
+            inputs.elapsed_s = (measured_ns - self._used_contraction_ns) * 1e-9
+        self._used_contraction_ns = measured_ns
+        pressure_ns = force_ns = reference_ns = trajectory_ns = -1
+        if self._fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
+            inputs.pressure_pa = self._pressure.pressure_pa
+            pressure_ns = self._pressure.stamp_ns
+        if self._fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
+            inputs.force_n = self._force.force_n
+            force_ns = self._force.stamp_ns
+        if references.uses_trajectory(now_ns) or references.reference is None:
+            trajectory_ns = references.trajectory.stamp_ns
+        else:
+            reference_ns = references.reference.stamp_ns
+        inputs.stamps_ns = (measured_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
+        return inputs
+
+    @staticmethod
+    def _fresh(message, now_ns):
+        """Return whether a message is neither too old nor too far ahead."""
+        return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS

@@ -1,0 +1,211 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+PID with anti-windup, optionally on top of the static inverse: the baseline.
+
+Derivative on the filtered change of error, back-calculation against the real
+limits of pressure and of its rate, bumpless start. Same interface as the
+self-organizing controller; it has no rules to learn.
+"""
+
+import math
+
+from numba import njit
+import numpy as np
+from pam_sim.units import P_ATM_PA
+
+from pam_actuation.control import inputs as place
+from pam_actuation.control.settings import checked_settings, Setting
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+
+SETTINGS = (
+    Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
+    Setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the static inverse'),
+    Setting('use_static_inverse', '-', 0.0, 0.0, 1.0, '1 = add the static inverse'),
+    Setting('proportional_pa_per_m', 'Pa/m', 2e6, 0.0, 5e7, 'proportional gain'),
+    Setting('integral_pa_per_m_s', 'Pa/(m s)', 2.5e7, 0.0, 1e9, 'integral gain'),
+    Setting('derivative_pa_s_per_m', 'Pa s/m', 1.5e5, 0.0, 5e6, 'derivative gain'),
+    Setting('anti_windup_time_s', 's', 0.2, 0.01, 10.0, 'back-calculation time constant'),
+    Setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
+    Setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
+    Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
+    Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+)
+NAMES = tuple(setting.name for setting in SETTINGS)
+
+(P_RATE, P_LEAD, P_INVERSE, P_PROPORTIONAL, P_INTEGRAL, P_DERIVATIVE, P_ANTI_WINDUP_TIME,
+ P_CHANGE_FILTER, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
+(S_STARTED, S_OFFSET, S_CONTRACTION, S_RATE, S_INTEGRAL, S_OUTPUT, S_HISTORY) = range(7)
+STATE_COUNT = 7
+_OFFSET_FLOOR_M = 1e-9      # then it is gone, before it becomes a denormal number
+STATE_NAMES = (
+    'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
+    'integral_pa', 'derivative_pa', 'unlimited_command_pa', 'saturated_low', 'saturated_high',
+    'slew_limited', 'start_offset_m')
+
+
+@njit(cache=True)
+def _start(par, inverse, st, inp):
+    """Begin so that the reference starts where the muscle is and the command where it is."""
+    st[S_STARTED] = 1.0
+    st[S_OFFSET] = inp[place.IN_REFERENCE] - inp[place.IN_CONTRACTION]
+    st[S_RATE] = 0.0
+    st[S_HISTORY] = 0.0
+    pressure = inp[place.IN_PRESSURE]
+    st[S_OUTPUT] = P_ATM_PA
+    if math.isfinite(pressure):
+        st[S_OUTPUT] = min(max(pressure, P_ATM_PA + par[P_MIN]), P_ATM_PA + par[P_MAX])
+    st[S_INTEGRAL] = 0.0
+    if par[P_INVERSE] < 0.5:
+        st[S_INTEGRAL] = st[S_OUTPUT] - P_ATM_PA
+
+
+@njit(cache=True)
+def pid_step(par, inverse, st, inp, out):
+    """
+    Run one tick; return the pressure command [absolute Pa].
+
+    ``par`` holds ``SETTINGS`` in order, ``inverse`` the static inverse table, ``st`` the
+    state, ``inp`` the inputs (``inputs.IN_*``), ``out`` receives ``STATE_NAMES``.
+    """
+    period = 1.0 / par[P_RATE]
+    if st[S_STARTED] < 0.5:
+        _start(par, inverse, st, inp)
+    x = inp[place.IN_CONTRACTION]
+    elapsed = inp[place.IN_ELAPSED]
+    if not math.isfinite(elapsed):
+        elapsed = period
+    if elapsed > 0.1:
+        st[S_RATE] = 0.0
+    elif elapsed > 0.0 and st[S_HISTORY] > 0.0:
+        raw = inp[place.IN_REFERENCE_RATE] - (x - st[S_CONTRACTION]) / elapsed
+        st[S_RATE] += elapsed / (par[P_CHANGE_FILTER] + elapsed) * (raw - st[S_RATE])
+    st[S_CONTRACTION] = x
+    st[S_HISTORY] += 1.0
+    offset = st[S_OFFSET]
+    st[S_OFFSET] = 0.0
+    if abs(offset) > _OFFSET_FLOOR_M:
+        st[S_OFFSET] = offset * (par[P_START_TIME] / (par[P_START_TIME] + period))
+    error = inp[place.IN_REFERENCE] - offset - x
+    base = P_ATM_PA
+    if par[P_INVERSE] > 0.5:
+        base = inverse_pressure_pa(inverse, inp[place.IN_LEAD_REFERENCE] - offset)
+    proportional = par[P_PROPORTIONAL] * error
+    derivative = par[P_DERIVATIVE] * st[S_RATE]
+    integral = st[S_INTEGRAL]
+    wanted = base + proportional + integral + derivative
+    lowest = P_ATM_PA + par[P_MIN]
+    highest = P_ATM_PA + par[P_MAX]
+    inside = min(max(wanted, lowest), highest)
+    reach = par[P_SLEW] * period
+    command = min(max(inside, st[S_OUTPUT] - reach), st[S_OUTPUT] + reach)
+    st[S_OUTPUT] = command
+    st[S_INTEGRAL] = integral + period * (
+        par[P_INTEGRAL] * error + (command - wanted) / par[P_ANTI_WINDUP_TIME])
+    out[0] = command
+    out[1] = error
+    out[2] = st[S_RATE]
+    out[3] = base
+    out[4] = proportional
+    out[5] = integral
+    out[6] = derivative
+    out[7] = wanted
+    out[8] = 1.0 if wanted < lowest else 0.0
+    out[9] = 1.0 if wanted > highest else 0.0
+    out[10] = 1.0 if command != inside else 0.0
+    out[11] = offset
+    return command
+
+
+class PidController:
+    """
+    PID controller in the interface of all controllers.
+
+    Parameters
+    ----------
+    static_inverse : numpy.ndarray
+        Table of ``static_inverse.tabulate_static_inverse``; used if ``use_static_inverse`` is 1.
+    settings : mapping, optional
+        What differs from the defaults of ``SETTINGS``.
+    rig_name : str
+        Identity of the rig, for the record.
+    where : callable, optional
+        Place of a setting for errors.
+
+    Raises
+    ------
+    InputError
+        A setting is unknown or out of range.
+
+    """
+
+    kind = 'pid'
+    state_names = STATE_NAMES
+    rules = None
+    rules_replaced = 0
+
+    def __init__(self, static_inverse, settings=None, rig_name='', where=None):
+        self.settings = checked_settings(SETTINGS, settings or {}, where)
+        self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
+        self.rig_name = rig_name
+        self.freeze_learning = False
+        self.parameters = np.array([self.settings[name] for name in NAMES])
+        self._state = np.zeros(STATE_COUNT)
+        self._inputs = np.zeros(place.INPUT_COUNT)
+        self._outputs = np.zeros(len(STATE_NAMES))
+        self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
+        self.pause()
+
+    @property
+    def rate_hz(self):
+        """Rate [Hz] at which ``step`` is to be called."""
+        return self.settings['rate_hz']
+
+    @property
+    def lead_s(self):
+        """Preview [s] of the static inverse."""
+        return self.settings['lead_s']
+
+    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
+             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
+        """Run one tick as ``SelfOrganizingFuzzyController.step``; ``learn`` is ignored."""
+        self._inputs[:] = (
+            x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, 0.0, elapsed_s,
+            pressure_pa, force_n)
+        return pid_step(
+            self.parameters, self.static_inverse, self._state, self._inputs, self._outputs)
+
+    def state_values(self):
+        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
+        return tuple(self._outputs.tolist())
+
+    def learning_reason(self):
+        """Return why nothing is learned."""
+        return 'this controller has no rules'
+
+    def pause(self):
+        """Forget the motion: the next tick starts bumplessly."""
+        self._state[:] = 0.0
+        self._outputs[:] = 0.0
+
+    def reset(self):
+        """Forget the motion."""
+        self.pause()
+
+    def to_yaml(self):
+        """Return YAML text from which ``load_controller`` builds an identical controller."""
+        from pam_actuation.control.config import controller_to_yaml
+        return controller_to_yaml(self)

@@ -1,0 +1,75 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Settings of a controller: named numbers with unit, default and allowed range."""
+
+from dataclasses import dataclass
+import difflib
+import math
+
+from pam_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One number a controller can be given."""
+
+    name: str
+    unit: str
+    default: float
+    lower: float
+    upper: float
+    description: str
+
+
+def checked_settings(specification, given, where=None):
+    """
+    Return every setting of a specification as floats, the given ones checked.
+
+    Parameters
+    ----------
+    specification : tuple of Setting
+        What the controller knows.
+    given : mapping of str -> number
+        What differs from the defaults.
+    where : callable, optional
+        Returns the place (``file:line``) of a given name.
+
+    Raises
+    ------
+    InputError
+        Unknown name, not a number, or outside the allowed range.
+
+    """
+    place = where if where is not None else (lambda name: name)
+    known = {setting.name: setting for setting in specification}
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f'; did you mean {near[0]}' if near else ''
+            raise InputError(
+                f'unknown setting {name}{hint}; known are {", ".join(sorted(known))}',
+                place(name))
+    values = {}
+    for setting in specification:
+        value = given.get(setting.name, setting.default)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError(
+                f'{setting.name} must be a number, not {value!r}', place(setting.name))
+        if not (math.isfinite(value) and setting.lower <= value <= setting.upper):
+            raise InputError(
+                f'{setting.name} = {value} {setting.unit} is outside '
+                f'{setting.lower:g}...{setting.upper:g} {setting.unit}', place(setting.name))
+        values[setting.name] = float(value)
+    return values

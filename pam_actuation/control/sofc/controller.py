@@ -1,0 +1,219 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The self-organizing fuzzy controller as a class: owner of the arrays of ``sofc_step``."""
+
+import math
+
+import numpy as np
+from pam_sim.errors import InputError
+
+from pam_actuation.control.inputs import INPUT_COUNT
+from pam_actuation.control.settings import checked_settings
+from pam_actuation.control.sofc import layout
+from pam_actuation.control.sofc.credit import ENTRY_SIZE, ring_rows
+from pam_actuation.control.sofc.learning import REASONS
+from pam_actuation.control.sofc.persistence import check_fit
+from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
+from pam_actuation.control.sofc.settings import parameter_vector, SCALING, SETTINGS
+from pam_actuation.control.sofc.step import sofc_step
+
+
+class SelfOrganizingFuzzyController:
+    """
+    Fuzzy controller whose rules change while it runs (Procyk and Mamdani, 1979).
+
+    Parameters
+    ----------
+    static_inverse : numpy.ndarray
+        Table of ``static_inverse.tabulate_static_inverse``.
+    settings : mapping, optional
+        What differs from the defaults of ``sofc.settings.SETTINGS``.
+    rules : RuleBase, optional
+        Rules to start from; linear feedback rules and zero feed-forward by default.
+    rig_name : str
+        Identity of the rig the rules belong to.
+    where : callable, optional
+        Place of a setting for errors.
+
+    Raises
+    ------
+    InputError
+        A setting is unknown or out of range, or the rules do not fit.
+
+    """
+
+    kind = 'sofc'
+    state_names = layout.STATE_NAMES
+
+    def __init__(self, static_inverse, settings=None, rules=None, rig_name='', where=None):
+        self.settings = checked_settings(SETTINGS, settings or {}, where)
+        knots = self.settings['reference_knots'] = float(round(self.settings['reference_knots']))
+        if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
+            raise InputError(
+                'reference_upper_m must be larger than reference_lower_m',
+                where('reference_upper_m') if where else 'reference_upper_m')
+        if self.settings['max_pressure_gauge_pa'] <= self.settings['min_pressure_gauge_pa']:
+            raise InputError(
+                'max_pressure_gauge_pa must be larger than min_pressure_gauge_pa',
+                where('max_pressure_gauge_pa') if where else 'max_pressure_gauge_pa')
+        self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
+        self.rig_name = rig_name
+        scaling = {name: self.settings[name] for name in SCALING}
+        scaling['rig'] = rig_name
+        self.rules = RuleBase(
+            linear_feedback_table(), np.zeros((2, int(knots))), scaling=scaling)
+        if rules is not None:
+            check_fit(rules, self.rules, 'rules')
+            self.rules.assign(rules)
+        self.freeze_learning = False
+        self.rules_replaced = 0       # times the rules were exchanged from outside
+        self.parameters = parameter_vector(self.settings)
+        self._ring = np.zeros((ring_rows(
+            int(self.parameters[layout.P_DELAY]), int(self.parameters[layout.P_SPREAD])),
+            ENTRY_SIZE))
+        self._state = np.zeros(layout.STATE_COUNT)
+        self._inputs = np.zeros(INPUT_COUNT)
+        self._outputs = np.zeros(layout.OUTPUT_COUNT)
+        rules = self.rules
+        self._arguments = (
+            self.parameters, self.static_inverse, rules.feedback, rules.feedforward,
+            rules.feedback_initial, rules.feedforward_initial, rules.feedback_fired,
+            rules.feedforward_fired, self._ring, self._state, self._inputs, self._outputs)
+        # Compile, or load what was compiled before, now and not in the first real tick.
+        sofc_step(*(array.copy() for array in self._arguments))
+
+    @property
+    def rate_hz(self):
+        """Rate [Hz] at which ``step`` is to be called."""
+        return self.settings['rate_hz']
+
+    @property
+    def lead_s(self):
+        """Preview [s]: how far ahead the lead reference is to be taken."""
+        return self.settings['lead_s']
+
+    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
+             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
+        """
+        Run one tick.
+
+        Parameters
+        ----------
+        x_m : float
+            Measured contraction [m].
+        ref_m, ref_vel_m_per_s : float
+            Wanted contraction [m] and rate [m/s] at the time of that measurement.
+        ref_lead_m, ref_lead_vel_m_per_s : float
+            The same ``lead_s`` ahead of now.
+        learn : bool
+            Whether the rules may change.
+        elapsed_s : float
+            Time between the measurements of this and the former tick; NaN: one period.
+        pressure_pa, force_n : float
+            Measured absolute pressure [Pa] and force [N]; NaN where not known. Used for the
+            bumpless start and for freezing the learning only.
+
+        Returns
+        -------
+        float
+            Wanted muscle pressure, absolute Pa, never below atmosphere.
+
+        """
+        inputs = self._inputs
+        inputs[0] = x_m
+        inputs[1] = ref_m
+        inputs[2] = ref_vel_m_per_s
+        inputs[3] = ref_lead_m
+        inputs[4] = ref_lead_vel_m_per_s
+        inputs[5] = 1.0 if learn and not self.freeze_learning else 0.0
+        inputs[6] = elapsed_s
+        inputs[7] = pressure_pa
+        inputs[8] = force_n
+        return sofc_step(*self._arguments)
+
+    def state_values(self):
+        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
+        return tuple(self._outputs.tolist())
+
+    def learning_reason(self):
+        """Return in words whether the last tick learned, or why not."""
+        return REASONS[int(self._outputs[layout.O_REASON])]
+
+    def pause(self):
+        """Forget the motion, keep the rules: the next tick starts bumplessly."""
+        self._state[:] = 0.0
+        self._ring[:] = 0.0
+        self._outputs[:] = 0.0
+
+    def reset(self):
+        """Return to the initial rules and forget the motion."""
+        self.rules.reset()
+        self.pause()
+
+    def replace_rules(self, rules, where='rules'):
+        """
+        Exchange the rules without a step in the command.
+
+        The difference the exchange makes at the present operating point goes into the
+        integral, which then fades it out.
+
+        Raises
+        ------
+        InputError
+            The rules do not fit this controller; the old ones stay.
+
+        """
+        check_fit(rules, self.rules, where)
+        before = self._rule_output_pa()
+        self.rules.assign(rules)
+        self._keep_output(before)
+
+    def reset_rules(self):
+        """Return to the initial rules without a step in the command."""
+        before = self._rule_output_pa()
+        self.rules.reset()
+        self._keep_output(before)
+
+    def _keep_output(self, before_pa):
+        self.rules_replaced += 1
+        self._ring[:, :] = 0.0        # no credit for rules that are gone
+        self._state[layout.S_HISTORY] = 0.0
+        change = before_pa - self._rule_output_pa()
+        limit = self.settings['integral_limit_pa']
+        integral = self._state[layout.S_INTEGRAL] + change
+        self._state[layout.S_INTEGRAL] = min(max(integral, -limit), limit)
+
+    def _rule_output_pa(self):
+        """Return the contribution [Pa] of both rule bases where the last tick was."""
+        from pam_actuation.control.sofc.rule_table import infer_feedback, infer_feedforward
+        out = self._outputs
+        share = out[layout.O_SHARE]
+        return (
+            self.settings['feedback_gain_pa'] * infer_feedback(
+                self.rules.feedback, share,
+                int(out[layout.O_ERROR_SET]), out[layout.O_ERROR_DEGREE],
+                int(out[layout.O_CHANGE_SET]), out[layout.O_CHANGE_DEGREE])
+            + infer_feedforward(
+                self.rules.feedforward, share,
+                int(out[layout.O_KNOT]), out[layout.O_KNOT_DEGREE]))
+
+    def to_mapping(self):
+        """Return everything that makes this controller, for ``config.controller_to_yaml``."""
+        return {'settings': dict(self.settings), 'rules': self.rules}
+
+    def to_yaml(self):
+        """Return YAML text from which ``load_controller`` builds an identical controller."""
+        from pam_actuation.control.config import controller_to_yaml
+        return controller_to_yaml(self)

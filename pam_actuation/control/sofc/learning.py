@@ -1,0 +1,90 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Rule modification and the reasons to leave the rules alone.
+
+The rules that were active one credit delay ago change in proportion to their
+firing strength and to the performance index (Procyk and Mamdani 1979; local
+memory as in fuzzy model reference learning control, Layne and Passino). With a
+partition of unity this is the gradient law ``theta' = gamma s xi``, hence the
+usual protections: bounds, a limit per tick, a dead zone, and a leak towards the
+initial rules on visited rules only.
+"""
+
+from numba import njit
+
+LEARNING = 0
+FROZEN_OFF = 1            # learning switched off
+FROZEN_START = 2          # start-up: bumpless offset or less history than the credit delay
+FROZEN_JUMP = 3           # the reference jumped
+FROZEN_SATURATED = 4      # the command is, or was when the rules were active, at a limit
+FROZEN_DEAD_ZONE = 5      # the error is within noise
+FROZEN_SLACK = 6          # the muscle is slack
+FROZEN_VALVE = 7          # the pressure does not follow: supply or valve
+REASONS = (
+    'learning', 'learning is off', 'starting', 'reference jumped', 'command at a limit',
+    'error within the dead zone', 'muscle slack', 'pressure does not follow the command')
+
+
+@njit(cache=True)
+def _bounded(value, limit):
+    return min(max(value, -limit), limit)
+
+
+@njit(cache=True)
+def modify_feedback(table, initial, share, i, wi, j, wj, gain, leak, step_limit):
+    """
+    Change the feedback rules that were active; return the squared norm of the change.
+
+    Each rule moves by ``gain x firing strength``, at most ``step_limit``, leaks by
+    ``leak x strength`` of its distance to the initial rule, and stays in [-1, 1].
+    """
+    squares = 0.0
+    for d in range(2):
+        direction = share if d == 0 else 1.0 - share
+        for a in range(2):
+            error_degree = wi if a == 1 else 1.0 - wi
+            for b in range(2):
+                strength = direction * error_degree * (wj if b == 1 else 1.0 - wj)
+                if strength > 0.0:
+                    old = table[d, i + a, j + b]
+                    new = (old + _bounded(gain * strength, step_limit)
+                           - leak * strength * (old - initial[d, i + a, j + b]))
+                    new = _bounded(new, 1.0)
+                    table[d, i + a, j + b] = new
+                    squares += (new - old) * (new - old)
+    return squares
+
+
+@njit(cache=True)
+def modify_feedforward(table, initial, share, k, wk, gain_pa, leak, step_limit_pa, limit_pa):
+    """
+    Change the feed-forward rules that were active; return the squared norm [Pa^2].
+
+    As ``modify_feedback``, with singletons in Pa within ``+-limit_pa``.
+    """
+    squares = 0.0
+    for d in range(2):
+        direction = share if d == 0 else 1.0 - share
+        for a in range(2):
+            strength = direction * (wk if a == 1 else 1.0 - wk)
+            if strength > 0.0:
+                old = table[d, k + a]
+                new = (old + _bounded(gain_pa * strength, step_limit_pa)
+                       - leak * strength * (old - initial[d, k + a]))
+                new = _bounded(new, limit_pa)
+                table[d, k + a] = new
+                squares += (new - old) * (new - old)
+    return squares

@@ -1,0 +1,93 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Settings of the self-organizing fuzzy controller and their places in compiled code.
+
+The order of ``SETTINGS`` is the order of the parameter vector: ``P_<NAME>`` in
+``layout`` are the indices. Derived entries (period, delays in ticks) follow.
+"""
+
+import numpy as np
+
+from pam_actuation.control.settings import Setting
+from pam_actuation.control.sofc import layout
+
+SETTINGS = (
+    Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
+    Setting('lead_s', 's', 0.1, 0.0, 0.5, 'preview: how far ahead the reference is taken'),
+    Setting('error_universe_m', 'm', 2e-3, 1e-5, 0.1, 'error at which the outer set is full'),
+    Setting('change_universe_m_per_s', 'm/s', 0.04, 1e-4, 2.0, 'same for the change of error'),
+    Setting('feedback_gain_pa', 'Pa', 6e3, 0.0, 2e5, 'pressure of a feedback rule of value 1'),
+    Setting('proportional_pa_per_m', 'Pa/m', 8e5, 0.0, 5e7, 'proportional trim'),
+    Setting('integral_pa_per_m_s', 'Pa/(m s)', 1.2e7, 0.0, 1e9, 'integral trim'),
+    Setting('derivative_pa_s_per_m', 'Pa s/m', 8e4, 0.0, 5e6, 'derivative trim'),
+    Setting('integral_limit_pa', 'Pa', 1.5e5, 0.0, 8e5, 'bound of the integral'),
+    Setting('anti_windup_time_s', 's', 0.2, 0.01, 10.0, 'back-calculation time constant'),
+    Setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
+    Setting('direction_blend_m_per_s', 'm/s', 5e-4, 1e-6, 0.1,
+            'rate of the reference below which both directions are active'),
+    Setting('index_form', '-', 0.0, 0.0, 1.0,
+            'performance index: 0 linear, 1 the 13-level table'),
+    Setting('index_tau_s', 's', 0.06, 0.0, 2.0, 'wanted decay time of the error'),
+    Setting('index_limit_m', 'm', 2e-3, 1e-6, 0.1, 'bound of the performance index'),
+    Setting('dead_zone_m', 'm', 1e-5, 0.0, 0.01, 'no learning below this error'),
+    Setting('credit_delay_s', 's', 0.09, 0.0, 1.0, 'how long ago the blamed rules were active'),
+    Setting('credit_spread_s', 's', 0.0, 0.0, 0.2, 'half width of the credit kernel'),
+    Setting('learning_rate', '-', 1.2, 0.0, 10.0, 'common factor of all rule changes'),
+    Setting('feedback_learning_per_m_s', '1/(m s)', 2e3, 0.0, 1e6,
+            'change of a feedback rule per index and time'),
+    Setting('feedforward_learning_pa_per_m_s', 'Pa/(m s)', 2e7, 0.0, 1e9,
+            'change of a feed-forward rule per index and time'),
+    Setting('feedback_step_limit', '-', 0.02, 0.0, 1.0, 'largest change per tick'),
+    Setting('feedforward_step_limit_pa', 'Pa', 1e3, 0.0, 1e5, 'largest change per tick'),
+    Setting('feedforward_limit_pa', 'Pa', 1.2e5, 0.0, 6e5, 'bound of a feed-forward rule'),
+    Setting('feedback_leak_per_m_s', '1/(m s)', 20.0, 0.0, 1e4,
+            'forgetting of visited feedback rules per index and time'),
+    Setting('feedforward_leak_per_m_s', '1/(m s)', 0.0, 0.0, 1e4,
+            'forgetting of visited feed-forward rules per index and time'),
+    Setting('reference_lower_m', 'm', 0.0, -0.05, 0.2, 'first knot of the feed-forward rules'),
+    Setting('reference_upper_m', 'm', 0.03, 0.001, 0.3, 'last knot of the feed-forward rules'),
+    Setting('reference_knots', '-', 25.0, 3.0, 401.0, 'number of knots'),
+    Setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
+    Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
+    Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+    Setting('jump_m', 'm', 1e-3, 1e-5, 0.1, 'reference jump that freezes learning'),
+    Setting('jump_freeze_s', 's', 0.6, 0.0, 10.0, 'for how long, beyond the credit delay'),
+    Setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
+    Setting('valve_gap_pa', 'Pa', 8e4, 1e3, 1e6,
+            'command minus pressure, one credit delay later, that freezes learning'),
+)
+
+NAMES = tuple(setting.name for setting in SETTINGS)
+
+# What rules mean depends on these; a file of rules must agree in all of them.
+SCALING = (
+    'rate_hz', 'error_universe_m', 'change_universe_m_per_s', 'feedback_gain_pa',
+    'reference_lower_m', 'reference_upper_m', 'reference_knots', 'feedforward_limit_pa')
+
+
+def parameter_vector(values):
+    """Return the parameter vector of compiled code for checked settings (a dict)."""
+    vector = np.zeros(layout.PARAMETER_COUNT)
+    for index, name in enumerate(NAMES):
+        vector[index] = values[name]
+    period_s = 1.0 / values['rate_hz']
+    vector[layout.P_PERIOD] = period_s
+    vector[layout.P_DELAY] = round(values['credit_delay_s'] / period_s)
+    vector[layout.P_SPREAD] = round(values['credit_spread_s'] / period_s)
+    if vector[layout.P_SPREAD] > vector[layout.P_DELAY]:
+        vector[layout.P_SPREAD] = vector[layout.P_DELAY]
+    return vector

@@ -1,0 +1,279 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One tick of the self-organizing fuzzy controller, compiled, without allocation.
+
+Order of a tick: error and filtered change of error; fuzzification; both rule
+bases, static inverse, trim; limits with back-calculation; memory of the firing
+strengths; modification of the rules that were active one credit delay ago.
+"""
+
+import math
+
+from numba import njit
+from pam_sim.units import P_ATM_PA
+
+from pam_actuation.control import inputs as place
+from pam_actuation.control.sofc import credit, layout as at, learning
+from pam_actuation.control.sofc.membership import locate, SET_COUNT
+from pam_actuation.control.sofc.performance_index import index_linear, index_table
+from pam_actuation.control.sofc.rule_table import (
+    contracting_share, infer_feedback, infer_feedforward)
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+
+_STALE_RATE_S = 0.1       # a longer gap between measurements restarts the rate filter
+_START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
+_OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
+_START_TRIM_PA = 3e4      # largest integral taken over at the start
+_LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
+
+
+@njit(cache=True)
+def _start(par, inverse, st, inp):
+    """Begin so that the reference starts where the muscle is and the command where it is."""
+    x = inp[place.IN_CONTRACTION]
+    st[at.S_STARTED] = 1.0
+    st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
+    st[at.S_CONTRACTION] = x
+    st[at.S_RATE] = 0.0
+    st[at.S_INTEGRAL] = 0.0
+    st[at.S_OUTPUT] = P_ATM_PA
+    st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
+    st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
+    st[at.S_FREEZE_LEFT] = 0.0
+    st[at.S_HISTORY] = 0.0
+    pressure = inp[place.IN_PRESSURE]
+    if math.isfinite(pressure):
+        st[at.S_OUTPUT] = min(
+            max(pressure, P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]),
+            P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE])
+        if x > _LIFTED_M:
+            trim = pressure - inverse_pressure_pa(inverse, x)
+            st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
+
+
+@njit(cache=True)
+def _update_rate(par, st, inp):
+    """Update and return the filtered change of error [m/s] from the contraction alone."""
+    elapsed = inp[place.IN_ELAPSED]
+    if not math.isfinite(elapsed):
+        elapsed = par[at.P_PERIOD]
+    x = inp[place.IN_CONTRACTION]
+    if elapsed > _STALE_RATE_S:
+        st[at.S_RATE] = 0.0
+    elif elapsed > 0.0 and st[at.S_HISTORY] > 0.0:
+        raw = inp[place.IN_REFERENCE_RATE] - (x - st[at.S_CONTRACTION]) / elapsed
+        part = elapsed / (par[at.P_CHANGE_FILTER] + elapsed)
+        st[at.S_RATE] += part * (raw - st[at.S_RATE])
+    st[at.S_CONTRACTION] = x
+    return st[at.S_RATE]
+
+
+@njit(cache=True)
+def _jumped(par, st, inp):
+    """Tell whether a reference moved otherwise than its rate says since the former tick."""
+    period = par[at.P_PERIOD]
+    now = abs(inp[place.IN_REFERENCE] - st[at.S_REFERENCE]
+              - inp[place.IN_REFERENCE_RATE] * period)
+    lead = abs(inp[place.IN_LEAD_REFERENCE] - st[at.S_LEAD_REFERENCE]
+               - inp[place.IN_LEAD_RATE] * period)
+    st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
+    st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
+    return now > par[at.P_JUMP] or lead > par[at.P_JUMP]
+
+
+@njit(cache=True)
+def _reason(par, ring, st, inp, error, limited):
+    """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
+    tick = int(st[at.S_TICK])
+    delay = int(par[at.P_DELAY])
+    spread = int(par[at.P_SPREAD])
+    if inp[place.IN_LEARN] < 0.5:
+        return learning.FROZEN_OFF
+    if st[at.S_HISTORY] < delay + spread or abs(st[at.S_OFFSET]) > _START_BAND_M:
+        return learning.FROZEN_START
+    if st[at.S_FREEZE_LEFT] > 0.0:
+        return learning.FROZEN_JUMP
+    force = inp[place.IN_FORCE]
+    if force < par[at.P_SLACK_FORCE]:         # False for NaN: force is optional
+        return learning.FROZEN_SLACK
+    then = credit.row_of(ring, tick, delay)
+    gap = abs(ring[then, credit.ENTRY_OUTPUT] - inp[place.IN_PRESSURE])
+    if gap > par[at.P_VALVE_GAP]:             # False for NaN: pressure is optional
+        return learning.FROZEN_VALVE
+    if limited or ring[then, credit.ENTRY_VALID] < 0.5:
+        return learning.FROZEN_SATURATED
+    if abs(error) <= par[at.P_DEAD_ZONE]:
+        return learning.FROZEN_DEAD_ZONE
+    return learning.LEARNING
+
+
+@njit(cache=True)
+def _learn(par, fb, ff, fb0, ff0, ring, st, index):
+    """Modify the rules active one credit delay ago; return the squared norms of the change."""
+    tick = int(st[at.S_TICK])
+    delay = int(par[at.P_DELAY])
+    spread = int(par[at.P_SPREAD])
+    dose = par[at.P_LEARNING_RATE] * index * par[at.P_PERIOD]
+    leak = abs(index) * par[at.P_PERIOD]
+    fb_squares = 0.0
+    ff_squares = 0.0
+    for offset in range(-spread, spread + 1):
+        row = credit.row_of(ring, tick, delay + offset)
+        if ring[row, credit.ENTRY_VALID] < 0.5:
+            continue
+        weight = credit.kernel_weight(offset, spread)
+        share = ring[row, credit.ENTRY_SHARE]
+        fb_squares += learning.modify_feedback(
+            fb, fb0, share,
+            int(ring[row, credit.ENTRY_ERROR_SET]), ring[row, credit.ENTRY_ERROR_DEGREE],
+            int(ring[row, credit.ENTRY_CHANGE_SET]), ring[row, credit.ENTRY_CHANGE_DEGREE],
+            weight * dose * par[at.P_FEEDBACK_LEARNING],
+            weight * leak * par[at.P_FEEDBACK_LEAK],
+            weight * par[at.P_FEEDBACK_STEP_LIMIT])
+        ff_squares += learning.modify_feedforward(
+            ff, ff0, share,
+            int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
+            weight * dose * par[at.P_FEEDFORWARD_LEARNING],
+            weight * leak * par[at.P_FEEDFORWARD_LEAK],
+            weight * par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+    return fb_squares, ff_squares
+
+
+@njit(cache=True)
+def _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk):
+    """Add the firing strengths of this tick to the counts of the rules."""
+    for d in range(2):
+        direction = share if d == 0 else 1.0 - share
+        fb_fired[d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
+        fb_fired[d, i, j + 1] += direction * (1.0 - wi) * wj
+        fb_fired[d, i + 1, j] += direction * wi * (1.0 - wj)
+        fb_fired[d, i + 1, j + 1] += direction * wi * wj
+        ff_fired[d, k] += direction * (1.0 - wk)
+        ff_fired[d, k + 1] += direction * wk
+
+
+@njit(cache=True)
+def sofc_step(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
+    """
+    Run one tick; return the pressure command [absolute Pa].
+
+    Parameters
+    ----------
+    par, inverse : float64[:]
+        Parameter vector (``settings.parameter_vector``) and static inverse table.
+    fb, ff, fb0, ff0, fb_fired, ff_fired : float64[:, :, :] and float64[:, :]
+        Feedback and feed-forward rules, their initial values, their firing counts.
+    ring : float64[:, :]
+        Credit memory (``credit.ring_rows`` rows).
+    st, inp, out : float64[:]
+        State (``layout.S_*``), inputs (``inputs.IN_*``), outputs (``layout.O_*``).
+
+    """
+    period = par[at.P_PERIOD]
+    if st[at.S_STARTED] < 0.5:
+        _start(par, inverse, st, inp)
+    change = _update_rate(par, st, inp)
+    jumped = _jumped(par, st, inp)
+    if jumped:
+        st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
+    offset = st[at.S_OFFSET]
+    error = inp[place.IN_REFERENCE] - offset - inp[place.IN_CONTRACTION]
+    lead = inp[place.IN_LEAD_REFERENCE] - offset
+    st[at.S_OFFSET] = 0.0
+    if abs(offset) > _OFFSET_FLOOR_M:
+        st[at.S_OFFSET] = offset * (par[at.P_START_TIME] / (par[at.P_START_TIME] + period))
+
+    # Fuzzification.
+    error_scaled = error / par[at.P_ERROR_UNIVERSE]
+    change_scaled = change / par[at.P_CHANGE_UNIVERSE]
+    i, wi = locate(error_scaled, -1.0, 1.0, SET_COUNT)
+    j, wj = locate(change_scaled, -1.0, 1.0, SET_COUNT)
+    k, wk = locate(lead, par[at.P_REFERENCE_LOWER], par[at.P_REFERENCE_UPPER], ff.shape[1])
+    share = contracting_share(inp[place.IN_LEAD_RATE], par[at.P_DIRECTION_BLEND])
+
+    # Inference and trim.
+    base = inverse_pressure_pa(inverse, lead)
+    feedback = par[at.P_FEEDBACK_GAIN] * infer_feedback(fb, share, i, wi, j, wj)
+    feedforward = infer_feedforward(ff, share, k, wk)
+    proportional = par[at.P_PROPORTIONAL] * error
+    derivative = par[at.P_DERIVATIVE] * change
+    integral = st[at.S_INTEGRAL]
+    wanted = base + feedback + feedforward + proportional + integral + derivative
+
+    # The limits of the actuator, then of its speed.
+    lowest = P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]
+    highest = P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE]
+    command = min(max(wanted, lowest), highest)
+    at_low = wanted < lowest
+    at_high = wanted > highest
+    reach = par[at.P_SLEW] * period
+    slewed = min(max(command, st[at.S_OUTPUT] - reach), st[at.S_OUTPUT] + reach)
+    at_slew = slewed != command
+    command = slewed
+    limited = at_low or at_high or at_slew
+    st[at.S_OUTPUT] = command
+
+    # Integral with back-calculation against those limits.
+    growth = (par[at.P_INTEGRAL] * error
+              + (command - wanted) / par[at.P_ANTI_WINDUP_TIME]) * period
+    st[at.S_INTEGRAL] = min(
+        max(integral + growth, -par[at.P_INTEGRAL_LIMIT]), par[at.P_INTEGRAL_LIMIT])
+
+    # Credit memory and rule modification.
+    undisturbed = st[at.S_FREEZE_LEFT] <= 0.0 and abs(offset) <= _START_BAND_M
+    credit.push(ring, int(st[at.S_TICK]), i, wi, j, wj, share, k, wk,
+                0.0 if limited or not undisturbed else 1.0, command)
+    if par[at.P_INDEX_FORM] < 0.5:
+        index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
+    else:
+        index = index_table(error_scaled, change_scaled, par[at.P_INDEX_LIMIT])
+    reason = _reason(par, ring, st, inp, error, limited)
+    fb_squares = 0.0
+    ff_squares = 0.0
+    if reason == learning.LEARNING:
+        fb_squares, ff_squares = _learn(par, fb, ff, fb0, ff0, ring, st, index)
+    _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk)
+
+    out[at.O_COMMAND] = command
+    out[at.O_ERROR] = error
+    out[at.O_CHANGE] = change
+    out[at.O_INVERSE] = base
+    out[at.O_FEEDBACK] = feedback
+    out[at.O_FEEDFORWARD] = feedforward
+    out[at.O_PROPORTIONAL] = proportional
+    out[at.O_INTEGRAL] = integral
+    out[at.O_DERIVATIVE] = derivative
+    out[at.O_UNLIMITED] = wanted
+    out[at.O_SAT_LOW] = 1.0 if at_low else 0.0
+    out[at.O_SAT_HIGH] = 1.0 if at_high else 0.0
+    out[at.O_SAT_SLEW] = 1.0 if at_slew else 0.0
+    out[at.O_SHARE] = share
+    out[at.O_ERROR_SET] = i
+    out[at.O_ERROR_DEGREE] = wi
+    out[at.O_CHANGE_SET] = j
+    out[at.O_CHANGE_DEGREE] = wj
+    out[at.O_KNOT] = k
+    out[at.O_KNOT_DEGREE] = wk
+    out[at.O_INDEX] = index
+    out[at.O_REASON] = reason
+    out[at.O_CREDIT] = 1.0 if reason == learning.LEARNING else 0.0
+    out[at.O_FEEDBACK_NORM] = par[at.P_FEEDBACK_GAIN] * math.sqrt(fb_squares)
+    out[at.O_FEEDFORWARD_NORM] = math.sqrt(ff_squares)
+    out[at.O_OFFSET] = offset
+    st[at.S_TICK] += 1.0
+    st[at.S_HISTORY] += 1.0
+    st[at.S_FREEZE_LEFT] = max(0.0, st[at.S_FREEZE_LEFT] - period)
+    return command

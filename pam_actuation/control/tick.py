@@ -1,0 +1,132 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One controller tick as a pure function of its inputs: what live loop and replay share.
+
+``TickInputs`` is everything a tick depends on besides the controller's own
+state. ``TickCore`` turns it into a command and the numbers of
+``controller_state``; replaying the same inputs gives the same bits.
+"""
+
+from dataclasses import dataclass
+import math
+
+from pam_sim.units import P_ATM_PA
+
+(OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
+ CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD) = range(9)
+REASONS = (
+    'ok',
+    'no contraction measured yet',
+    'contraction is older than 0.1 s',
+    'contraction is stamped more than 0.02 s ahead',
+    'contraction is not a finite number',
+    'contraction is outside what the muscle can do',
+    'no reference yet',
+    'reference lost, muscle vented',
+    'reference lost, holding its last position')
+RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
+
+STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
+INPUT_NAMES = (
+    'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced',
+    *(f'{name}_stamp_{part}' for name in STAMPED for part in ('sec', 'nanosec')),
+    'contraction_m', 'reference_m', 'reference_m_per_s', 'lead_reference_m',
+    'lead_reference_m_per_s', 'elapsed_s', 'pressure_pa', 'force_n')
+
+
+@dataclass(slots=True)
+class TickInputs:
+    """
+    Everything one tick depends on.
+
+    ``reason`` is one of this module's codes; ``stamps_ns`` gives the stamp of every input
+    used, in the order of ``STAMPED``, -1 for one not used. Other fields: see
+    ``SelfOrganizingFuzzyController.step``. ``restarted``: the loop stood still, so that the
+    motion known from before means nothing.
+    """
+
+    reason: int = OK
+    learning: bool = True
+    restarted: bool = False
+    stamps_ns: tuple = (-1,) * len(STAMPED)
+    contraction_m: float = math.nan
+    reference_m: float = math.nan
+    reference_m_per_s: float = math.nan
+    lead_reference_m: float = math.nan
+    lead_reference_m_per_s: float = math.nan
+    elapsed_s: float = math.nan
+    pressure_pa: float = math.nan
+    force_n: float = math.nan
+
+
+def split_stamp(stamp_ns):
+    """Return a stamp as two numbers that a float holds exactly: seconds, nanoseconds."""
+    if stamp_ns < 0:
+        return -1.0, 0.0
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    return float(seconds), float(nanoseconds)
+
+
+def join_stamp(seconds, nanoseconds):
+    """Return the stamp [ns] of ``split_stamp``, -1 for none."""
+    return -1 if seconds < 0 else int(seconds) * 1_000_000_000 + int(nanoseconds)
+
+
+class TickCore:
+    """
+    A controller with a tick counter.
+
+    Parameters
+    ----------
+    controller : SelfOrganizingFuzzyController or PidController
+
+    """
+
+    def __init__(self, controller):
+        self.controller = controller
+        self.ticks = 0
+        self.names = INPUT_NAMES + tuple(controller.state_names)
+
+    def run(self, inputs):
+        """
+        Run one tick.
+
+        Returns
+        -------
+        command_pa : float
+            Wanted absolute pressure; atmosphere (vented) while the inputs are invalid.
+        values : tuple of float
+            What ``controller_state`` carries, in the order of ``names``.
+
+        """
+        controller = self.controller
+        if inputs.restarted or inputs.reason not in RUNNING:
+            controller.pause()
+        command_pa = P_ATM_PA
+        if inputs.reason in RUNNING:
+            command_pa = float(controller.step(
+                inputs.contraction_m, inputs.reference_m, inputs.reference_m_per_s,
+                inputs.lead_reference_m, inputs.lead_reference_m_per_s, inputs.learning,
+                inputs.elapsed_s, inputs.pressure_pa, inputs.force_n))
+        values = (
+            float(self.ticks), float(inputs.reason), float(inputs.learning),
+            float(inputs.restarted), float(controller.rules_replaced),
+            *(part for stamp_ns in inputs.stamps_ns for part in split_stamp(stamp_ns)),
+            inputs.contraction_m, inputs.reference_m, inputs.reference_m_per_s,
+            inputs.lead_reference_m, inputs.lead_reference_m_per_s, inputs.elapsed_s,
+            inputs.pressure_pa, inputs.force_n, *controller.state_values())
+        self.ticks += 1
+        return command_pa, values
