@@ -24,6 +24,7 @@ from collections import deque
 from dataclasses import asdict, dataclass, field
 import threading
 
+from pam_actuation.bags.source import read_bag
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
@@ -153,7 +154,8 @@ class RecorderCore:
         self._max_queued = max_queued
         self._flush_every_s = flush_every_s
         self._queue = deque()
-        self._wake = threading.Condition()
+        self._wake = threading.Condition()       # guards the queue and the counts
+        self._disk = threading.Lock()            # guards the writer; never taken inside _wake
         self._counts = {}
         self._checks = {}
         self._closing = False
@@ -169,8 +171,9 @@ class RecorderCore:
         ``check_sequence`` says whether sequence numbers are watched for gaps; by
         default everywhere but on ``/diagnostics``, where many nodes publish.
         """
-        with self._wake:
+        with self._disk:
             self._writer.add_topic(full_name, type_name, qos)
+        with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
             watch = full_name != '/diagnostics' if check_sequence is None else check_sequence
             if watch:
@@ -228,7 +231,7 @@ class RecorderCore:
 
     def add_metadata(self, name, values):
         """Put a named record of texts into the bag."""
-        with self._wake:
+        with self._disk:
             self._writer.add_metadata(name, values)
 
     def close(self):
@@ -239,22 +242,36 @@ class RecorderCore:
             self._closing = True
             self._wake.notify()
         self._thread.join()
-        counts = self.counts
         try:
             if not self.write_error:
-                self._writer.add_metadata(RECORDING_RECORD, _as_texts(counts))
-            self._writer.close()
+                self._writer.add_metadata(RECORDING_RECORD, _as_texts(self.counts))
+                self._writer.close()
         except OSError as error:
             self._fail(error)
+        if self.write_error:
+            self._keep_beginning()
         self._summary = RecordingSummary(
-            str(self._writer.directory), counts, self.write_error)
+            str(self._writer.directory), self.counts, self.write_error)
         return self._summary
 
     def _fail(self, error):
         if not self.write_error:
+            reason = getattr(error, 'strerror', None) or error
             self.write_error = (
-                f'{self._writer.file}: writing failed ({error.strerror or error}); the bag ends '
-                'early, free some space or record elsewhere')
+                f'{self._writer.file}: writing failed ({reason}); the bag ends early, free '
+                'some space or record elsewhere')
+
+    def _keep_beginning(self):
+        """Close the file as it is and count what can be read back from it."""
+        self._writer.abandon()
+        try:
+            readable = read_bag(self._writer.file, recover=True).counts
+        except (InputError, OSError):
+            readable = {}
+        with self._wake:
+            for name, counts in self._counts.items():
+                counts.written = readable.get(name, 0)
+                counts.dropped = counts.received - counts.written
 
     def _run(self):
         while True:
@@ -269,24 +286,24 @@ class RecorderCore:
 
     def _write(self, batch):
         written = {}
-        dropped = {}
-        try:
-            while batch:
-                name, data, log_time_ns, publish_time_ns = batch.popleft()
-                # Counted as lost until the writer has taken it.
-                dropped[name] = 1
-                self._writer.write(name, bytes(data), log_time_ns, publish_time_ns)
-                written[name] = written.get(name, 0) + 1
-                del dropped[name]
-            self._writer.flush()
-        except OSError as error:
-            self._fail(error)
-            for name, *_ in batch:
-                dropped[name] = dropped.get(name, 0) + 1
+        refused = {}
+        with self._disk:
+            try:
+                while batch and not self.write_error:
+                    name, data, log_time_ns, publish_time_ns = batch[0]
+                    self._writer.write(name, bytes(data), log_time_ns, publish_time_ns)
+                    written[name] = written.get(name, 0) + 1
+                    batch.popleft()
+                self._writer.flush()
+            # Whatever went wrong must reach the summary: a thread dies silently.
+            except Exception as error:
+                self._fail(error)
+        for name, *_ in batch:
+            refused[name] = refused.get(name, 0) + 1
         with self._wake:
             for name, number in written.items():
                 self._counts[name].written += number
-            for name, number in dropped.items():
+            for name, number in refused.items():
                 self._counts[name].dropped += number
 
 

@@ -20,6 +20,7 @@ checksums, so that a killed process leaves a readable beginning; the experiment
 metadata is the first record. ``run/metadata.yaml`` appears, complete, at close.
 """
 
+import contextlib
 import io
 import os
 from pathlib import Path
@@ -151,6 +152,12 @@ class BagWriter:
         temporary = self.directory / f'.{layout.METADATA_FILE}.{os.getpid()}'
         temporary.write_text(text, encoding='utf-8')
         os.replace(temporary, self.directory / layout.METADATA_FILE)
+
+    def abandon(self):
+        """Close the file without an index, after a write error; what is in it stays readable."""
+        self._closed = True
+        with contextlib.suppress(OSError):
+            self._stream.close()
 
     def __enter__(self):
         """Return the writer itself."""

@@ -1,0 +1,275 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What is in a bag, whether it is complete and whether it can be true: ``bag_info(path)``.
+
+Completeness is judged twice: by the recorder's own count, kept in the bag as
+``pam_recording``, and against the numbers of published messages that every
+node reports in /diagnostics as ``published.<full topic>``.
+"""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags.load import is_rig_topic, namespaces
+from pam_actuation.bags.recorder import RECORDING_RECORD
+from pam_actuation.bags.source import read_bag
+from pam_sim.errors import InputError
+
+DIAGNOSTICS = 'diagnostics'
+PUBLISHED = 'published.'
+# An interval between stamps this many times the usual one counts as a gap.
+GAP_FACTOR = 2.5
+
+
+@dataclass
+class TopicInfo:
+    """
+    One topic of a bag; times by header stamp where the message has one.
+
+    ``rate_hz``, ``max_gap_s`` and ``stamp_jitter_s`` (rms difference of the stamp
+    intervals from their median) are None with fewer than three messages.
+    ``published`` is None where no node reports it. ``lost`` is the larger of
+    what the recorder missed by sequence numbers and what published counts say,
+    None where neither is known.
+    """
+
+    name: str
+    type_name: str
+    count: int
+    rate_hz: float = None
+    max_gap_s: float = None
+    gaps: int = 0
+    stamp_jitter_s: float = None
+    stamps_backward: int = 0
+    stamps_repeated: int = 0
+    published: int = None
+    lost: int = None
+    dropped: int = None
+    missed_at_start: int = None
+    ranges: dict = field(default_factory=dict)
+
+
+@dataclass
+class BagInfo:
+    """
+    Everything ``pam info`` shows.
+
+    ``remarks`` are sentences on what is odd or implausible, empty for a good
+    bag. ``complete`` is False when messages are known to be missing, True when
+    every topic of the rig has been checked, None where that is not known.
+    """
+
+    path: str
+    storage: str
+    size_bytes: int
+    start_ns: int
+    duration_s: float
+    message_count: int
+    namespaces: list
+    topics: list
+    metadata: dict
+    remarks: list
+    recovered: bool = False
+
+    @property
+    def lost(self):
+        """Return the number of messages known to have been lost on the way."""
+        return sum(topic.lost or 0 for topic in self.topics)
+
+    @property
+    def dropped(self):
+        """Return the number of messages the recorder received and did not write."""
+        return sum(topic.dropped or 0 for topic in self.topics)
+
+    @property
+    def complete(self):
+        """Return whether all published messages are in the bag, None if unknown."""
+        if self.recovered or self.lost or self.dropped:
+            return False
+        rig = [t for t in self.topics if t.name.rsplit('/', 1)[-1] in codecs.TOPIC_TYPES]
+        known = [t.lost is not None or t.published is not None for t in rig]
+        return True if rig and all(known) else None
+
+    def topic(self, full_name):
+        """Return the TopicInfo of a full name; InputError if the bag has no such topic."""
+        for topic in self.topics:
+            if topic.name == full_name:
+                return topic
+        raise InputError(f'the bag has no topic {full_name}', self.path)
+
+    def to_dict(self):
+        """Return everything as plain data for JSON."""
+        return {
+            **asdict(self), 'lost': self.lost, 'dropped': self.dropped,
+            'complete': self.complete}
+
+
+def bag_info(path, recover=False):
+    """
+    Look through a bag.
+
+    Parameters
+    ----------
+    path : path
+        As for ``load_run``.
+    recover : bool
+        Also look at a bag that ended early.
+
+    Raises
+    ------
+    InputError
+        As ``load_run``, but any bag with any topics will do.
+
+    """
+    bag = read_bag(path, recover=recover)
+    recording = bag.records.get(RECORDING_RECORD, {})
+    published = _published(bag)
+    remarks = list(bag.remarks)
+    topics = []
+    for name in sorted(bag.topics):
+        topic = bag.topics[name]
+        info, stamp_ns, values = _topic_info(topic, remarks)
+        _add_counts(info, topic, recording, published.get(name))
+        remarks += _loss_remarks(info)
+        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values)
+        topics.append(info)
+    muscles = namespaces(bag)
+    remarks += plausibility.missing_topics(muscles)
+    start_ns, end_ns = _span(bag)
+    return BagInfo(
+        path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
+        duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
+        namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
+        recovered=bag.recovered)
+
+
+def _size(path):
+    files = [path] if path.is_file() else [p for p in path.iterdir() if p.is_file()]
+    return sum(file.stat().st_size for file in files)
+
+
+def _span(bag):
+    times = [topic.log_time_ns for topic in bag.topics.values() if topic.log_time_ns]
+    if not times:
+        return 0, 0
+    return min(map(min, times)), max(map(max, times))
+
+
+def _topic_info(topic, remarks):
+    info = TopicInfo(topic.name, topic.type_name, len(topic.payloads))
+    stamp_ns, values = _stamps_and_values(topic, remarks)
+    if len(stamp_ns) > 1:
+        steps = np.diff(stamp_ns)
+        info.stamps_backward = int((steps < 0).sum())
+        info.stamps_repeated = int((steps == 0).sum())
+    if len(stamp_ns) > 2 and topic.name != '/diagnostics':
+        steps_s = np.diff(np.sort(stamp_ns)) * 1e-9
+        usual_s = float(np.median(steps_s))
+        span_s = float(steps_s.sum())
+        info.rate_hz = len(steps_s) / span_s if span_s > 0 else None
+        info.max_gap_s = float(steps_s.max())
+        info.gaps = int((steps_s > GAP_FACTOR * usual_s).sum()) if usual_s > 0 else 0
+        info.stamp_jitter_s = float(np.sqrt(np.mean((steps_s - usual_s)**2)))
+    for name, column in values.items():
+        finite = column[np.isfinite(column)]
+        if len(finite) and topic.name.rsplit('/', 1)[-1] != 'controller_state':
+            info.ranges[name] = (float(finite.min()), float(finite.max()))
+    return info, stamp_ns, values
+
+
+def _stamps_and_values(topic, remarks):
+    """Return header stamps in file order (receive times if there are none) and values."""
+    short = topic.name.rsplit('/', 1)[-1]
+    if is_rig_topic(topic) and short in series.VALUES:
+        stamp_ns, values, bad = series.table(short, topic.payloads)
+        if bad.any():
+            remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
+        return stamp_ns[~bad], {name: column[~bad] for name, column in values.items()}
+    if _has_header(topic):
+        try:
+            return np.array([cdr.stamp_of(raw) for raw in topic.payloads], dtype=np.int64), {}
+        except cdr.CdrError:
+            remarks.append(f'{topic.name}: some messages cannot be decoded.')
+    return np.array(topic.log_time_ns, dtype=np.int64), {}
+
+
+def _has_header(topic):
+    fields = layout.typestore().fielddefs.get(topic.type_name)
+    little = all(raw[:2] == cdr.ENCAPSULATION[:2] for raw in topic.payloads)
+    return bool(
+        topic.encoding == 'cdr' and little and fields and fields[1]
+        and fields[1][0][1][1] == 'std_msgs/msg/Header')
+
+
+def _published(bag):
+    """
+    Return what the nodes last reported: full topic to (published, send time of the report).
+
+    Reports of several nodes on one topic add up; the latest report's time counts.
+    """
+    last = {}
+    topic = bag.topics.get('/diagnostics')
+    if topic is None or not is_rig_topic(topic):
+        return {}
+    for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns):
+        try:
+            statuses = codecs.decode(DIAGNOSTICS, raw)
+        except InputError:
+            continue
+        for status in statuses:
+            for key, text in status.values:
+                if key.startswith(PUBLISHED) and text.isdigit():
+                    last[status.name, key[len(PUBLISHED):]] = (int(text), sent_ns)
+    published = {}
+    for (_, name), (number, sent_ns) in last.items():
+        before, before_ns = published.get(name, (0, 0))
+        published[name] = (before + number, max(before_ns, sent_ns))
+    return published
+
+
+def _add_counts(info, topic, recording, published):
+    def recorded(key):
+        text = recording.get(f'{topic.name}.{key}', '')
+        return int(text) if text.isdigit() else None
+
+    info.lost = recorded('lost')
+    info.dropped = recorded('dropped')
+    info.missed_at_start = recorded('missed_at_start')
+    if published is None:
+        return
+    info.published, sent_ns = published
+    # Where the bag knows send times, a node that died early is checked too: what it had
+    # published by its last report must be there from that time.
+    by_then = info.count
+    if topic.name != '/diagnostics' and topic.publish_time_ns != topic.log_time_ns:
+        by_then = int((np.array(topic.publish_time_ns) <= sent_ns).sum())
+    missing = max(0, info.published - by_then - (info.dropped or 0))
+    info.lost = max(info.lost or 0, missing)
+
+
+def _loss_remarks(info):
+    remarks = []
+    if info.lost:
+        of = '' if info.published is None else f' of {info.published} published'
+        remarks.append(f'{info.name}: {info.lost} messages{of} never arrived.')
+    if info.dropped:
+        remarks.append(
+            f'{info.name}: {info.dropped} messages arrived but the recorder could not write '
+            'them.')
+    return remarks

@@ -1,0 +1,264 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Load a bag as named arrays with units: ``load_run(path)``.
+
+Any namespace, any rates, topics missing, bags of other recorders: what can be
+used is returned, what is odd is said in ``remarks``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pam_actuation.bags import codecs, series
+from pam_actuation.bags.source import read_bag
+from pam_sim.errors import InputError
+from pam_sim.run import Run, Series
+
+SIGNALS = {
+    'ppr': ('ppr_voltage',),
+    'hsv': ('fill_duty', 'vent_duty'),
+}
+_SIGNAL_NAMES = tuple(name for names in SIGNALS.values() for name in names)
+# Any clock that counts from 1970 is far above this; a simulation's may start at 0.
+_WALL_CLOCK_NS = 10**17
+_UNIT_OF_ENDING = (
+    ('_m_per_s', 'm/s'), ('_pa_per_s', 'Pa/s'), ('_pa', 'Pa'), ('_hz', 'Hz'), ('_kg', 'kg'),
+    ('_ns', 'ns'), ('_s', 's'), ('_m', 'm'), ('_n', 'N'), ('_voltage', 'V'), ('_sec', 's'),
+    ('_nanosec', 'ns'),
+)
+
+
+@dataclass
+class RecordedRun(Run):
+    """
+    A run read from a bag.
+
+    Parameters
+    ----------
+    reference_trajectories : tuple of ReferenceTrajectory
+        All messages of ``reference_trajectory``, by stamp.
+    remarks : tuple of str
+        Sentences on anything odd in the bag.
+
+    """
+
+    reference_trajectories: tuple = ()
+    remarks: tuple = ()
+
+    @property
+    def valve(self):
+        """Return 'ppr' or 'hsv' by the valve signal, else by the metadata, else ''."""
+        names = self.topics['valve_signal'].values if 'valve_signal' in self.topics else {}
+        for valve, signals in SIGNALS.items():
+            if set(signals) & set(names):
+                return valve
+        return self.metadata.get('valve', '')
+
+
+def load_run(path, namespace=None, recover=False):
+    """
+    Load one muscle's run from a bag.
+
+    Parameters
+    ----------
+    path : path
+        rosbag2 directory (mcap or sqlite3), a directory of .mcap files, a lone .mcap or .db3.
+    namespace : str, optional
+        Which muscle, as in ``/left_knee/flexor``; needed only if the bag has several.
+    recover : bool
+        Also read what precedes the damage in a bag that ended early.
+
+    Returns
+    -------
+    RecordedRun
+        Times are ``header.stamp`` in int64 nanoseconds, values float64 in SI.
+        Messages are sorted by stamp, equal stamps in the order of recording.
+
+    Raises
+    ------
+    InputError
+        Missing, empty, damaged or foreign file, several namespaces or none with
+        a pressure or contraction.
+
+    """
+    bag = read_bag(path, recover=recover)
+    namespace = _choose_namespace(bag, namespace)
+    found = topics_of(bag, namespace)
+    remarks = list(bag.remarks)
+    topics, trajectories = {}, ()
+    for short, topic in found.items():
+        if short == 'reference_trajectory':
+            trajectories = _trajectories(topic, remarks)
+        else:
+            one = read_series(short, topic, remarks)
+            if len(one):
+                topics[short] = one
+    return RecordedRun(
+        topics=topics, metadata=bag.experiment, namespace=namespace, path=str(path),
+        reference_trajectories=trajectories, remarks=tuple(remarks))
+
+
+def topics_of(bag, namespace):
+    """
+    Return short name to TopicData of the readable rig topics in a namespace.
+
+    Topics of another message type or encoding are left out, with a remark in the bag.
+    """
+    found = {}
+    for name, topic in bag.topics.items():
+        parent, _, short = name.rpartition('/')
+        if parent != namespace or short not in codecs.TOPIC_TYPES or short == 'diagnostics':
+            continue
+        if is_rig_topic(topic):
+            found[short] = topic
+            continue
+        remark = (
+            f'{name} is {topic.type_name} in {topic.encoding}, not '
+            f'{codecs.TOPIC_TYPES[short]} in cdr: left out.')
+        if remark not in bag.remarks:
+            bag.remarks.append(remark)
+    return found
+
+
+def is_rig_topic(topic):
+    """Return whether a TopicData has the name and the message type of a topic of the rig."""
+    short = topic.name.rsplit('/', 1)[-1]
+    return topic.encoding == 'cdr' and codecs.TOPIC_TYPES.get(short) == topic.type_name
+
+
+def namespaces(bag):
+    """Return the namespaces with messages of the rig: dict of namespace to set of short names."""
+    found = {}
+    for name, topic in bag.topics.items():
+        parent, _, short = name.rpartition('/')
+        if short != 'diagnostics' and is_rig_topic(topic) and topic.payloads:
+            found.setdefault(parent, set()).add(short)
+    return found
+
+
+def _choose_namespace(bag, wanted):
+    present = namespaces(bag)
+    if wanted is not None:
+        wanted = '/' + str(wanted).strip('/') if str(wanted).strip('/') else ''
+        if wanted in present:
+            return wanted
+        raise InputError(
+            f'no topics of a muscle in the namespace {wanted or "/"}; the bag has '
+            f'{_listed(present)}', bag.path)
+    for needed in ({'pressure', 'contraction'}, {'pressure'}, {'contraction'}):
+        candidates = [name for name, topics in present.items() if needed <= topics]
+        if len(candidates) == 1:
+            return candidates[0]
+        if candidates:
+            raise InputError(
+                f'the bag has several muscles, {_listed(candidates)}; choose one with namespace',
+                bag.path)
+    names = ', '.join(sorted(bag.topics)) or 'none at all'
+    raise InputError(
+        f'the bag has no messages on a pressure or contraction topic of a muscle; its topics: '
+        f'{names}', bag.path)
+
+
+def _listed(names):
+    return ', '.join(name or '/' for name in sorted(names)) or 'none'
+
+
+def read_series(short, topic, remarks):
+    """Return the Series of a TopicData; what is odd is appended to ``remarks`` as sentences."""
+    stamp_ns, values, bad = series.table(short, topic.payloads)
+    keep = ~bad
+    if bad.any():
+        remarks.append(
+            f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
+    stamp_ns, keep = _checked_stamps(stamp_ns, keep, topic, remarks)
+    if short == 'valve_signal':
+        values = {name: values[name] for name in _SIGNAL_NAMES if name in values}
+        if not values and len(stamp_ns):
+            remarks.append(
+                f'{topic.name} has none of the signals {", ".join(_SIGNAL_NAMES)}: left out.')
+            keep = np.zeros_like(keep)
+    stamp_ns = stamp_ns[keep]
+    values = {name: column[keep] for name, column in values.items()}
+    backward = int((np.diff(stamp_ns) < 0).sum())
+    if backward:
+        remarks.append(
+            f'{topic.name}: the stamp goes back {backward} times; sorted by stamp.')
+        order = np.argsort(stamp_ns, kind='stable')
+        stamp_ns = stamp_ns[order]
+        values = {name: column[order] for name, column in values.items()}
+    same = int((np.diff(stamp_ns) == 0).sum())
+    if same:
+        remarks.append(f'{topic.name}: {same} messages repeat the stamp before, kept.')
+    if short == 'valve_signal':
+        stamp_ns, values = _held(stamp_ns, values, topic.name, remarks)
+    elif short != 'controller_state' and len(stamp_ns):
+        _remark_not_finite(values, topic.name, remarks)
+    return Series(stamp_ns, values, {name: unit_of(name) for name in values})
+
+
+def _checked_stamps(stamp_ns, keep, topic, remarks):
+    """Treat messages that nobody stamped: all of them by receive time, single ones left out."""
+    unset = keep & (stamp_ns == 0)
+    if int(unset.sum()) > 1 and not (stamp_ns[keep] != 0).any():
+        remarks.append(f'{topic.name}: no message has a header stamp, receive times are used.')
+        return np.array(topic.log_time_ns, dtype=np.int64), keep
+    if unset.any() and int(np.median(stamp_ns[keep])) > _WALL_CLOCK_NS:
+        remarks.append(
+            f'{topic.name}: {int(unset.sum())} messages without a header stamp, left out.')
+        keep = keep & ~unset
+    return stamp_ns, keep
+
+
+def _held(stamp_ns, values, name, remarks):
+    """Return the signal as a valve takes it: it ignores non-finite entries and holds the last."""
+    known = np.ones(len(stamp_ns), dtype=bool)
+    held = {}
+    for key, column in values.items():
+        finite = np.isfinite(column)
+        last = np.maximum.accumulate(np.where(finite, np.arange(len(column)), -1))
+        held[key] = column[np.maximum(last, 0)]
+        known &= last >= 0
+    ignored = sum(int((~np.isfinite(column)).sum()) for column in values.values())
+    if ignored:
+        remarks.append(
+            f'{name}: {ignored} missing or non-finite entries, the value before is held.')
+    return stamp_ns[known], {key: column[known] for key, column in held.items()}
+
+
+def _remark_not_finite(values, name, remarks):
+    for key, column in values.items():
+        count = int((~np.isfinite(column)).sum())
+        # A velocity that is never measured is the sensor's business, not an oddity.
+        if count and not (key == 'velocity_m_per_s' and count == len(column)):
+            remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
+
+
+def _trajectories(topic, remarks):
+    messages, bad = [], 0
+    for raw in topic.payloads:
+        try:
+            messages.append(codecs.decode('reference_trajectory', raw))
+        except InputError:
+            bad += 1
+    if bad:
+        remarks.append(f'{topic.name}: {bad} messages are not {topic.type_name}, left out.')
+    return tuple(sorted(messages, key=lambda message: message.stamp_ns))
+
+
+def unit_of(name):
+    """Return the SI unit a value's name ends in; '1' for plain numbers."""
+    return next((unit for ending, unit in _UNIT_OF_ENDING if name.endswith(ending)), '1')

@@ -1,0 +1,252 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Open any bag of the rig: a rosbag2 directory, a lone .mcap, a sqlite3 bag.
+
+All of it is read into memory as bytes per topic; decoding is the business of
+``load.py`` and ``info.py``. MCAP goes through ``mcap_scan.py``, everything else
+that rosbag2 writes through the ``rosbags`` package.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.errors import ReaderError
+import yaml
+
+from pam_actuation.bags import layout
+from pam_actuation.bags.mcap_scan import MAGIC, scan
+from pam_actuation.bags.writer import EXPERIMENT_RECORD
+from pam_sim.errors import InputError
+
+_RECOVER = 'or read that beginning with the option recover'
+
+
+@dataclass
+class TopicData:
+    """The messages of one topic as bytes, in file order, with their times [ns]."""
+
+    name: str
+    type_name: str
+    encoding: str = 'cdr'
+    payloads: list = field(default_factory=list)
+    log_time_ns: list = field(default_factory=list)
+    publish_time_ns: list = field(default_factory=list)
+
+
+@dataclass
+class Bag:
+    """
+    A bag in memory.
+
+    ``records`` are the named metadata records of the file (the last of each
+    name), ``remarks`` sentences on anything odd, ``recovered`` tells that the
+    end is missing.
+    """
+
+    path: Path
+    storage: str
+    topics: dict = field(default_factory=dict)
+    records: dict = field(default_factory=dict)
+    remarks: list = field(default_factory=list)
+    recovered: bool = False
+
+    @property
+    def counts(self):
+        """Return the number of messages per full topic name."""
+        return {name: len(topic.payloads) for name, topic in self.topics.items()}
+
+    @property
+    def experiment(self):
+        """Return the ``pam_experiment`` record; empty where the bag has none."""
+        return dict(self.records.get(EXPERIMENT_RECORD, {}))
+
+
+def read_bag(path, recover=False):
+    """
+    Read a bag into memory.
+
+    Parameters
+    ----------
+    path : path
+        Directory with metadata.yaml, directory with only .mcap files, .mcap or .db3 file.
+    recover : bool
+        Also read what precedes the damage in a file that ended early.
+
+    Raises
+    ------
+    InputError
+        Nothing there, not a bag, damaged, or ended early (says how much is readable).
+
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError('no such file or directory; give the path of a bag', path)
+    try:
+        if path.is_dir():
+            return _read_directory(path, recover)
+        if path.suffix == '.mcap':
+            return _read_mcap(path, [path], recover)
+        if path.suffix == '.db3':
+            return _read_with_rosbags(path, path)
+        if path.name == layout.METADATA_FILE:
+            return _read_directory(path.parent, recover)
+    except PermissionError as error:
+        raise InputError('no right to read this', error.filename or path) from None
+    raise InputError(
+        'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
+
+
+def _read_directory(path, recover):
+    facts = _directory_facts(path)
+    if facts is None:
+        files = sorted(path.glob('*.mcap'), key=_by_number)
+        if files:
+            return _read_mcap(path, files, recover)
+        databases = sorted(path.glob('*.db3'), key=_by_number)
+        if len(databases) == 1:
+            return _read_with_rosbags(path, databases[0])
+        raise InputError(
+            'no bag in this directory (neither metadata.yaml nor .mcap files); give the '
+            "directory that 'pam run', 'pam simulate' or 'ros2 bag record' made", path)
+    plain_mcap = (
+        facts.get('storage_identifier') == 'mcap' and not facts.get('compression_mode'))
+    if not plain_mcap:
+        return _read_with_rosbags(path, path)
+    files = []
+    for name in facts['relative_file_paths']:
+        # Version 3 and older repeat the directory's name in front of the file's.
+        candidates = [path / name, path / Path(name).name]
+        found = [candidate for candidate in candidates if candidate.is_file()]
+        if not found:
+            raise InputError(
+                f'the file {name} named in {layout.METADATA_FILE} is missing', path)
+        files.append(found[0])
+    bag = _read_mcap(path, files, recover)
+    announced, present = facts.get('message_count'), sum(bag.counts.values())
+    if announced != present and not bag.recovered:
+        bag.remarks.append(
+            f'{layout.METADATA_FILE} announces {announced} messages, the files hold {present}.')
+    _add_custom_data(bag, facts.get('custom_data'))
+    return bag
+
+
+def _directory_facts(path):
+    """Return what metadata.yaml says, None where there is no such file."""
+    file = path / layout.METADATA_FILE
+    if not file.is_file():
+        return None
+    try:
+        facts = yaml.safe_load(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
+        if isinstance(facts['relative_file_paths'], list) and facts['relative_file_paths']:
+            return facts
+        problem = 'it names no file'
+    except (yaml.YAMLError, UnicodeDecodeError):
+        problem = 'it is not YAML'
+    except (KeyError, TypeError):
+        problem = f'it has no {layout.METADATA_ROOT} with relative_file_paths'
+    raise InputError(
+        f'not the metadata of a rosbag2 bag: {problem}; remove the file to read the data files '
+        'without it', file)
+
+
+def _by_number(path):
+    """Return a sort key: run_2 before run_10."""
+    digits = path.stem.rsplit('_', 1)[-1]
+    return (int(digits) if digits.isdigit() else -1, path.name)
+
+
+def _read_mcap(path, files, recover):
+    bag = Bag(path=path, storage='mcap')
+    for file in files:
+        data = file.read_bytes()
+        _refuse_foreign(data, file)
+        content = scan(data)
+        if content.damage is not None:
+            readable = (
+                f'{content.message_count} messages before that can still be read')
+            if not content.message_count or not recover:
+                raise InputError(_damage_sentence(content, len(data), readable), file)
+            bag.recovered = True
+            bag.remarks.append(
+                f'{file.name} ended early or is damaged ({content.damage}); {readable}.')
+        _add_content(bag, content, file)
+    return bag
+
+
+def _refuse_foreign(data, file):
+    if not data:
+        raise InputError('the file is empty; record again or give another bag', file)
+    if not data.startswith(MAGIC[:len(data)]):
+        raise InputError(
+            'not an MCAP file (it begins with other bytes); give a file written by a recorder',
+            file)
+
+
+def _damage_sentence(content, size, readable):
+    if not content.message_count:
+        readable = 'no message can be read: give another bag'
+    else:
+        readable += f': record again, {_RECOVER}'
+    if content.damage.problem.startswith(('the file ends', 'the end mark')):
+        return f'the recording ended early (no end mark after {size} bytes); {readable}'
+    return f'the file is damaged ({content.damage}); {readable}'
+
+
+def _add_content(bag, content, file):
+    bag.records.update(content.metadata)
+    for channel in content.channels.values():
+        topic = bag.topics.setdefault(
+            channel.topic, TopicData(
+                channel.topic, channel.type_name, channel.message_encoding))
+        if (channel.type_name, channel.message_encoding) != (topic.type_name, topic.encoding):
+            bag.remarks.append(
+                f'{channel.topic} has several message types ({topic.type_name}, '
+                f'{channel.type_name}); only the first is read.')
+            continue
+        topic.payloads += channel.payloads
+        topic.log_time_ns += channel.log_time_ns
+        topic.publish_time_ns += channel.publish_time_ns
+
+
+def _read_with_rosbags(path, opened):
+    bag = Bag(path=path, storage='sqlite3')
+    try:
+        with Reader(opened) as reader:
+            for connection in reader.connections:
+                bag.topics.setdefault(
+                    connection.topic, TopicData(connection.topic, connection.msgtype))
+            for connection, log_time_ns, raw in reader.messages():
+                topic = bag.topics[connection.topic]
+                if connection.msgtype == topic.type_name:
+                    topic.payloads.append(bytes(raw))
+                    topic.log_time_ns.append(log_time_ns)
+                    # This storage keeps only the receive time.
+                    topic.publish_time_ns.append(log_time_ns)
+            _add_custom_data(bag, getattr(reader.storage.metadata, 'custom', None))
+    except (ReaderError, FileNotFoundError) as error:
+        raise InputError(f'not a readable rosbag2 bag: {error}', path) from None
+    # The database library has its own family of exceptions, all meaning a broken file.
+    except Exception as error:
+        raise InputError(
+            f'not a readable rosbag2 bag ({type(error).__name__}: {error})', path) from None
+    return bag
+
+
+def _add_custom_data(bag, custom):
+    """Take the experiment from metadata.yaml where the file itself has no record of it."""
+    if custom and isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
+        bag.records[EXPERIMENT_RECORD] = {str(k): str(v) for k, v in custom.items()}
