@@ -19,6 +19,14 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help demo test env clean
 
+# PYTHON names another version than the environment has: it is made anew.
+VERSION_OF = $(shell "$(1)" -c 'import sys; print(sys.version_info[:2])' 2>/dev/null)
+ifneq ($(PYTHON),)
+ifneq ($(call VERSION_OF,$(PYTHON)),$(call VERSION_OF,$(BIN)/python))
+.PHONY: $(STAMP)
+endif
+endif
+
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
 
@@ -34,7 +42,7 @@ clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
 
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
-$(STAMP): setup.py setup.cfg pyproject.toml
+$(STAMP): setup.py pyproject.toml
 	@found=''; \
 	for python in $(if $(PYTHON),'$(PYTHON)',python3.12 python3.11 python3 python); do \
 	  if "$$python" -c 'import sys, venv, ensurepip; \
