@@ -31,6 +31,7 @@ import yaml
 import pam_actuation
 from pam_actuation import resources
 from pam_actuation.bags.codecs import TOPIC_TYPES
+from pam_actuation.drivers.faults import fault_table_markdown
 from pam_sim.errors import InputError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -277,3 +278,11 @@ def test_this_python_is_supported(setup_keywords):
     version = sysconfig.get_python_version()
     assert version in ('3.11', '3.12')
     assert setup_keywords['python_requires'] == '>=3.11,<3.13'
+
+
+def test_the_printed_fault_table_is_the_one_the_driver_uses():
+    text = (ROOT / 'docs' / 'safety.md').read_text(encoding='utf-8')
+    printed = re.search(
+        r'<!-- fault table: begin -->\n(.*)<!-- fault table: end -->', text, re.S)[1]
+    assert printed == fault_table_markdown(), (
+        'copy the output of pam_actuation.drivers.faults.fault_table_markdown() into docs/safety.md')
