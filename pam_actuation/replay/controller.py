@@ -1,0 +1,213 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Step a controller offline on the inputs a recording says it used, and compare.
+
+Every tick recorded in ``controller_state`` names the stamps of the messages it
+used; the replay fetches exactly these measurements from their topics, steps a
+fresh controller and compares commands and internals bit for bit.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pam_sim.errors import InputError
+
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.tick import (
+    INPUT_NAMES, join_stamp, RUNNING, TickCore, TickInputs)
+
+# Input of a tick -> (topic it came from, field of that topic).
+_MEASURED = {
+    'contraction': ('contraction_m', 'contraction_m'),
+    'pressure': ('pressure_pa', 'pressure_pa'),
+    'force': ('force_n', 'force_n')}
+
+
+@dataclass
+class ReplayResult:
+    """
+    Outcome of a replay.
+
+    Attributes
+    ----------
+    stamp_ns : numpy.ndarray
+        Ticks compared, int64.
+    recorded_pa, replayed_pa : numpy.ndarray
+        Commands as recorded and as replayed, absolute Pa.
+    max_abs_difference_pa : float
+        Largest difference of the two.
+    identical : bool
+        Every command and every internal number agrees to the bit.
+    ticks : int
+        Ticks in the recording.
+    commands_missing : int
+        Ticks without a recorded ``pressure_command`` (lost messages); the command kept in
+        ``controller_state`` is compared instead.
+    differing_states : dict of str -> int
+        Internal numbers that differ, with the number of ticks.
+    controller : object
+        The controller after the last tick; with given inputs, equal to the live one.
+
+    """
+
+    stamp_ns: np.ndarray
+    recorded_pa: np.ndarray
+    replayed_pa: np.ndarray
+    max_abs_difference_pa: float
+    identical: bool
+    ticks: int
+    commands_missing: int = 0
+    differing_states: dict = field(default_factory=dict)
+    controller: object = None
+
+    def sentence(self):
+        """Return the outcome in one sentence."""
+        if self.identical:
+            return f'{self.ticks} controller ticks replayed, commands and internals bit-identical'
+        where = ', '.join(f'{name} ({n})' for name, n in self.differing_states.items())
+        return (f'{self.ticks} controller ticks replayed, largest difference '
+                f'{self.max_abs_difference_pa:g} Pa; differing: {where or "commands"}')
+
+
+def replay_controller(run, controller=None):
+    """
+    Replay the controller of a recording.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        Needs ``controller_state``, ``pressure_command`` and the measurements it used.
+    controller : optional
+        A controller in the state the recording began with; by default built from the
+        recording's metadata. Another controller answers what it *would* have commanded, but
+        its internals are then not compared.
+
+    Returns
+    -------
+    ReplayResult
+
+    Raises
+    ------
+    InputError
+        The recording has no controller ticks, does not begin with the first tick, lacks
+        ticks or measurements that were used, or the rules were exchanged on the way.
+
+    """
+    states = run.require('controller_state')
+    commands = run.require('pressure_command')
+    own = controller is None
+    if own:
+        text = run.metadata.get('controller')
+        if not text:
+            raise InputError('the recording does not say which controller ran', run.path)
+        controller = load_controller(text)
+    columns = _columns(states, run.path)
+    order = np.argsort(columns['tick'], kind='stable')
+    _check_complete(columns, order, run.path)
+    lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
+    command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
+
+    core = TickCore(controller)
+    compare = tuple(core.names) if own else ()
+    wanted = [columns.get(name) for name in compare]
+    if own and any(column is None for column in wanted):
+        missing = [name for name, column in zip(compare, wanted) if column is None]
+        raise InputError(f'controller_state lacks {missing[0]}', run.path)
+    differing = {}
+    recorded, replayed = np.empty(len(order)), np.empty(len(order))
+    missing = 0
+    for place, row in enumerate(order.tolist()):
+        command_pa, values = core.run(_inputs(columns, row, lookups, run.path))
+        replayed[place] = command_pa
+        stamp = int(states.stamp_ns[row])
+        recorded[place] = command_at.get(stamp, np.nan)
+        if stamp not in command_at:
+            missing += 1
+            # A lost message; the state of a running tick keeps the command as well.
+            running = int(columns['input_reason'][row]) in RUNNING
+            recorded[place] = columns['command_pa'][row] if running else command_pa
+        for name, column, value in zip(compare, wanted, values):
+            if not _same(column[row], value):
+                differing[name] = differing.get(name, 0) + 1
+    difference = float(np.max(np.abs(recorded - replayed))) if len(order) else 0.0
+    return ReplayResult(
+        states.stamp_ns[order], recorded, replayed, difference,
+        bool(np.array_equal(recorded, replayed)) and not differing, len(order), missing,
+        differing, controller)
+
+
+def _same(a, b):
+    """Return whether two floats are the same bits, all NaN being one."""
+    return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
+
+
+def _columns(states, path):
+    """Return the columns of ``controller_state``, refusing foreign ones."""
+    missing = [name for name in INPUT_NAMES if name not in states.values]
+    if missing:
+        raise InputError(
+            f'controller_state is not of this project\'s controllers: it lacks {missing[0]}', path)
+    return states.values
+
+
+def _check_complete(columns, order, path):
+    """Raise InputError unless the ticks run from 0 without a hole and with the same rules."""
+    ticks = columns['tick'][order]
+    if len(ticks) == 0 or ticks[0] != 0:
+        first = int(ticks[0]) if len(ticks) else 'none'
+        raise InputError(
+            f'the recording begins with controller tick {first}, not 0: what the controller '
+            'had learned before is unknown; start the recorder before the controller', path)
+    holes = np.flatnonzero(np.diff(ticks) != 1)
+    if len(holes):
+        at = int(ticks[holes[0]])
+        raise InputError(
+            f'controller ticks after {at} are missing or doubled ({len(holes)} places)', path)
+    if np.any(columns['rules_replaced'] != columns['rules_replaced'][order[0]]):
+        raise InputError(
+            'rules were loaded or reset by hand during the recording, their content is not in '
+            'it', path)
+
+
+def _lookup(run, topic):
+    """Return {stamp: value} of a measured topic; empty if it was not recorded."""
+    if topic not in run:
+        return {}
+    series = run.topics[topic]
+    return dict(zip(series.stamp_ns.tolist(), series.values[_MEASURED[topic][1]].tolist()))
+
+
+def _inputs(columns, row, lookups, path):
+    """Return the ``TickInputs`` of one recorded tick, measurements taken from their topics."""
+    stamps = tuple(
+        join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])
+        for name in ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory'))
+    inputs = TickInputs(
+        reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
+        restarted=bool(columns['restarted'][row]), stamps_ns=stamps)
+    for name in ('reference_m', 'reference_m_per_s', 'lead_reference_m',
+                 'lead_reference_m_per_s', 'elapsed_s'):
+        setattr(inputs, name, float(columns[name][row]))
+    for (topic, (target, _)), stamp_ns in zip(_MEASURED.items(), stamps):
+        if stamp_ns < 0:
+            continue
+        value = lookups[topic].get(stamp_ns)
+        if value is None:
+            raise InputError(
+                f'the {topic} message of stamp {stamp_ns} ns that controller tick '
+                f'{int(columns["tick"][row])} used is not in the recording', path)
+        setattr(inputs, target, value)
+    return inputs
