@@ -1,0 +1,66 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Thin a trace for a page without hiding its extremes."""
+
+import numpy as np
+
+
+def decimate_min_max(x, y, max_points=2400):
+    """
+    Keep the smallest and the largest value of every bin, in their order.
+
+    A spike of one sample therefore stays visible, unlike with every n-th sample.
+    Non-finite values are left out before binning.
+
+    Parameters
+    ----------
+    x, y : array_like, shape (N,)
+        Abscissa (ascending) and value.
+    max_points : int
+        Largest number of points returned, at least 4.
+
+    Returns
+    -------
+    (x, y) : numpy.ndarray, numpy.ndarray
+        At most ``max_points`` of the given points, ends included.
+
+    """
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if x.size <= max_points:
+        return x, y
+    bins = max(int(max_points) // 2 - 1, 1)
+    edges = np.linspace(0, x.size, bins + 1).astype(int)
+    keep = [0, x.size - 1]
+    for start, stop in zip(edges[:-1], edges[1:]):
+        part = y[start:stop]
+        keep += [start + int(np.argmin(part)), start + int(np.argmax(part))]
+    keep = np.unique(keep)
+    return x[keep], y[keep]
+
+
+def decimate_steps(x, y, max_points=2400):
+    """
+    Thin a held (zero order) signal: first drop repeats, then as ``decimate_min_max``.
+
+    Both ends of every plateau are kept, so that a step stays a step.
+    """
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if x.size > 2:
+        changed = np.flatnonzero(np.diff(y) != 0.0)
+        keep = np.unique(np.concatenate(([0], changed, changed + 1, [x.size - 1])))
+        x, y = x[keep], y[keep]
+    return decimate_min_max(x, y, max_points)

@@ -1,0 +1,226 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Figures as plain plotly dictionaries: axes with units, colours by role, light arrays.
+
+A colour is written ``@role`` and becomes a real one in the page, so that the
+same figure fits the light and the dark page. The roles keep one meaning all
+over a page and come from the Okabe-Ito palette, which colour-blind readers can
+tell apart.
+"""
+
+import math
+
+import numpy as np
+
+from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+
+ROW_PX = 210                 # height of one row of a stack of plots
+LEGEND_PX = 30               # room above a row for its legend
+BOTTOM_PX = 52
+# Contracting / extending rules and other signed maps: one scale, white at zero.
+DIVERGING = [[0.0, '#2166ac'], [0.25, '#92c5de'], [0.5, '#f7f7f7'], [0.75, '#fdb863'],
+             [1.0, '#b35806']]
+
+
+def rounded(values, digits=5):
+    """Return a list of floats with so many significant digits; NaN and infinity become None."""
+    out = []
+    for value in np.asarray(values, dtype=float).ravel():
+        value = float(value)
+        if not math.isfinite(value):
+            out.append(None)
+        else:
+            text = float(f'{value:.{digits}g}')
+            out.append(int(text) if text == int(text) and abs(text) < 1e15 else text)
+    return out
+
+
+def line(x, y, name, role, held=False, dash=None, width=1.6, max_points=2400):
+    """
+    Return one line trace, thinned without losing extremes.
+
+    Parameters
+    ----------
+    x, y : array_like
+        Abscissa and value in the units of the axes.
+    name, role : str
+        Legend text and colour role.
+    held : bool
+        Draw as steps (zero order hold).
+    dash : str, optional
+        Plotly dash style.
+    width : float
+        Line width [px].
+    max_points : int
+        Most points kept.
+
+    """
+    x, y = (decimate_steps if held else decimate_min_max)(x, y, max_points)
+    style = {'color': f'@{role}', 'width': width}
+    if held:
+        style['shape'] = 'hv'
+    if dash:
+        style['dash'] = dash
+    return {'type': 'scatter', 'mode': 'lines', 'name': name, 'line': style,
+            'x': [round(float(v), 4) for v in x], 'y': rounded(y)}
+
+
+def stack(rows, x_title, row_px=ROW_PX):
+    """
+    Return a figure of plots one below the other whose x axes zoom together.
+
+    Parameters
+    ----------
+    rows : list of (y_title, traces)
+        From top to bottom. Each row has its own legend in its own strip above the
+        plot, so that legends never cover data.
+    x_title : str
+        Title of the common x axis.
+    row_px : int
+        Height of a row.
+
+    """
+    n = len(rows)
+    inner = n * (row_px + LEGEND_PX)
+    height = inner + BOTTOM_PX
+    layout = {'height': height, 'margin': {'l': 68, 'r': 14, 't': 4, 'b': BOTTOM_PX},
+              'hovermode': 'x'}
+    data = []
+    for k, (title, traces) in enumerate(rows):
+        suffix = '' if k == 0 else str(k + 1)
+        top = 1.0 - (k * (row_px + LEGEND_PX) + LEGEND_PX) / inner
+        bottom = max(top - row_px / inner, 0.0)
+        # A free axis needs an anchor of its own; matches='x' links the zoom.
+        layout['xaxis' + suffix] = {
+            'anchor': 'y' + suffix, 'showticklabels': k == n - 1,
+            'title': {'text': x_title} if k == n - 1 else None}
+        if k:
+            layout['xaxis' + suffix]['matches'] = 'x'
+        layout['yaxis' + suffix] = {'domain': [bottom, top], 'title': {'text': title},
+                                    'anchor': 'x' + suffix}
+        legend = 'legend' + suffix
+        layout[legend] = {'orientation': 'h', 'x': 0, 'xanchor': 'left', 'y': top,
+                          'yanchor': 'bottom'}
+        for trace in traces:
+            data.append(dict(trace, xaxis='x' + suffix, yaxis='y' + suffix, legend=legend,
+                             showlegend=len(traces) > 1))
+    return {'data': data, 'layout': layout}
+
+
+def bars(categories, groups, x_title, y_title, height=300):
+    """
+    Return a grouped bar chart.
+
+    Parameters
+    ----------
+    categories : list
+        Labels on the x axis.
+    groups : list of (name, values, role)
+        One bar per category and group.
+    x_title, y_title : str
+        Axis titles with units.
+    height : int
+        Height [px].
+
+    """
+    data = [{'type': 'bar', 'name': name, 'x': list(categories), 'y': rounded(values),
+             'marker': {'color': f'@{role}'}, 'showlegend': len(groups) > 1}
+            for name, values, role in groups]
+    return {'data': data, 'layout': {
+        'height': height, 'barmode': 'group', 'bargap': 0.25, 'hovermode': 'x',
+        'margin': {'l': 68, 'r': 14, 't': 34, 'b': BOTTOM_PX},
+        'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
+        'xaxis': {'title': {'text': x_title}, 'type': 'category'},
+        'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
+
+
+def histogram(groups, x_title, y_title, bins=80, height=280):
+    """
+    Return histograms over one common set of bins, counted here to keep the page light.
+
+    Parameters
+    ----------
+    groups : list of (name, values, role)
+        Samples in the unit of the x axis.
+    x_title, y_title : str
+        Axis titles with units.
+    bins : int
+        Number of bins between the 0.1 % and 99.9 % quantiles; the rest goes into the
+        outer bins.
+    height : int
+        Height [px].
+
+    """
+    everything = np.concatenate([np.asarray(v, dtype=float) for _, v, _ in groups])
+    low, high = np.percentile(everything, [0.1, 99.9])
+    if high <= low:
+        low, high = low - 0.5 * abs(low) - 1e-9, high + 0.5 * abs(high) + 1e-9
+    edges = np.linspace(low, high, bins + 1)
+    centre = 0.5 * (edges[1:] + edges[:-1])
+    data = []
+    for name, values, role in groups:
+        count, _ = np.histogram(np.clip(values, low, high), edges)
+        data.append({'type': 'scatter', 'mode': 'lines', 'name': name, 'x': rounded(centre),
+                     'y': rounded(count), 'fill': 'tozeroy', 'fillcolor': f'@{role}+fill',
+                     'line': {'color': f'@{role}', 'shape': 'hvh', 'width': 1.4},
+                     'showlegend': len(groups) > 1})
+    return {'data': data, 'layout': {
+        'height': height, 'margin': {'l': 68, 'r': 14, 't': 34, 'b': BOTTOM_PX},
+        'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
+        'xaxis': {'title': {'text': x_title}},
+        'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
+
+
+def heat_maps(maps, x_title, y_title, z_title, limit, height=340):
+    """
+    Return heat maps in one row with one colour scale, symmetric about zero.
+
+    Parameters
+    ----------
+    maps : list of (title, x, y, z)
+        ``z`` has shape (len(y), len(x)).
+    x_title, y_title, z_title : str
+        Titles with units; ``z_title`` stands at the colour bar.
+    limit : float
+        The scale runs from -limit to limit in every map.
+    height : int
+        Height [px].
+
+    """
+    n = len(maps)
+    gap = 0.05 if n > 2 else 0.09
+    width = (1.0 - gap * (n - 1)) / n
+    layout = {'height': height, 'margin': {'l': 62, 'r': 10, 't': 34, 'b': BOTTOM_PX},
+              'annotations': []}
+    data = []
+    for k, (title, x, y, z) in enumerate(maps):
+        suffix = '' if k == 0 else str(k + 1)
+        left = k * (width + gap)
+        data.append({
+            'type': 'heatmap', 'x': rounded(x, 4), 'y': rounded(y, 4),
+            'z': [rounded(row, 3) for row in np.asarray(z)], 'zmin': -limit, 'zmax': limit,
+            'colorscale': DIVERGING, 'showscale': k == n - 1, 'xgap': 1, 'ygap': 1,
+            'xaxis': 'x' + suffix, 'yaxis': 'y' + suffix,
+            'hovertemplate': '%{y} / %{x}: %{z}<extra></extra>',
+            'colorbar': {'title': {'text': z_title, 'side': 'right'}, 'thickness': 12}})
+        layout['xaxis' + suffix] = {'domain': [left, left + width], 'anchor': 'y' + suffix,
+                                    'title': {'text': x_title}, 'showgrid': False}
+        layout['yaxis' + suffix] = {'anchor': 'x' + suffix, 'showgrid': False,
+                                    'title': {'text': y_title} if k == 0 else None}
+        layout['annotations'].append({
+            'text': title, 'x': left + 0.5 * width, 'y': 1.0, 'xref': 'paper',
+            'yref': 'paper', 'xanchor': 'center', 'yanchor': 'bottom', 'showarrow': False})
+    return {'data': data, 'layout': layout}

@@ -1,0 +1,319 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Figures of merit of a recorded run, as pure functions.
+
+The functions on arrays take SI values and return SI values; those on a
+``pam_sim.run.Run`` read the topics they need and return None where a topic is
+missing, so that a page can leave a cell empty instead of failing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pam_actuation.report import signals
+
+STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
+STEP_WITHIN_S = 0.03
+SETTLING_BAND = 0.05         # of the step, the usual 5 % band
+SETTLING_BAND_MIN_M = 0.3e-3  # below this a band would test the sensor, not the loop
+
+
+@dataclass(frozen=True)
+class LoopTiming:
+    """Periods of one periodic topic: seconds, ``late_share`` beyond 1.5 median periods."""
+
+    topic: str
+    count: int
+    mean_s: float
+    median_s: float
+    jitter_s: float
+    p99_s: float
+    max_s: float
+    late_share: float
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """One step of the reference: size [m], settling time [s] or None, overshoot [m]."""
+
+    start_s: float
+    size_m: float
+    settling_s: float | None
+    overshoot_m: float
+
+
+@dataclass(frozen=True)
+class RunMetrics:
+    """All figures of one run; None where the recording does not hold what is needed."""
+
+    duration_s: float
+    rmse_m: float | None
+    max_error_m: float | None
+    mean_error_m: float | None
+    cycle_rmse_m: np.ndarray
+    steps: tuple
+    saturation_low: float | None
+    saturation_high: float | None
+    air_use_kg: float | None
+    timing: tuple
+
+
+def rmse(error):
+    """Return the root mean square of the finite values, or None if there is none."""
+    error = np.asarray(error, dtype=float)
+    error = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(error ** 2))) if error.size else None
+
+
+def tracking_error(run):
+    """
+    Return (time_s, error_m) with error = reference - contraction, or None.
+
+    The reference is interpolated linearly to the stamps of the contraction;
+    only the stretch in which both exist is used. Time counts from the first
+    reference message, which is when the experiment starts.
+    """
+    reference = signals.series(run, 'reference')
+    measured = signals.series(run, 'contraction')
+    if reference is None or measured is None or len(reference[0]) < 2:
+        return None
+    (tr, r), (tx, x) = reference, measured
+    inside = (tx >= tr[0]) & (tx <= tr[-1])
+    if not inside.any():
+        return None
+    return tx[inside], np.interp(tx[inside], tr, r) - x[inside]
+
+
+def split_rmse(time_s, error, period_s, start_s, count=None):
+    """
+    Return the RMSE of every complete period from start_s on, as an array.
+
+    Parameters
+    ----------
+    time_s, error : array_like, shape (N,)
+        Samples of the error over time.
+    period_s, start_s : float
+        Length of a cycle and start of the first one [s].
+    count : int, optional
+        Number of cycles; by default as many as are complete.
+
+    """
+    time_s, error = np.asarray(time_s, dtype=float), np.asarray(error, dtype=float)
+    if time_s.size < 2 or period_s <= 0.0:
+        return np.empty(0)
+    # The last sample lies up to one sample before the end of the last cycle.
+    complete = int(np.floor((time_s[-1] - start_s) / period_s + 0.02))
+    complete = max(complete if count is None else min(complete, int(count)), 0)
+    values = []
+    for k in range(complete):
+        inside = ((time_s >= start_s + k * period_s)
+                  & (time_s < start_s + (k + 1) * period_s))
+        value = rmse(error[inside])
+        values.append(np.nan if value is None else value)
+    return np.array(values)
+
+
+def cycle_rmse(run, period_s, start_s, count=None):
+    """Return the tracking RMSE [m] of each cycle of a run; empty if nothing is tracked."""
+    tracked = tracking_error(run)
+    if tracked is None:
+        return np.empty(0)
+    return split_rmse(*tracked, period_s, start_s, count)
+
+
+def find_cycles(run):
+    """
+    Return (start_s, period_s, count) of the run's repeating reference, or None.
+
+    Read from the experiment in the bag's metadata; a foreign bag is searched for
+    equally spaced rising crossings of the reference's middle value.
+    """
+    text = run.metadata.get('experiment') if run.metadata else None
+    if text:
+        from pam_actuation.experiments import load_experiment
+        from pam_sim.errors import InputError
+        try:
+            return load_experiment(text).cycles
+        except InputError:
+            pass
+    reference = signals.series(run, 'reference')
+    return None if reference is None else cycles_of_signal(*reference)
+
+
+def cycles_of_signal(time_s, value):
+    """Return (start_s, period_s, count) of an evenly repeating signal, or None."""
+    time_s, value = np.asarray(time_s, dtype=float), np.asarray(value, dtype=float)
+    if value.size < 8 or np.ptp(value) <= 0.0:
+        return None
+    centred = value - 0.5 * (value.max() + value.min())
+    rising = np.flatnonzero((centred[:-1] < 0.0) & (centred[1:] >= 0.0))
+    if rising.size < 3:
+        return None
+    share = -centred[rising] / (centred[rising + 1] - centred[rising])
+    crossing = time_s[rising] + share * (time_s[rising + 1] - time_s[rising])
+    gaps = np.diff(crossing)
+    period = float(np.median(gaps))
+    even = np.abs(gaps - period) < 0.03 * period
+    if even.sum() < 2 or even.sum() < 0.8 * even.size:
+        return None
+    start = float(crossing[np.flatnonzero(even)[0]])
+    return start, period, int((time_s[-1] - start) / period + 0.02)
+
+
+def step_responses(run):
+    """
+    Return a StepResponse for every step of the reference.
+
+    Settled means that the error stays within 5 % of the step (at least 0.3 mm)
+    until the next step or the end; ``settling_s`` is None if it never does.
+    """
+    reference, tracked = signals.series(run, 'reference'), tracking_error(run)
+    if tracked is None:
+        return ()
+    tr, r = reference
+    te, error = tracked
+    period = max(float(np.median(np.diff(tr))), 1e-6)
+    lag = max(int(round(STEP_WITHIN_S / period)), 1)
+    if r.size <= lag:
+        return ()
+    jump = r[lag:] - r[:-lag]
+    large = np.flatnonzero(np.abs(jump) >= STEP_MIN_M)
+    if not large.size:
+        return ()
+    groups = np.split(large, np.flatnonzero(np.diff(large) > lag) + 1)
+    # A ramp also moves far in 30 ms if it is long enough; a step is over at once.
+    groups = [g for g in groups if g.size <= 2 * lag]
+    starts = [float(tr[g[0] + lag]) for g in groups]
+    ends = starts[1:] + [float(te[-1])]
+    found = []
+    for group, start, end in zip(groups, starts, ends):
+        size = float(jump[group][np.argmax(np.abs(jump[group]))])
+        inside = (te >= start) & (te < end - 2.0 * STEP_WITHIN_S)
+        found.append(_step_response(te[inside], error[inside], start, size))
+    return tuple(found)
+
+
+def _step_response(time_s, error, start_s, size_m):
+    if not time_s.size:
+        return StepResponse(start_s, size_m, None, 0.0)
+    band = max(SETTLING_BAND * abs(size_m), SETTLING_BAND_MIN_M)
+    outside = np.flatnonzero(np.abs(error) > band)
+    overshoot = max(float(np.max(-np.sign(size_m) * error)), 0.0)
+    if not outside.size:
+        return StepResponse(start_s, size_m, 0.0, overshoot)
+    if outside[-1] + 1 >= time_s.size:
+        return StepResponse(start_s, size_m, None, overshoot)
+    return StepResponse(
+        start_s, size_m, float(time_s[outside[-1] + 1] - start_s), overshoot)
+
+
+def saturation_share(run, high_v=6.0):
+    """
+    Return (low, high): share of valve messages at the lower / upper limit, or None.
+
+    PPR: 0 V and ``high_v``. HSV: high is either duty fully open; low has no
+    meaning there (both shut is the wanted rest state) and is None.
+    """
+    duty = signals.series(run, 'valve_signal', 'fill_duty')
+    if duty is not None:
+        vent = signals.series(run, 'valve_signal', 'vent_duty')
+        full = (duty[1] >= 0.999) | (vent[1] >= 0.999)
+        return None, float(np.mean(full))
+    volts = signals.series(run, 'valve_signal', 'ppr_voltage')
+    if volts is None or not len(volts[1]):
+        return None
+    return float(np.mean(volts[1] <= 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
+
+
+def loop_timing(run, topic):
+    """Return the LoopTiming of a topic's header stamps, or None with under 3 messages."""
+    stamps = signals.stamps_s(run, topic)
+    if stamps is None or stamps.size < 3:
+        return None
+    periods = np.diff(stamps)
+    median = float(np.median(periods))
+    return LoopTiming(
+        topic, int(stamps.size), float(periods.mean()), median, float(periods.std()),
+        float(np.percentile(periods, 99)), float(periods.max()),
+        float(np.mean(periods > 1.5 * median)))
+
+
+def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
+    """
+    Return the air [kg] filled in over a record, by mass balance of the muscle.
+
+    Increases of m = p V / (R T) are summed after a play of 0.5 % of the range of
+    m, which keeps sensor noise from being counted as consumption. Leakage and
+    what a regulator bleeds itself are not seen, so this is a lower bound.
+
+    Parameters
+    ----------
+    pressure_pa, contraction_m : array_like, shape (N,)
+        Absolute pressure and contraction at the same instants.
+    volume_m3 : callable
+        Volume of muscle and fittings at a contraction [m].
+
+    """
+    mass = np.asarray(pressure_pa) * volume_m3(np.asarray(contraction_m)) / (
+        287.05 * temperature_k)
+    if mass.size < 2:
+        return 0.0
+    play = 0.005 * float(np.ptp(mass))
+    held, used = mass[0], 0.0
+    for value in mass[1:]:
+        if value > held + play:
+            used += value - play - held
+            held = value - play
+        elif value < held - play:
+            held = value + play
+    return float(used)
+
+
+def run_metrics(run, cycles=None, volume_m3=None):
+    """
+    Return the RunMetrics of a run.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        The recording.
+    cycles : (start_s, period_s, count), optional
+        Of the repeating part; by default as ``find_cycles``.
+    volume_m3 : callable, optional
+        Muscle volume over contraction; without it air use is None.
+
+    """
+    cycles = find_cycles(run) if cycles is None else cycles
+    tracked = tracking_error(run)
+    error = None if tracked is None else tracked[1]
+    saturation = saturation_share(run) or (None, None)
+    used = None
+    pressure, contraction = signals.series(run, 'pressure'), signals.series(run, 'contraction')
+    if volume_m3 is not None and pressure is not None and contraction is not None:
+        used = air_use(pressure[1], np.interp(pressure[0], *contraction), volume_m3)
+    timing = [loop_timing(run, topic) for topic in (
+        'reference', 'pressure_command', 'valve_signal', 'pressure', 'contraction', 'force')]
+    return RunMetrics(
+        duration_s=signals.duration_s(run),
+        rmse_m=None if error is None else rmse(error),
+        max_error_m=None if error is None else float(np.max(np.abs(error))),
+        mean_error_m=None if error is None else float(np.mean(error)),
+        cycle_rmse_m=np.empty(0) if not cycles else cycle_rmse(
+            run, cycles[1], cycles[0], cycles[2]),
+        steps=step_responses(run),
+        saturation_low=saturation[0], saturation_high=saturation[1],
+        air_use_kg=used, timing=tuple(t for t in timing if t is not None))

@@ -1,0 +1,144 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page: sections in order, written as one self-contained HTML file."""
+
+from dataclasses import dataclass
+import html
+import json
+import os
+from pathlib import Path
+import tempfile
+
+from pam_actuation.report.assets import CSS, SCRIPT
+
+
+@dataclass(frozen=True)
+class Section:
+    """
+    One part of a page.
+
+    ``body`` is HTML whose variable text is already escaped. A section with
+    ``group`` true is a heading with its paragraph above the sections that follow.
+    """
+
+    key: str
+    title: str
+    body: str
+    group: bool = False
+
+
+def text(value):
+    """Return a value as escaped HTML text."""
+    return html.escape(str(value), quote=True)
+
+
+def paragraph(value, kind=''):
+    """Return an escaped paragraph, ``kind`` being a CSS class such as ``note``."""
+    return f'<p class="{kind}">{text(value)}</p>' if kind else f'<p>{text(value)}</p>'
+
+
+def plot(figure, caption=''):
+    """Return the HTML of one figure; its data are JSON beside it, drawn when scrolled to."""
+    # '<' may not stand in a script element: '</script>' in a name would end it.
+    data = json.dumps(figure, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
+    height = int(figure['layout'].get('height', 300))
+    note = f'<figcaption>{text(caption)}</figcaption>' if caption else ''
+    return (f'<figure><div class="plot" style="min-height:{height}px">'
+            f'<script type="application/json">{data}</script></div>{note}</figure>')
+
+
+def table(head, rows, kind=''):
+    """Return an HTML table; cells are escaped, None becomes a dash."""
+    def cell(value):
+        return '–' if value is None else text(value)
+    top = ''.join(f'<th>{cell(v)}</th>' for v in head)
+    top = f'<thead><tr>{top}</tr></thead>' if head else ''
+    body = ''.join('<tr>' + ''.join(f'<td>{cell(v)}</td>' for v in row) + '</tr>'
+                   for row in rows)
+    return f'<div class="scroll"><table class="{kind}">{top}<tbody>{body}</tbody></table></div>'
+
+
+def key_numbers(numbers):
+    """
+    Return the HTML of the numbers a reader should see first.
+
+    Parameters
+    ----------
+    numbers : list of (value, what, note, mood)
+        Text of the number with its unit, what it is, a remark, and ``good``,
+        ``bad`` or ``''``.
+
+    """
+    cells = ''.join(
+        f'<div class="number {mood}"><span>{text(what)}</span><b>{text(value)}</b>'
+        f'<small>{text(note)}</small></div>' for value, what, note, mood in numbers)
+    return f'<div class="numbers">{cells}</div>'
+
+
+def render(title, lead, sections, numbers=(), footer=''):
+    """
+    Return the whole page as text.
+
+    Parameters
+    ----------
+    title, lead : str
+        Heading and the sentence below it.
+    sections : list of Section
+        In reading order.
+    numbers : list
+        See ``key_numbers``; shown above all sections.
+    footer : str
+        Last line.
+
+    """
+    links = ''.join(f'<a href="#{text(s.key)}">{text(s.title)}</a>' for s in sections
+                    if s.group or not any(t.group for t in sections))
+    parts = []
+    for section in sections:
+        tag = 'div' if section.group else 'section'
+        kind = ' class="group"' if section.group else ''
+        parts.append(f'<{tag}{kind} id="{text(section.key)}"><h2>{text(section.title)}</h2>'
+                     f'{section.body}</{tag}>')
+    return ('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<title>{text(title)}</title><style>{CSS}</style></head><body>'
+            f'<header class="top"><h1>{text(title)}</h1>{paragraph(lead, "lead")}'
+            f'<nav>{links}</nav>{key_numbers(numbers) if numbers else ""}</header>'
+            f'<main>{"".join(parts)}</main><footer>{text(footer)}</footer>'
+            f'<script>{plotly_script()}</script><script>{SCRIPT}</script></body></html>\n')
+
+
+def plotly_script():
+    """Return plotly's bundled JavaScript, licence comment included."""
+    from plotly.offline import get_plotlyjs
+    return get_plotlyjs().replace('</script', '<\\/script')
+
+
+def write_text(path, content):
+    """Write a text file atomically: a reader sees the old file or the whole new one."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+    try:
+        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path

@@ -1,0 +1,149 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page about one experiment or several runs of it."""
+
+from pam_actuation.report.metrics import run_metrics
+from pam_actuation.report.page import render, write_text
+from pam_actuation.report.sections.cycles import cycles
+from pam_actuation.report.sections.gap import gap_section
+from pam_actuation.report.sections.metrics_table import metrics
+from pam_actuation.report.sections.provenance import provenance
+from pam_actuation.report.sections.replay import controller_replays, overlays
+from pam_actuation.report.sections.rules import rules
+from pam_actuation.report.sections.signals_plot import time_plots
+from pam_actuation.report.sections.timing import timing
+from pam_sim.errors import InputError
+
+FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
+          'no network.')
+
+
+def muscle_volume(run):
+    """Return the volume function [m^3 over m] of the rig in a run's metadata, or None."""
+    content = (run.metadata or {}).get('rig')
+    if not content:
+        return None
+    from pam_sim import load_rig
+    try:
+        return load_rig(content).volume_m3
+    except (InputError, AttributeError):
+        return None
+
+
+def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,
+                      overlay=None, replays=None, gap=None, page_title=None):
+    """
+    Write the HTML page of one or several runs.
+
+    Parameters
+    ----------
+    runs : list of pam_sim.run.Run
+        The recordings; the first one is the main one.
+    out_path : path
+        File to write, atomically.
+    titles : list of str, optional
+        Short name of every run.
+    rules_before, rules_after : RuleBase, optional
+        Rules of the first run at its start and end.
+    overlay : list of Overlay, optional
+        Simulated against recorded signals of the first run.
+    replays : list of (title, result), optional
+        Controller replays.
+    gap : pam_sim.gap.GapResult, optional
+        Gap of the first run against a model.
+    page_title : str, optional
+        Heading; by default made of the experiment's name.
+
+    Returns
+    -------
+    dict
+        Main numbers of every run, plain data.
+
+    Raises
+    ------
+    InputError
+        No run was given.
+
+    """
+    if not runs:
+        raise InputError('a report needs at least one recording')
+    titles = list(titles) if titles else default_titles(runs)
+    measured = [run_metrics(run, volume_m3=muscle_volume(run)) for run in runs]
+    named = list(zip(titles, measured))
+    sections = [metrics(named), cycles(named)]
+    for k, (title, run) in enumerate(zip(titles, runs)):
+        heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
+        sections.append(time_plots(run, f'signals-{k}', heading))
+    if rules_after is not None:
+        sections.append(rules(rules_before, rules_after))
+    if overlay:
+        sections.append(overlays(overlay))
+    if replays:
+        sections.append(controller_replays(replays))
+    sections.append(timing(list(zip(titles, runs, measured))))
+    if gap is not None:
+        sections.append(gap_section(gap))
+    sections.append(provenance(list(zip(titles, runs))))
+    name = (runs[0].metadata or {}).get('experiment_name') or 'Recording'
+    write_text(out_path, render(
+        page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
+        'what was asked, what it did, and how well.', [s for s in sections if s],
+        run_numbers(named), FOOTER))
+    return {title: summary(m) for title, m in named}
+
+
+def default_titles(runs):
+    """Return a short distinct name of every run, from path or experiment."""
+    names = []
+    for k, run in enumerate(runs):
+        name = str(run.path).rstrip('/').rsplit('/', 1)[-1] or (
+            run.metadata or {}).get('experiment_name') or f'run {k + 1}'
+        names.append(name if name not in names else f'{name} ({k + 1})')
+    return names
+
+
+def run_numbers(named):
+    """Return the key numbers on top of a page for (title, RunMetrics) pairs."""
+    numbers = []
+    for title, m in named[:4]:
+        if len(m.cycle_rmse_m) > 1:
+            first, last = m.cycle_rmse_m[0] * 1e3, m.cycle_rmse_m[-1] * 1e3
+            numbers.append((f'{first:.2f} → {last:.2f} mm', 'Tracking RMSE, first → last cycle',
+                            f'{title}: {100 * (last / first - 1):+.0f} %', ''))
+        elif m.rmse_m is not None:
+            numbers.append((f'{m.rmse_m * 1e3:.2f} mm', 'Tracking RMSE', title, ''))
+        if m.max_error_m is not None and len(named) == 1:
+            numbers.append((f'{m.max_error_m * 1e3:.2f} mm', 'Largest error', title, ''))
+    return numbers
+
+
+def summary(m):
+    """Return the main numbers of a RunMetrics as plain data, SI."""
+    return {'duration_s': m.duration_s, 'tracking_rmse_m': m.rmse_m,
+            'max_error_m': m.max_error_m,
+            'cycle_rmse_m': [float(v) for v in m.cycle_rmse_m],
+            'settling_s': [s.settling_s for s in m.steps],
+            'saturation_high': m.saturation_high, 'air_use_kg': m.air_use_kg,
+            'loop_period_s': {t.topic: t.median_s for t in m.timing},
+            'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
+
+
+def bag_report(runs, out_path, titles=None):
+    """
+    Write the page of some bags; as ``experiment_report``, and return the main numbers.
+
+    A gap result or rules are not computed here; the page shows what was recorded.
+    """
+    return experiment_report(runs, out_path, titles=titles)

@@ -1,0 +1,42 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tracking error cycle by cycle, runs side by side."""
+
+from pam_actuation.report import figures
+from pam_actuation.report.page import paragraph, plot, Section
+
+ROLES = ('after', 'frozen', 'second', 'green', 'command')
+
+
+def cycles(named, key='cycles', title='Tracking error per cycle', remark=''):
+    """
+    Return the bar chart of the RMSE of every cycle, or None if no run has cycles.
+
+    Parameters
+    ----------
+    named : list of (title, RunMetrics)
+        Runs of the same experiment, for example with learning and frozen.
+    key, title, remark : str
+        Anchor, heading, and a sentence above the chart.
+
+    """
+    named = [(name, m.cycle_rmse_m) for name, m in named if len(m.cycle_rmse_m)]
+    if not named:
+        return None
+    count = max(len(values) for _, values in named)
+    groups = [(name, values * 1e3, ROLES[k % len(ROLES)])
+              for k, (name, values) in enumerate(named)]
+    figure = figures.bars(range(1, count + 1), groups, 'cycle', 'tracking RMSE [mm]')
+    return Section(key, title, (paragraph(remark) if remark else '') + plot(figure))

@@ -1,0 +1,125 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The gap between a recording and a model: verdict, size, place, overlays."""
+
+import numpy as np
+
+from pam_actuation.report import figures
+from pam_actuation.report.page import paragraph, plot, Section, table
+from pam_actuation.report.sections.replay import SHOWN
+
+VERDICT_TEXT = {
+    'no_gap': 'No gap beyond noise', 'parameter': 'A number of the model is wrong',
+    'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
+    'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
+CONDITION_ORDER = ('contracting', 'extending', 'at rest')
+
+
+def gap_section(result, key='gap', title='Recording against model', remark='',
+                max_points=2000):
+    """
+    Return the section of a gap result.
+
+    Parameters
+    ----------
+    result : pam_sim.gap.GapResult
+        The result.
+    key, title, remark : str
+        Anchor, heading, and a sentence above.
+    max_points : int
+        Most points per trace.
+
+    """
+    body = paragraph(remark) if remark else ''
+    body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
+    if result.signals:
+        body += table(['signal', 'noise floor', 'given model', 'numbers calibrated',
+                       'given model, in floors'],
+                      [_size(name, s) for name, s in result.signals.items()])
+        body += paragraph(
+            'RMS difference of whole free runs of the model on the recorded valve signal, on '
+            'time blocks the calibration did not use. The noise floor is what sensor noise '
+            'and stamps explain.', 'note')
+    body += _where(result) + _calibration(result)
+    for note in result.remarks:
+        body += paragraph(note, 'note')
+    if result.traces:
+        body += plot(_overlay(result, max_points))
+    return Section(key, title, body)
+
+
+def _size(name, s):
+    factor, _, unit, _ = SHOWN[name]
+
+    def shown(value):
+        return None if value is None else f'{value * factor:.3g} {unit}'
+    return [name, shown(s.noise_floor), shown(s.rmse_before), shown(s.rmse_refit),
+            f'{s.rmse_before / s.noise_floor:.1f}' if s.noise_floor else None]
+
+
+def _where(result):
+    if not result.where:
+        return ''
+    whole = [w for w in result.where if w.condition == 'all']
+    body = '<h3>Where the gap sits</h3>'
+    body += table(['signal', 'subsystem', 'share of the squared gap'],
+                  [[w.signal, w.subsystem, f'{100 * w.share_of_gap:.0f} %'] for w in whole])
+    parts = [w for w in result.where if w.condition != 'all']
+    names = list(dict.fromkeys(w.condition for w in parts))
+    groups = []
+    for signal, role in (('pressure', 'after'), ('contraction', 'second'), ('force', 'green')):
+        chosen = {w.condition: w.share_of_gap for w in parts if w.signal == signal}
+        if chosen:
+            groups.append((signal, [100.0 * chosen.get(n, np.nan) for n in names], role))
+    if groups:
+        body += plot(figures.bars(names, groups, 'condition', 'share of the squared gap [%]'),
+                     'Shares by direction of motion add up to 100 %, and so do those by '
+                     'pressure.')
+    return body
+
+
+def _calibration(result):
+    if not result.calibration:
+        return ''
+    wrong = {p.name for p in result.parameters}
+    rows = [[c.name, f'{c.nominal:.5g} {c.unit}', f'{c.value:.5g} {c.unit}',
+             f'{c.ci95[0]:.5g} … {c.ci95[1]:.5g}', f'{c.pull:+.1f}',
+             'wrong' if c.name in wrong else ''] for c in result.calibration]
+    return ('<details><summary>Calibrated numbers</summary>'
+            + table(['number', 'nominal', 'calibrated', '95 % interval',
+                     'pull [standard deviations]', ''], rows)
+            + paragraph('The pull is the shift in standard deviations of how well the number '
+                        'was known before.', 'note') + '</details>')
+
+
+def _overlay(result, max_points):
+    start = min(int(t.stamp_ns[0]) for t in result.traces.values())
+    rows = []
+    for name, trace in result.traces.items():
+        factor, offset, unit, label = SHOWN[name]
+        time_s = (trace.stamp_ns - start) * 1e-9
+        curves = [('recorded', trace.measured, 'measured', None),
+                  ('given model', trace.before, 'simulated', 'dash')]
+        rows.append((label, [figures.line(
+            time_s, (y + offset) * factor, text, role, dash=dash, width=1.4,
+            max_points=max_points) for text, y, role, dash in curves]))
+        rows.append((f'residual [{unit}]', [
+            figures.line(time_s, (trace.measured - trace.before) * factor,
+                         'recorded − given model', 'residual', width=1.0,
+                         max_points=max_points),
+            figures.line(time_s, (trace.measured - trace.refit) * factor,
+                         'recorded − calibrated', 'green', width=1.0,
+                         max_points=max_points)]))
+    return figures.stack(rows, 'time [s]', row_px=170)

@@ -1,0 +1,87 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The table of figures of merit, one column per run."""
+
+from pam_actuation.report.page import paragraph, Section, table
+
+AIR_DENSITY = 1.185          # kg/m^3 at the reference atmosphere of ISO 8778
+
+
+def metrics(named, key='metrics', title='Figures of merit'):
+    """
+    Return the table of metrics.
+
+    Parameters
+    ----------
+    named : list of (title, RunMetrics)
+        One column each.
+    key, title : str
+        Anchor and heading.
+
+    """
+    rows = [
+        ('Tracking RMSE', _mm(m.rmse_m for _, m in named)),
+        ('Largest error', _mm(m.max_error_m for _, m in named)),
+        ('Mean error (reference − contraction)', _mm((m.mean_error_m for _, m in named), '+')),
+        ('RMSE of the first cycle', _mm(_cycle(m, 0) for _, m in named)),
+        ('RMSE of the last cycle', _mm(_cycle(m, -1) for _, m in named)),
+        ('Last cycle against the first', [_change(m) for _, m in named]),
+        ('Cycles', [len(m.cycle_rmse_m) or None for _, m in named]),
+        ('Settling into 5 % after a step', [_settling(m) for _, m in named]),
+        ('Overshoot of steps', _mm(max((s.overshoot_m for s in m.steps), default=None)
+                                   for _, m in named)),
+        ('Valve at its upper limit', [_percent(m.saturation_high) for _, m in named]),
+        ('Valve at its lower limit', [_percent(m.saturation_low) for _, m in named]),
+        ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
+    ]
+    rows = [[name, *cells] for name, cells in rows if any(c is not None for c in cells)]
+    body = table([''] + [name for name, _ in named], rows)
+    if any(m.air_use_kg is not None for _, m in named):
+        body += paragraph(
+            'Air is the sum of all increases of the air mass in the muscle, from measured '
+            'pressure and the volume of the model; litres at the reference atmosphere. What '
+            'leaks or a regulator bleeds is not in it.', 'note')
+    return Section(key, title, body)
+
+
+def _mm(values, sign=''):
+    return [None if v is None else f'{v * 1e3:{sign}.3f} mm' for v in values]
+
+
+def _percent(value):
+    return None if value is None else f'{100.0 * value:.1f} % of the messages'
+
+
+def _cycle(m, index):
+    return float(m.cycle_rmse_m[index]) if len(m.cycle_rmse_m) else None
+
+
+def _change(m):
+    if len(m.cycle_rmse_m) < 2:
+        return None
+    return f'{100.0 * (m.cycle_rmse_m[-1] / m.cycle_rmse_m[0] - 1.0):+.0f} %'
+
+
+def _settling(m):
+    if not m.steps:
+        return None
+    return ', '.join('not settled' if s.settling_s is None else f'{s.settling_s:.2f} s'
+                     for s in m.steps)
+
+
+def _air(value):
+    if value is None:
+        return None
+    return f'{value * 1e3:.2f} g ({value / AIR_DENSITY * 1e3:.2f} l)'

@@ -1,0 +1,101 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Signals over time: contraction, error, pressure, force and valve, zooming together."""
+
+import numpy as np
+
+from pam_actuation.report import figures, signals
+from pam_actuation.report.metrics import tracking_error
+from pam_actuation.report.page import plot, Section
+from pam_sim.units import P_ATM_PA
+
+
+def time_plots(run, key='signals', title='Signals over time', max_points=2400):
+    """
+    Return the section with all signals of one run.
+
+    Rows whose topics are not in the run are left out.
+    """
+    rows = [row for row in (
+        _contraction(run, max_points), _error(run, max_points), _pressure(run, max_points),
+        _force(run, max_points), _valve(run, max_points)) if row]
+    if not rows:
+        return Section(key, title, '<p>This recording holds no signal of the rig.</p>')
+    figure = figures.stack(rows, 'time since the start of the experiment [s]')
+    return Section(key, title, plot(
+        figure, 'Drag to zoom, all rows follow; double click to go back.'))
+
+
+def _mm(pair):
+    return pair[0], pair[1] * 1e3
+
+
+def _kpa(pair):
+    return pair[0], (pair[1] - P_ATM_PA) * 1e-3
+
+
+def _contraction(run, points):
+    traces = []
+    reference, measured = signals.series(run, 'reference'), signals.series(run, 'contraction')
+    if measured is not None:
+        traces.append(figures.line(*_mm(measured), 'contraction', 'measured',
+                                   max_points=points))
+    if reference is not None:
+        traces.append(figures.line(*_mm(reference), 'reference', 'reference', dash='dash',
+                                   width=1.3, max_points=points))
+    return ('contraction [mm]', traces) if traces else None
+
+
+def _error(run, points):
+    tracked = tracking_error(run)
+    if tracked is None:
+        return None
+    return 'tracking error [mm]', [figures.line(
+        *_mm(tracked), 'reference − contraction', 'residual', width=1.1, max_points=points)]
+
+
+def _pressure(run, points):
+    traces = []
+    for topic, name, role, dash in (('pressure', 'pressure', 'measured', None),
+                                    ('pressure_command', 'command', 'command', 'dot')):
+        pair = signals.series(run, topic)
+        if pair is not None:
+            traces.append(figures.line(*_kpa(pair), name, role, dash=dash, max_points=points))
+    return ('pressure [kPa gauge]', traces) if traces else None
+
+
+def _force(run, points):
+    traces = []
+    for topic, name, role in (('force', 'load cell', 'measured'),
+                              ('external_force', 'external force', 'second')):
+        pair = signals.series(run, topic)
+        if pair is not None:
+            traces.append(figures.line(*pair, name, role, width=1.2, max_points=points))
+    return ('force [N]', traces) if traces else None
+
+
+def _valve(run, points):
+    volts = signals.series(run, 'valve_signal', 'ppr_voltage')
+    if volts is not None:
+        return 'valve voltage [V]', [figures.line(
+            *volts, 'voltage', 'green', held=True, width=1.2, max_points=points)]
+    fill = signals.series(run, 'valve_signal', 'fill_duty')
+    vent = signals.series(run, 'valve_signal', 'vent_duty')
+    if fill is None or vent is None:
+        return None
+    return 'duty [–], vent downwards', [
+        figures.line(*fill, 'fill', 'green', held=True, width=1.0, max_points=points),
+        figures.line(vent[0], -np.asarray(vent[1]), 'vent', 'second', held=True, width=1.0,
+                     max_points=points)]

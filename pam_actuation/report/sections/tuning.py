@@ -1,0 +1,65 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What offline tuning changed."""
+
+from pam_actuation.report import figures
+from pam_actuation.report.page import paragraph, plot, Section, table
+
+
+def tuning_section(result, key='tuning', title='Offline tuning'):
+    """
+    Return the section of a tuning result.
+
+    Parameters
+    ----------
+    result : object or dict
+        With ``to_dict()`` or as a dict. Used where present: ``changes`` (name to
+        {before, after, unit}), ``history`` (best cost after each rollout), and any
+        other plain number, shown in a table.
+    key, title : str
+        Anchor and heading.
+
+    """
+    data = result if isinstance(result, dict) else result.to_dict()
+    body = paragraph(
+        'Settings of the controller were searched on the model, against simulated runs of '
+        'the same experiment; a run with other random numbers then checked the result.')
+    if hasattr(result, 'text'):
+        body += paragraph(result.text())
+    plain = [[_words(name), _shown(value)] for name, value in data.items()
+             if isinstance(value, (int, float, bool, str)) and value != '']
+    if plain:
+        body += table([], plain, 'facts')
+    changes = data.get('changes') or {}
+    if changes:
+        body += table(['setting', 'before', 'after', 'unit'], [
+            [name, _shown(c.get('before')), _shown(c.get('after')), c.get('unit', '')]
+            for name, c in changes.items()])
+    history = [v for v in data.get('history') or [] if isinstance(v, (int, float))]
+    if len(history) > 1:
+        line = figures.line(range(1, len(history) + 1), history, 'best cost', 'after',
+                            held=True)
+        body += plot(figures.stack([('best cost', [line])], 'simulated runs', row_px=220))
+    return Section(key, title, body)
+
+
+def _words(name):
+    return str(name).replace('_', ' ')
+
+
+def _shown(value):
+    if isinstance(value, bool):
+        return 'yes' if value else 'no'
+    return f'{value:.5g}' if isinstance(value, float) else value

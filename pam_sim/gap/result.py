@@ -1,0 +1,176 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a look at the gap found, and its form in gap.json."""
+
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+
+SCHEMA = 1
+VERDICTS = ('effects', 'parameter', 'no_gap', 'unknown', 'ambiguous', 'refused')
+SIGNALS = ('pressure', 'contraction', 'force')
+FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
+UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
+
+
+@dataclass(frozen=True)
+class SignalGap:
+    """
+    Gap of one signal in SI units, on the certify part of the record.
+
+    ``before`` is the given model, ``refit`` the same with its numbers calibrated,
+    ``after`` the final model; equal to ``refit`` as long as no effect is added.
+    """
+
+    unit: str
+    noise_floor: float
+    rmse_before: float
+    rmse_refit: float | None
+    rmse_after: float | None
+
+    @property
+    def shrink_percent(self):
+        """Return how much of the gap left by refitting the final model closes, or None."""
+        if self.rmse_refit is None or self.rmse_refit <= self.noise_floor:
+            return None
+        left = max(self.rmse_after ** 2 - self.noise_floor ** 2, 0.0)
+        return 100.0 * (1.0 - math.sqrt(left / (self.rmse_refit ** 2 - self.noise_floor ** 2)))
+
+    def to_dict(self):
+        """Return the entry of gap.json."""
+        return {'unit': self.unit, 'noise_floor': self.noise_floor,
+                'rmse_before': self.rmse_before, 'rmse_refit': self.rmse_refit,
+                'rmse_after': self.rmse_after, 'shrink_percent': self.shrink_percent}
+
+
+@dataclass(frozen=True)
+class Share:
+    """A part of the gap: of ``signal``, caused in ``subsystem``, under ``condition``."""
+
+    subsystem: str
+    signal: str
+    condition: str
+    share_of_gap: float
+
+    def to_dict(self):
+        """Return the entry of gap.json."""
+        return {'subsystem': self.subsystem, 'signal': self.signal,
+                'condition': self.condition, 'share_of_gap': self.share_of_gap}
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """
+    One number of the model after calibration.
+
+    ``pull`` is (value - nominal) in standard deviations of how well the nominal
+    number is known; ``ci95`` the 95 % interval of the value.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    value: float
+    ci95: tuple
+    pull: float
+
+    def to_dict(self):
+        """Return the entry of gap.json."""
+        return {'name': self.name, 'nominal': self.nominal, 'value': self.value,
+                'unit': self.unit, 'ci95': list(self.ci95)}
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A signal measured and simulated at the measured stamps, SI units."""
+
+    stamp_ns: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    refit: np.ndarray
+    after: np.ndarray
+
+
+@dataclass
+class GapResult:
+    """
+    Outcome of the gap workflow.
+
+    Attributes
+    ----------
+    verdict : str
+        One of ``VERDICTS``.
+    reason : str
+        One or two sentences for a person.
+    signals : dict of str -> SignalGap
+        By signal name; signals that were not recorded are absent.
+    where : list of Share
+        Shares of the squared gap by subsystem and by condition.
+    parameters : list of Calibrated
+        Numbers found wrong (verdict ``parameter``).
+    calibration : list of Calibrated
+        All numbers that were calibrated, for the report.
+    traces : dict of str -> Trace
+        For compare.mcap and plots; not part of gap.json.
+    model_yaml : str
+        The final model.
+
+    """
+
+    verdict: str
+    reason: str
+    signals: dict = field(default_factory=dict)
+    where: list = field(default_factory=list)
+    parameters: list = field(default_factory=list)
+    calibration: list = field(default_factory=list)
+    effects: list = field(default_factory=list)
+    ambiguity_set: list = field(default_factory=list)
+    next_experiment: dict | None = None
+    unexplained_fraction: float = 0.0
+    fingerprint: dict = field(default_factory=dict)
+    minimum_detectable: dict = field(default_factory=dict)
+    runtime_s: float = 0.0
+    simulations: int = 0
+    remarks: list = field(default_factory=list)
+    traces: dict = field(default_factory=dict)
+    model_yaml: str = ''
+
+    def to_dict(self):
+        """Return what gap.json holds, plain data without NaN."""
+        return _finite({
+            'schema': SCHEMA, 'verdict': self.verdict, 'effects': self.effects,
+            'parameters': [p.to_dict() for p in self.parameters],
+            'ambiguity_set': self.ambiguity_set, 'next_experiment': self.next_experiment,
+            'where': [w.to_dict() for w in self.where],
+            'signals': {name: s.to_dict() for name, s in self.signals.items()},
+            'unexplained_fraction': self.unexplained_fraction,
+            'fingerprint': self.fingerprint, 'minimum_detectable': self.minimum_detectable,
+            'runtime_s': self.runtime_s, 'simulations': self.simulations,
+            'reason': self.reason})
+
+
+def _finite(value):
+    """Return the value with NumPy numbers as plain ones and NaN or infinity as None."""
+    if isinstance(value, dict):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    if isinstance(value, (bool, str, type(None))):
+        return value
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    number = float(value)
+    return number if math.isfinite(number) else None

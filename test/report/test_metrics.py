@@ -1,0 +1,140 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Figures of merit on runs whose figures are known."""
+
+import numpy as np
+from pam_actuation.report import metrics
+from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+import pytest
+
+from tracking_runs import step_run, tracking_run
+
+AMPLITUDES = (2e-3, 1e-3, 0.5e-3)
+
+
+def test_cycle_rmse_is_that_of_each_cycle():
+    values = metrics.cycle_rmse(tracking_run(AMPLITUDES), 4.0, 3.0)
+    assert values == pytest.approx(np.array(AMPLITUDES) / np.sqrt(2), rel=2e-3)
+
+
+def test_cycle_rmse_takes_as_many_as_wanted_and_only_complete_ones():
+    run = tracking_run(AMPLITUDES)
+    assert len(metrics.cycle_rmse(run, 4.0, 3.0, count=2)) == 2
+    assert len(metrics.cycle_rmse(run, 4.0, 5.0)) == 2
+
+
+def test_cycles_are_found_without_metadata():
+    start, period, count = metrics.find_cycles(tracking_run([1e-3] * 6))
+    assert period == pytest.approx(4.0, rel=1e-3)
+    assert count >= 5
+    assert 3.0 < start < 7.0 + 1e-6
+
+
+def test_cycles_come_from_the_recorded_experiment():
+    text = ('name: sine\ndescription: x\ndomain: contraction\nsegments:\n'
+            '  - rest: {duration_s: 1.0}\n'
+            '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n')
+    run = tracking_run(AMPLITUDES, metadata={'experiment': text})
+    assert metrics.find_cycles(run) == (1.0, 4.0, 3)
+
+
+def test_a_hold_has_no_cycles():
+    t = np.arange(0, 10, 0.01)
+    assert metrics.cycles_of_signal(t, np.where(t > 2, 1.0, 0.0)) is None
+
+
+def test_rmse_and_largest_error_and_missing_topics():
+    found = metrics.run_metrics(tracking_run((1e-3, 1e-3)))
+    assert found.max_error_m == pytest.approx(1e-3, rel=1e-3)
+    run = tracking_run((1e-3, 1e-3))
+    del run.topics['reference']
+    found = metrics.run_metrics(run)
+    assert found.rmse_m is None and found.max_error_m is None and not len(found.cycle_rmse_m)
+
+
+def test_settling_time_of_a_first_order_lag():
+    (step,) = metrics.step_responses(step_run(gain_per_s=10.0))
+    assert step.size_m == pytest.approx(0.01)
+    assert step.settling_s == pytest.approx(np.log(20) / 10.0, abs=0.012)
+    assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_step_that_stays_off_is_not_settled():
+    (step,) = metrics.step_responses(step_run(late_m=0.001))
+    assert step.settling_s is None
+
+
+def test_a_sine_has_no_steps():
+    assert metrics.step_responses(tracking_run(AMPLITUDES)) == ()
+
+
+def test_saturation_shares():
+    run = tracking_run(AMPLITUDES)
+    volts = run.topics['valve_signal'].values['ppr_voltage']
+    volts[:] = 3.0
+    volts[: volts.size // 4] = 6.0
+    volts[-volts.size // 10:] = 0.0
+    low, high = metrics.saturation_share(run)
+    assert high == pytest.approx(0.25, abs=1e-3)
+    assert low == pytest.approx(0.10, abs=1e-3)
+
+
+def test_saturation_of_an_hsv_pair_is_either_valve_fully_open():
+    run = tracking_run(AMPLITUDES, valve='hsv')
+    values = run.topics['valve_signal'].values
+    values['fill_duty'][:] = 0.0
+    values['vent_duty'][:] = 0.0
+    values['vent_duty'][: values['vent_duty'].size // 2] = 1.0
+    assert metrics.saturation_share(run) == (None, pytest.approx(0.5, abs=1e-3))
+
+
+def test_loop_timing_counts_late_ticks():
+    run = tracking_run(AMPLITUDES)
+    stamp = run.topics['pressure_command'].stamp_ns
+    stamp[100:] += 20_000_000
+    timing = metrics.loop_timing(run, 'pressure_command')
+    assert timing.median_s == pytest.approx(0.005)
+    assert timing.max_s == pytest.approx(0.025)
+    assert timing.late_share == pytest.approx(1.0 / (stamp.size - 1))
+
+
+def test_air_use_counts_fillings_and_not_noise():
+    t = np.linspace(0, 10, 10001)
+    p = 2e5 + 1e5 * np.sin(2 * np.pi * t) + np.random.default_rng(0).normal(0, 300, t.size)
+    one = 2e5 * 1e-5 / (287.05 * 293.15)
+    used = metrics.air_use(p, 0 * t, lambda x: 1e-5 + 0 * x)
+    assert used == pytest.approx(10 * one, rel=0.03)
+
+
+def test_decimation_keeps_extremes_and_ends():
+    y = np.zeros(100_000)
+    y[54_321], y[77_777] = 5.0, -3.0
+    x, thin = decimate_min_max(np.arange(y.size), y, 2000)
+    assert x.size <= 2000
+    assert thin.max() == 5.0 and thin.min() == -3.0
+    assert x[0] == 0 and x[-1] == y.size - 1
+    assert np.all(np.diff(x) > 0)
+
+
+def test_decimation_of_a_held_signal_keeps_both_ends_of_plateaus():
+    y = np.repeat([0.0, 1.0, 0.5], 10_000)
+    x, thin = decimate_steps(np.arange(y.size), y)
+    assert list(thin) == [0.0, 0.0, 1.0, 1.0, 0.5, 0.5]
+    assert list(x) == [0, 9999, 10_000, 19_999, 20_000, 29_999]
+
+
+def test_decimation_leaves_out_what_is_not_finite():
+    x, y = decimate_min_max([0, 1, 2, 3], [1.0, np.nan, np.inf, 2.0])
+    assert list(x) == [0, 3] and list(y) == [1.0, 2.0]
