@@ -24,15 +24,14 @@ import tomllib
 
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
-import pytest
-from rosbags.typesys import get_typestore, Stores
-import yaml
-
 import pam_actuation
 from pam_actuation import resources
 from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.drivers.faults import fault_table_markdown
 from pam_sim.errors import InputError
+import pytest
+from rosbags.typesys import get_typestore, Stores
+import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = (
@@ -45,7 +44,8 @@ DISTRIBUTIONS = {'yaml': 'pyyaml'}
 ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'mcap': 'mcap-ros2-support', 'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'rosbags': 'python3-rosbags-pip', 'scipy': 'python3-scipy',
-    'tqdm': 'python3-tqdm', 'zstandard': 'mcap-ros2-support', 'yaml': 'python3-yaml', 'plotly': None}
+    'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml', 'zstandard': 'mcap-ros2-support',
+    'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
 
@@ -284,5 +284,4 @@ def test_the_printed_fault_table_is_the_one_the_driver_uses():
     text = (ROOT / 'docs' / 'safety.md').read_text(encoding='utf-8')
     printed = re.search(
         r'<!-- fault table: begin -->\n(.*)<!-- fault table: end -->', text, re.S)[1]
-    assert printed == fault_table_markdown(), (
-        'copy the output of pam_actuation.drivers.faults.fault_table_markdown() into docs/safety.md')
+    assert printed == fault_table_markdown(), 'copy what fault_table_markdown() returns'
