@@ -1,0 +1,132 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the valve driver does about each fault: the one table.
+
+The supervisor names its reasons after these rows, the tests walk them, and the
+documentation prints them (``fault_table_markdown``).
+"""
+
+from dataclasses import dataclass
+
+VENT = 'vent'
+HOLD = 'hold'
+IGNORE = 'ignore'
+CLAMP = 'clamp'
+
+
+@dataclass(frozen=True)
+class Fault:
+    """
+    One row: what is wrong, how it is noticed, what the driver does, how it ends.
+
+    ``reaction`` is one of vent, hold, ignore, clamp; ``latched`` faults stay until the
+    service ``~/reset`` is called, the others end by themselves as ``resume`` says.
+    """
+
+    key: str
+    title: str
+    detection: str
+    reaction: str
+    latched: bool
+    resume: str
+
+
+_RAMP = 'then a slow rise from the measured pressure'
+
+FAULT_TABLE = (
+    Fault('emergency_stop', 'Emergency stop',
+          'service ~/emergency_stop called', VENT, True, 'service ~/reset, ' + _RAMP),
+    Fault('over_pressure', 'Over-pressure',
+          'one valid reading above 1.05 times the pressure limit plus 10 kPa', VENT, True,
+          'service ~/reset, refused while the reading is above the limit; ' + _RAMP),
+    Fault('no_command', 'No command yet',
+          'no valid pressure_command since start or reset', VENT, False,
+          'first valid command, ' + _RAMP),
+    Fault('command_timeout', 'Command lost',
+          'newest valid pressure_command older than 0.1 s (controller killed, stopped, '
+          'cut off, or sending only invalid values)', VENT, False,
+          'next valid command, ' + _RAMP),
+    Fault('two_publishers', 'Two publishers on pressure_command',
+          'two or more commands in 0.5 s with a stamp or publisher sequence number that goes '
+          'backwards, or with equal stamps and different values', VENT, False,
+          'no such command for 1 s, ' + _RAMP),
+    Fault('second_publisher_seen', 'Second publisher on the graph',
+          'the graph shows more than one publisher of pressure_command, messages are still in '
+          'order', IGNORE, False, 'warning ends with the second publisher'),
+    Fault('command_out_of_order', 'Single command out of order',
+          'stamp not newer than the last accepted one', IGNORE, False,
+          'message dropped; the former command goes on until its time-out'),
+    Fault('command_not_finite', 'Command NaN or infinite',
+          'value is not a finite number', IGNORE, False,
+          'message dropped; the former command goes on until its time-out'),
+    Fault('command_stamp', 'Command too old or from the future',
+          'stamp older than 0.1 s or more than 0.02 s ahead on arrival', IGNORE, False,
+          'message dropped; the former command goes on until its time-out'),
+    Fault('command_above_limit', 'Command above the pressure limit',
+          'command above max_pressure_gauge_pa', CLAMP, False,
+          'warning ends 1 s after the last such command'),
+    Fault('command_below_atmosphere', 'Command below the atmosphere',
+          'command below 101.325 kPa absolute', CLAMP, False,
+          'warning ends 1 s after the last such command'),
+    Fault('no_pressure', 'No measured pressure yet',
+          'no valid pressure since start: HSV', VENT, False, 'first valid reading, ' + _RAMP),
+    Fault('no_pressure_ppr', 'No measured pressure at all',
+          'no valid pressure since start: PPR', IGNORE, False,
+          'warning, over-pressure is not supervised; ends with the first valid reading'),
+    Fault('pressure_timeout', 'Measured pressure lost',
+          'newest valid pressure older than 0.1 s (sensor lost; or only readings that are '
+          'NaN, below -20 kPa gauge, above 1500 kPa absolute, or stamped more than 0.02 s '
+          'ahead)', VENT, False, 'next valid reading, ' + _RAMP),
+    Fault('pressure_frozen', 'Measured pressure frozen (HSV)',
+          'reading unchanged to the last bit for 0.2 s or longer while the valve flow should have '
+          'moved it by 100 kPa', VENT, False, 'first reading that differs, ' + _RAMP),
+    Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
+          'as above, from the lag of the regulator', IGNORE, False,
+          'warning: the regulator closes its own loop; ends with a reading that differs'),
+    Fault('supply_low', 'Supply loss',
+          'measured supply pressure less than 20 kPa above the command', IGNORE, False,
+          'warning: the muscle gets what there is; ends when the supply returns'),
+    Fault('supply_stale', 'Supply reading lost',
+          'supply pressure was measured and is now older than 0.5 s, or invalid', IGNORE, False,
+          'warning: the nominal supply is assumed'),
+    Fault('driver_paused', 'Driver stopped and continued',
+          'more than 0.3 s between two ticks of the driver', VENT, False,
+          'first command and reading stamped after the pause, ' + _RAMP),
+    Fault('clock_back', 'Clock set back',
+          'time of a tick before that of the former one', VENT, False,
+          'first command and reading on the new clock, ' + _RAMP),
+    Fault('driver_ends', 'Driver shut down by request or by an error of its own',
+          'lifecycle deactivate, SIGINT, SIGTERM, exception', VENT, False,
+          'start the driver again'),
+    Fault('driver_killed', 'Driver killed, stopped or its computer lost',
+          'not detectable by the driver: the valve holds its last signal', HOLD, False,
+          'needs hardware or a second process that publishes the safe valve_signal'),
+    Fault('reference_lost', 'Reference lost',
+          'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,
+          'the driver follows the controller'),
+)
+
+FAULTS = {fault.key: fault for fault in FAULT_TABLE}
+
+
+def fault_table_markdown():
+    """Return the table as Markdown text, one row per fault."""
+    lines = ['| fault | noticed by | reaction | latched | ends |', '|---|---|---|---|---|']
+    for fault in FAULT_TABLE:
+        latched = 'latched' if fault.latched else 'self-resuming'
+        lines.append(f'| {fault.title} | {fault.detection} | {fault.reaction} | {latched} '
+                     f'| {fault.resume} |')
+    return '\n'.join(lines) + '\n'

@@ -1,0 +1,187 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Driver law of a pair of high-speed on/off valves (HSV): pressure to two PWM duties.
+
+``HsvLaw`` wraps the compiled ``hsv_kernel`` for use tick by tick; ``HsvConfig`` is
+what the law knows of valves, line and muscle. The figures are data-sheet values of the
+rig, not measured ones: the law learns flow gain and drift while it runs.
+"""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from pam_actuation.drivers import hsv_kernel as kernel
+from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K
+
+_SPAN_PA = 600_000.0
+
+
+@dataclass(frozen=True)
+class HsvConfig:
+    """
+    What the law knows, SI.
+
+    Valves: ISO 6358 ``conductance_m3_per_s_pa`` and ``critical_ratio``, ``supply_pa``
+    (absolute, used where no supply is measured), ``open_time_s`` and ``close_time_s``,
+    ``dead_time_s`` from duty to pressure. Volumes include the dead volume and hold at 0
+    and at 600 kPa gauge. Loop: ``gain`` share of the predicted error removed per
+    period, ``band_pa`` half width of the set-point band.
+    """
+
+    period_s: float = 0.010
+    conductance_m3_per_s_pa: float = 2.0e-10
+    critical_ratio: float = 0.38
+    supply_pa: float = 801_325.0
+    volume_m3: float = 8.89e-6
+    volume_slope_m3_per_pa: float = 4.1e-12
+    volume_at_600kpa_m3: float = 11.7e-6
+    lift_off_gauge_pa: float = 236_000.0
+    swing_hz: float = 5.9
+    swing_lowest_hz: float = 2.95
+    swing_lowest_gauge_pa: float = 490_000.0
+    swing_damping: float = 0.1
+    dead_time_s: float = 0.030
+    open_time_s: float = 0.0017
+    close_time_s: float = 0.0020
+    pulse_margin_s: float = 0.0001
+    gain: float = 0.7
+    band_pa: float = 1_000.0
+    rest_share: float = 0.6
+    correct: float = 0.8
+    correct_volume: float = 0.0
+    correct_rate: float = 0.3
+    learn_drift: float = 0.01
+    learn_gain: float = 0.03
+    flow_scale_pa: float = 4_000.0
+    gain_limit: float = 2.0
+    drift_limit_pa_per_s: float = 500_000.0
+    supply_margin_pa: float = 5_000.0
+    slope_share: float = 1.0
+
+    def par(self):
+        """
+        Return the parameter array of ``hsv_step``.
+
+        Raises
+        ------
+        InputError
+            If the dead time is longer than the law can remember.
+
+        """
+        longest_s = (kernel.SENT_SIZE - 2) * self.period_s
+        if not 0.0 <= self.dead_time_s < longest_s:
+            raise InputError(f'dead time of {self.dead_time_s} s, allowed are 0 to below '
+                             f'{longest_s:.2f} s', 'dead_time_s')
+        delay = round(self.dead_time_s / self.period_s, 9)
+        whole = math.floor(delay)
+        par = np.zeros(kernel.PAR_SIZE)
+        par[kernel.P_PERIOD] = self.period_s
+        par[kernel.P_DELAY_WHOLE] = whole
+        par[kernel.P_DELAY_PART] = delay - whole
+        par[kernel.P_CONDUCTANCE] = (
+            self.conductance_m3_per_s_pa * RHO_REFERENCE
+            * math.sqrt(T_REFERENCE_K / TEMPERATURE_K))
+        par[kernel.P_CRITICAL_RATIO] = self.critical_ratio
+        par[kernel.P_SUPPLY] = self.supply_pa
+        par[kernel.P_VOLUME] = self.volume_m3
+        span_pa = _SPAN_PA - self.lift_off_gauge_pa
+        rise_m3 = self.volume_at_600kpa_m3 - self.volume_m3
+        par[kernel.P_VOLUME_KNEE] = self.lift_off_gauge_pa
+        par[kernel.P_VOLUME_SLOPE] = self.volume_slope_m3_per_pa
+        par[kernel.P_VOLUME_CURVE] = (
+            rise_m3 - self.volume_slope_m3_per_pa * span_pa) / span_pa ** 2
+        turn = 2.0 * math.pi * self.period_s
+        par[kernel.P_SWING] = turn * self.swing_hz
+        par[kernel.P_SWING_LOWEST] = turn * self.swing_lowest_hz
+        swing_span_pa = max(self.swing_lowest_gauge_pa - self.lift_off_gauge_pa, 1.0)
+        par[kernel.P_SWING_SLOPE] = turn * (
+            self.swing_lowest_hz - self.swing_hz) / swing_span_pa
+        par[kernel.P_DAMPING] = self.swing_damping
+        par[kernel.P_OPEN] = self.open_time_s / self.period_s
+        par[kernel.P_CLOSE] = self.close_time_s / self.period_s
+        par[kernel.P_PULSE_MARGIN] = self.pulse_margin_s / self.period_s
+        par[kernel.P_GAIN] = self.gain
+        par[kernel.P_BAND] = self.band_pa
+        par[kernel.P_REST] = self.rest_share
+        par[kernel.P_CORRECT] = self.correct
+        par[kernel.P_CORRECT_VOLUME] = self.correct_volume
+        par[kernel.P_CORRECT_RATE] = self.correct_rate
+        par[kernel.P_LEARN_DRIFT] = self.learn_drift
+        par[kernel.P_LEARN_GAIN] = self.learn_gain
+        par[kernel.P_FLOW_SCALE] = self.flow_scale_pa
+        par[kernel.P_GAIN_LIMIT] = self.gain_limit
+        par[kernel.P_DRIFT_LIMIT] = self.drift_limit_pa_per_s * self.period_s
+        par[kernel.P_SUPPLY_MARGIN] = self.supply_margin_pa
+        par[kernel.P_SLOPE] = self.slope_share
+        return par
+
+
+def initial_state():
+    """Return the state array of ``hsv_step`` before the first measurement."""
+    state = np.zeros(kernel.STATE_SIZE)
+    state[kernel.S_MODEL] = P_ATM_PA
+    state[kernel.S_VOLUME] = 1.0
+    state[kernel.S_FILL_GAIN] = 1.0
+    state[kernel.S_VENT_GAIN] = 1.0
+    state[kernel.S_COMMAND] = math.nan
+    return state
+
+
+class HsvLaw:
+    """The law as an object: ``step`` each PWM period, ``hold`` for imposed duties."""
+
+    def __init__(self, config=None):
+        """Start without a measurement, both valves shut."""
+        self.config = config or HsvConfig()
+        self.par = self.config.par()
+        self.state = initial_state()
+        self.out = np.zeros(kernel.OUT_SIZE)
+
+    def step(self, p_cmd_pa, p_meas_pa, supply_pa=math.nan, age_s=0.0):
+        """
+        Return (fill duty, vent duty) for the next PWM period.
+
+        Pressures absolute [Pa]; ``p_meas_pa`` NaN = no new measurement, ``supply_pa``
+        NaN = nominal; ``age_s`` is the age of the measurement.
+        """
+        self.state[kernel.S_AGE] = age_s
+        hsv_step(self.state, self.par, p_cmd_pa, p_meas_pa, supply_pa, self.out)
+        return self.out[kernel.O_FILL], self.out[kernel.O_VENT]
+
+    def hold(self, fill_duty, vent_duty, p_meas_pa=math.nan, supply_pa=math.nan, age_s=0.0):
+        """Note a period in which these duties were sent whatever the law says."""
+        self.state[kernel.S_AGE] = age_s
+        hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
+        self.out[kernel.O_SATURATED] = 0.0
+
+    @property
+    def saturated(self):
+        """Return -1, 0 or +1: vent fully open, free, fill fully open."""
+        return int(self.out[kernel.O_SATURATED])
+
+    @property
+    def predicted_pa(self):
+        """Return the pressure [Pa] predicted for when the newest opening begins to act."""
+        return self.out[kernel.O_PREDICTED]
+
+    @property
+    def flow_pa(self):
+        """Return the pressure change [Pa] the valves made in the last period (model)."""
+        return self.state[kernel.S_FLOW]

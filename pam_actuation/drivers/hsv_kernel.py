@@ -1,0 +1,360 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Compiled core of the HSV pressure loop: model, observer, predictor, pulse choice.
+
+The law keeps a small model of the muscle's air (isothermal chamber, ISO 6358 valves,
+volume rising with pressure), runs it on the openings that have reached the muscle,
+corrects it by the measured pressure and predicts it over the openings still under way
+(dead time). The opening of the next PWM period is the mass-flow inverse of the error
+left at the end of that prediction. What the model misses is learned slowly in three
+numbers: a gain of the fill flow, a gain of the vent flow and a drift (leak, moving
+volume).
+
+Both duties are exactly 0 while the predicted error is inside the set-point band, and
+an error smaller than a part of what the shortest possible pulse would do is left alone,
+so that the valves rest. Never are both duties above 0.
+
+Sources: ISO 6358 (flow); the opening and closing times act as in a pulse of length
+on: open from on-delay to off-delay, nothing if shorter than the on-delay.
+
+``P_*`` index the parameter array, ``S_*`` the state array, ``O_*`` the output array.
+"""
+
+import math
+
+import numba
+
+from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
+from pam_sim.valve.flow import mass_flow_kg_per_s
+
+# Parameters.
+P_PERIOD = 0            # PWM period [s]
+P_DELAY_WHOLE = 1       # dead time, whole periods
+P_DELAY_PART = 2        # dead time, rest as a part of a period
+P_CONDUCTANCE = 3       # C rho0 sqrt(T0/T) [kg/(s Pa)]
+P_CRITICAL_RATIO = 4    # b
+P_SUPPLY = 5            # nominal supply [Pa absolute]
+P_VOLUME = 6            # volume at atmospheric pressure, dead volume included [m^3]
+P_VOLUME_SLOPE = 7      # dV/dp where the load lifts off [m^3/Pa]
+P_OPEN = 8              # opening time, part of a period
+P_CLOSE = 9             # closing time, part of a period
+P_PULSE_MARGIN = 10     # shortest pulse beyond the opening time, part of a period
+P_GAIN = 11             # share of the predicted error removed per period
+P_BAND = 12             # set-point band, half width [Pa]
+P_REST = 13             # errors below this share of the shortest pulse's effect rest
+P_CORRECT = 14          # observer: pressure correction per period
+P_CORRECT_VOLUME = 15   # observer: correction of volume, in pressure
+P_FLOW_SCALE = 16       # change per period [Pa] from which errors count as gain errors
+P_GAIN_LIMIT = 17       # flow gains stay within 1/limit..limit
+P_DRIFT_LIMIT = 18      # drift stays within +- this [Pa per period]
+P_SUPPLY_MARGIN = 19    # the target stays this far below the supply [Pa]
+P_SLOPE = 20            # share of the command's slope fed forward
+P_VOLUME_CURVE = 21     # half of d2V/dp2 [m^3/Pa^2]
+P_VOLUME_KNEE = 22      # gauge pressure where the load lifts off [Pa]
+P_SWING = 23            # load on the muscle: natural frequency at lift-off [rad/period]
+P_SWING_SLOPE = 24      # and its change with pressure [rad/(period Pa)]
+P_DAMPING = 25          # and its damping ratio
+P_CORRECT_RATE = 26     # observer: correction of the volume's rate, in pressure
+P_LEARN_DRIFT = 27      # observer: learning of the drift
+P_LEARN_GAIN = 28       # observer: learning of the flow gains
+P_SWING_LOWEST = 29     # lowest natural frequency of the load [rad/period]
+PAR_SIZE = 30
+
+# State.
+S_MODEL = 0             # model pressure now [Pa]
+S_DRIFT = 1             # learned drift [Pa per period]
+S_FILL_GAIN = 2         # learned flow gains
+S_VENT_GAIN = 3
+S_STARTED = 4           # 1 after the first measurement
+S_AGE = 5               # set by the caller: age of the measurement [s]
+S_COMMAND = 6           # former command [Pa], NaN = none
+S_SLOPE = 7             # former change of the command [Pa per period]
+S_FLOW = 8              # pressure change by the valves in the last period [Pa]
+S_VOLUME = 9            # model volume [m^3]
+S_VOLUME_RATE = 10      # and its rate [m^3 per period]
+S_SENT = 11             # openings under way, newest first, fill > 0, vent < 0
+SENT_SIZE = 32
+STATE_SIZE = S_SENT + SENT_SIZE
+
+# Output.
+O_FILL = 0              # fill duty 0..1
+O_VENT = 1              # vent duty 0..1
+O_PREDICTED = 2         # predicted pressure where the new opening begins to act [Pa]
+O_SATURATED = 3         # -1 vent fully open, +1 fill fully open, 0 free
+O_TARGET = 4            # the command after the limits of atmosphere and supply [Pa]
+OUT_SIZE = 5
+
+
+@numba.njit(cache=True)
+def _full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
+    """Return the pressure change [Pa] in one period with one valve fully open."""
+    if filling:
+        flow = mass_flow_kg_per_s(
+            supply_pa, p_pa, par[P_CONDUCTANCE], par[P_CRITICAL_RATIO])
+        flow *= state[S_FILL_GAIN]
+    else:
+        flow = -mass_flow_kg_per_s(
+            p_pa, P_ATM_PA, par[P_CONDUCTANCE], par[P_CRITICAL_RATIO])
+        flow *= state[S_VENT_GAIN]
+    return GAS_CONSTANT_AIR * TEMPERATURE_K * flow * par[P_PERIOD] / volume_m3
+
+
+@numba.njit(cache=True)
+def _volume_pull(par, p_pa, volume_m3, rate_m3):
+    """
+    Return the volume's acceleration [m^3 per period^2].
+
+    The load swings about the volume that belongs to the pressure.
+    """
+    above = max(p_pa - P_ATM_PA - par[P_VOLUME_KNEE], 0.0)
+    rest = par[P_VOLUME] + above * (par[P_VOLUME_SLOPE] + above * par[P_VOLUME_CURVE])
+    omega = max(par[P_SWING] + above * par[P_SWING_SLOPE], par[P_SWING_LOWEST])
+    return omega * (omega * (rest - volume_m3) - 2.0 * par[P_DAMPING] * rate_m3)
+
+
+@numba.njit(cache=True)
+def _advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
+    """
+    Bring the model forward by a part of a period with a constant opening.
+
+    Returns pressure [Pa], volume [m^3], its rate [m^3 per period] and the pressure
+    change made by the valves [Pa].
+    """
+    flow_pa = 0.0
+    substep = 0.5 * periods
+    if substep <= 0.0:
+        return p_pa, volume_m3, rate_m3, flow_pa
+    for _ in range(2):
+        rate_m3 += substep * _volume_pull(par, p_pa, volume_m3, rate_m3)
+        volume_m3 += substep * rate_m3
+        if volume_m3 < par[P_VOLUME]:      # the load rests on its lower stop
+            volume_m3 = par[P_VOLUME]
+            rate_m3 = max(rate_m3, 0.0)
+        change = 0.0
+        if opening != 0.0:
+            filling = opening > 0.0
+            size = abs(opening) * substep
+            half = p_pa + 0.5 * size * _full_rate(state, par, p_pa, volume_m3, supply_pa, filling)
+            half = min(max(half, P_ATM_PA), max(supply_pa, p_pa))
+            change = size * _full_rate(state, par, half, volume_m3, supply_pa, filling)
+        flow_pa += change
+        after = p_pa + change + substep * (state[S_DRIFT] - p_pa * rate_m3 / volume_m3)
+        p_pa = max(after, P_ATM_PA) if after < p_pa else after
+    return p_pa, volume_m3, rate_m3, flow_pa
+
+
+@numba.njit(cache=True)
+def duty_of_opening(opening, open_part, close_part, margin):
+    """Return the duty whose pulse is effectively open for ``opening`` (0..1) of a period."""
+    if opening >= 1.0:
+        return 1.0
+    duty = opening + open_part - close_part
+    return min(max(duty, open_part + margin), 1.0)
+
+
+@numba.njit(cache=True)
+def opening_of_duty(duty, open_part, close_part):
+    """Return the effective opening (0..1 of a period) of a duty."""
+    if duty <= open_part:
+        return 1.0 if duty >= 1.0 else 0.0
+    if 1.0 - duty < close_part:
+        return 1.0       # the valve has no time to close before the next pulse
+    return min(duty - open_part + close_part, 1.0)
+
+
+@numba.njit(cache=True)
+def observe(state, par, p_meas_pa, supply_pa):
+    """
+    Bring the model one period further and correct it by a measurement.
+
+    ``p_meas_pa`` NaN = no measurement this period. Start: the first measurement is the
+    model pressure.
+    """
+    if state[S_STARTED] < 0.5:
+        if not math.isfinite(p_meas_pa):
+            return
+        state[S_MODEL] = p_meas_pa
+        above = max(p_meas_pa - P_ATM_PA - par[P_VOLUME_KNEE], 0.0)
+        state[S_VOLUME] = par[P_VOLUME] + above * (
+            par[P_VOLUME_SLOPE] + above * par[P_VOLUME_CURVE])
+        state[S_VOLUME_RATE] = 0.0
+        state[S_STARTED] = 1.0
+        return
+    whole = int(par[P_DELAY_WHOLE])
+    part = par[P_DELAY_PART]
+    before = state[S_MODEL]
+    early = state[S_SENT + whole + 1]
+    late = state[S_SENT + whole]
+    p_pa, vol, vrate, flow_early = _advance(
+        state, par, before, state[S_VOLUME], state[S_VOLUME_RATE], early, part, supply_pa)
+    after, vol, vrate, flow_late = _advance(
+        state, par, p_pa, vol, vrate, late, 1.0 - part, supply_pa)
+    flow = flow_early + flow_late
+    state[S_FLOW] = flow
+    state[S_MODEL] = after
+    state[S_VOLUME] = vol
+    state[S_VOLUME_RATE] = vrate
+    if not math.isfinite(p_meas_pa):
+        return
+    rate = (after - before) / par[P_PERIOD]
+    error = p_meas_pa - (after - rate * state[S_AGE])
+    state[S_MODEL] = after + par[P_CORRECT] * error
+    if vol > par[P_VOLUME]:
+        # A reading above the model: the volume grows less than it thinks.
+        per_pa = vol / after
+        state[S_VOLUME] = max(vol + par[P_CORRECT_VOLUME] * error * per_pa, par[P_VOLUME])
+        state[S_VOLUME_RATE] = vrate - par[P_CORRECT_RATE] * error * per_pa
+    # A large flow points to a wrong flow gain, a small one to a drift.
+    scale = par[P_FLOW_SCALE]
+    share = flow * flow / (flow * flow + scale * scale)
+    if share > 0.0:
+        index = S_FILL_GAIN if flow > 0.0 else S_VENT_GAIN
+        gain = state[index] * (1.0 + par[P_LEARN_GAIN] * share * error / flow)
+        state[index] = min(max(gain, 1.0 / par[P_GAIN_LIMIT]), par[P_GAIN_LIMIT])
+    drift = state[S_DRIFT] + par[P_LEARN_DRIFT] * (1.0 - share) * error
+    state[S_DRIFT] = min(max(drift, -par[P_DRIFT_LIMIT]), par[P_DRIFT_LIMIT])
+
+
+@numba.njit(cache=True)
+def _push(state, opening):
+    for i in range(S_SENT + SENT_SIZE - 1, S_SENT, -1):
+        state[i] = state[i - 1]
+    state[S_SENT] = opening
+
+
+@numba.njit(cache=True)
+def predict(state, par, supply_pa):
+    """
+    Run the model over all openings under way.
+
+    Returns pressure [Pa], volume [m^3] and its rate [m^3 per period] when the next
+    opening begins to act.
+    """
+    whole = int(par[P_DELAY_WHOLE])
+    p_pa, vol, vrate, _ = _advance(
+        state, par, state[S_MODEL], state[S_VOLUME], state[S_VOLUME_RATE],
+        state[S_SENT + whole], par[P_DELAY_PART], supply_pa)
+    for i in range(whole - 1, -1, -1):
+        p_pa, vol, vrate, _ = _advance(
+            state, par, p_pa, vol, vrate, state[S_SENT + i], 1.0, supply_pa)
+    return p_pa, vol, vrate
+
+
+@numba.njit(cache=True)
+def _command_slope(state, par, p_cmd_pa):
+    """
+    Return the change [Pa per period] to feed forward.
+
+    The smaller of the last two changes of the command where they agree in sign: a ramp
+    or a sine passes, a step or noise does not.
+    """
+    slope = 0.0
+    if math.isfinite(state[S_COMMAND]):
+        slope = p_cmd_pa - state[S_COMMAND]
+    former = state[S_SLOPE]
+    state[S_COMMAND] = p_cmd_pa
+    state[S_SLOPE] = slope
+    if slope * former <= 0.0:
+        return 0.0
+    return par[P_SLOPE] * (slope if abs(slope) < abs(former) else former)
+
+
+@numba.njit(cache=True)
+def _wanted_opening(state, par, p_pa, volume_m3, free_pa, target_pa, slope_pa, supply_pa):
+    """
+    Return the signed opening for the next period.
+
+    ``p_pa`` is the pressure it starts at, ``free_pa`` where that would go by itself.
+    """
+    error = target_pa - free_pa
+    if abs(error) <= par[P_BAND]:
+        return 0.0
+    # The slope is part of the error one period on: only the rest is scaled by the gain.
+    if slope_pa * error < 0.0:
+        slope_pa = 0.0
+    elif abs(slope_pa) > abs(error):
+        slope_pa = error
+    wanted = par[P_GAIN] * (error - slope_pa) + slope_pa
+    filling = error > 0.0
+    middle = p_pa + 0.5 * wanted
+    middle = min(max(middle, P_ATM_PA), supply_pa)
+    full = abs(_full_rate(state, par, middle, volume_m3, supply_pa, filling))
+    if full <= 0.0:
+        return 0.0
+    shortest = 0.0
+    if par[P_OPEN] > 0.0 or par[P_CLOSE] > 0.0:
+        shortest = min(par[P_CLOSE] + par[P_PULSE_MARGIN], 1.0)
+    if abs(error) < par[P_REST] * shortest * full:
+        return 0.0
+    opening = min(max(abs(wanted) / full, shortest), 1.0)
+    return opening if filling else -opening
+
+
+@numba.njit(cache=True)
+def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+    """
+    One PWM period of the pressure loop.
+
+    Parameters
+    ----------
+    state, par, out : float64 arrays
+        Laid out as the ``S_*``, ``P_*`` and ``O_*`` constants; ``state`` and ``out`` are
+        written. ``state[S_AGE]`` may be set before to the age of the measurement [s].
+    p_cmd_pa, p_meas_pa, supply_pa : float
+        Wanted, measured and supply pressure, absolute [Pa]. A measurement of NaN means
+        none this period, a supply of NaN the nominal one.
+
+    """
+    if not math.isfinite(supply_pa):
+        supply_pa = par[P_SUPPLY]
+    observe(state, par, p_meas_pa, supply_pa)
+    slope = _command_slope(state, par, p_cmd_pa)
+    target = max(min(p_cmd_pa, supply_pa - par[P_SUPPLY_MARGIN]), P_ATM_PA)
+    out[O_TARGET] = target
+    opening = 0.0
+    out[O_PREDICTED] = math.nan
+    if state[S_STARTED] > 0.5:
+        predicted, vol, vrate = predict(state, par, supply_pa)
+        free, _, _, _ = _advance(state, par, predicted, vol, vrate, 0.0, 1.0, supply_pa)
+        out[O_PREDICTED] = predicted
+        opening = _wanted_opening(state, par, predicted, vol, free, target, slope, supply_pa)
+    _push(state, opening)
+    out[O_FILL] = 0.0
+    out[O_VENT] = 0.0
+    if opening > 0.0:
+        out[O_FILL] = duty_of_opening(opening, par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
+    elif opening < 0.0:
+        out[O_VENT] = duty_of_opening(-opening, par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
+    out[O_SATURATED] = 0.0
+    if abs(opening) >= 1.0:
+        out[O_SATURATED] = math.copysign(1.0, opening)
+
+
+@numba.njit(cache=True)
+def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
+    """
+    One PWM period with imposed duties (venting, missed tick): only the model goes on.
+
+    The open valve of larger effect counts where both are open.
+    """
+    if not math.isfinite(supply_pa):
+        supply_pa = par[P_SUPPLY]
+    observe(state, par, p_meas_pa, supply_pa)
+    fill = opening_of_duty(fill_duty, par[P_OPEN], par[P_CLOSE])
+    vent = opening_of_duty(vent_duty, par[P_OPEN], par[P_CLOSE])
+    _push(state, fill - vent)
+    state[S_COMMAND] = math.nan
+    state[S_SLOPE] = 0.0

@@ -1,0 +1,214 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The valve driver without ROS: supervisor and law of one valve, tick by tick.
+
+A node, the offline simulation and the tests feed it messages and call ``tick`` at
+``rate_hz``; it never looks at a clock of its own.
+"""
+
+import math
+
+from pam_actuation.drivers.config import check_valve_type, DriverConfig
+from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.ppr import PprLaw
+from pam_actuation.drivers.safety import SafetySupervisor
+from pam_actuation.messages import Pressure, Status, ValveSignal
+from pam_sim.units import gauge_kpa, P_ATM_PA
+
+PPR_NAMES = ('ppr_voltage',)
+HSV_NAMES = ('fill_duty', 'vent_duty')
+_NS = 1_000_000_000
+_MOST_MISSED = 20        # periods the model catches up after a late tick
+_PPR_MOVE_PA = 20_000.0  # a regulator this far from its command should move
+
+
+class DriverLoop:
+    """
+    Pressure command in, valve signal and status out.
+
+    Parameters
+    ----------
+    valve_type : str
+        ``ppr`` or ``hsv``.
+    config : DriverConfig or mapping, optional
+        Configuration, or parameter names and values that differ from the defaults.
+
+    Raises
+    ------
+    InputError
+        For an unknown valve type or parameter.
+
+    """
+
+    def __init__(self, valve_type, config=None):
+        """Build supervisor and law (and compile the law, so that no tick waits for it)."""
+        self.valve_type = check_valve_type(valve_type)
+        if not isinstance(config, DriverConfig):
+            config = DriverConfig.from_parameters(config or {})
+        self.config = config
+        self.is_hsv = valve_type == 'hsv'
+        self.safety = SafetySupervisor(config.safety, needs_pressure=self.is_hsv)
+        self.period_s = config.hsv.period_s if self.is_hsv else config.ppr.period_s
+        self.rate_hz = 1.0 / self.period_s
+        self._new_law().step(P_ATM_PA, *((P_ATM_PA,) if self.is_hsv else ()))
+        self.law = self._new_law()
+        self.ticks = 0
+        self.late_ticks = 0
+        self.saturated_ticks = 0
+        self._last_ns = None
+        self._law_ns = None
+        self._used_stamp_ns = None
+        self._efforts = self._safe_efforts()
+        self._rate_start = None
+        self._rate_measured_hz = math.nan
+
+    def _new_law(self):
+        return HsvLaw(self.config.hsv) if self.is_hsv else PprLaw(self.config.ppr)
+
+    def on_command(self, message: Pressure, sequence=None):
+        """Take a pressure_command; ``sequence`` is the publisher's message number, if known."""
+        self.safety.on_command(message.stamp_ns, message.pressure_pa, sequence)
+
+    def on_pressure(self, message: Pressure):
+        """Take a measured pressure."""
+        self.safety.on_pressure(message.stamp_ns, message.pressure_pa)
+
+    def on_supply(self, message: Pressure):
+        """Take a measured supply pressure."""
+        self.safety.on_supply(message.stamp_ns, message.pressure_pa)
+
+    def set_command_publishers(self, count):
+        """Tell how many publishers of pressure_command the graph shows."""
+        self.safety.publishers = count
+
+    def emergency_stop(self, why='requested'):
+        """Latch the emergency stop; return (True, sentence). Vents from the next tick on."""
+        self.safety.emergency_stop(why)
+        return True, f'Emergency stop: {why}. Venting until the service reset is called.'
+
+    def reset(self):
+        """End a latched stop; return (done, sentence)."""
+        return self.safety.reset()
+
+    def safe_signal(self, now_ns):
+        """Return the signal that vents: PPR 0 V, HSV fill 0 and vent 1."""
+        return self._signal(now_ns, self._safe_efforts())
+
+    def tick(self, now_ns):
+        """Return (ValveSignal, Status) for ``now_ns``."""
+        decision = self.safety.tick(now_ns)
+        self._count(now_ns)
+        efforts = self._hsv(decision, now_ns) if self.is_hsv else self._ppr(decision, now_ns)
+        self._efforts = efforts
+        if decision.pressure_pa is not None and self.law.saturated:
+            self.saturated_ticks += 1
+        self._last_ns = now_ns
+        return self._signal(now_ns, efforts), self._status(now_ns, decision)
+
+    # -- laws -----------------------------------------------------------------------
+
+    def _ppr(self, decision, now_ns):
+        target_pa = decision.pressure_pa
+        if target_pa is None:
+            volts = max(self.config.ppr.lowest_v, 0.0)
+            self.law.force(volts)
+            target_pa = P_ATM_PA
+        else:
+            volts = self.law.step(target_pa)
+        away_pa = target_pa - self.safety.pressure.pressure_pa
+        if self._last_ns is not None and abs(away_pa) > _PPR_MOVE_PA:
+            dt_s = (now_ns - self._last_ns) / _NS
+            self.safety.flow(away_pa * dt_s / self.config.ppr.time_constant_s)
+        return (float(volts),)
+
+    def _hsv(self, decision, now_ns):
+        measured = self._new_measurement()
+        age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / _NS, 0.0)
+        supply_pa = self.safety.supply_pa(now_ns)
+        elapsed = 1
+        if self._law_ns is not None:
+            elapsed = round((now_ns - self._law_ns) / (self.period_s * _NS))
+        if elapsed == 0 and decision.pressure_pa is not None and self._efforts != (0.0, 1.0):
+            return self._efforts      # called within a period: the running one goes on
+        for _ in range(min(elapsed - 1, _MOST_MISSED)):
+            self.law.hold(*self._efforts, supply_pa=supply_pa)
+            self.safety.flow(self.law.flow_pa)
+        if decision.pressure_pa is None:
+            efforts = self._safe_efforts()
+            if elapsed != 0:
+                self.law.hold(*efforts, measured, supply_pa, age_s)
+        else:
+            efforts = self.law.step(decision.pressure_pa, measured, supply_pa, age_s)
+        if elapsed != 0:
+            self._law_ns = now_ns
+            self.safety.flow(self.law.flow_pa)
+        self._used_stamp_ns = self.safety.pressure.stamp_ns
+        return tuple(float(effort) for effort in efforts)
+
+    def _new_measurement(self):
+        channel = self.safety.pressure
+        if channel.stamp_ns is None or channel.stamp_ns == self._used_stamp_ns:
+            return math.nan
+        return channel.pressure_pa
+
+    def _safe_efforts(self):
+        return (0.0, 1.0) if self.is_hsv else (max(self.config.ppr.lowest_v, 0.0),)
+
+    def _signal(self, now_ns, efforts):
+        return ValveSignal(now_ns, HSV_NAMES if self.is_hsv else PPR_NAMES, efforts)
+
+    # -- status ---------------------------------------------------------------------
+
+    def _count(self, now_ns):
+        self.ticks += 1
+        if self._last_ns is not None and now_ns - self._last_ns > 1.5 * self.period_s * _NS:
+            self.late_ticks += 1
+        if self._rate_start is None or now_ns < self._rate_start[0]:
+            self._rate_start = (now_ns, self.ticks)
+        elif now_ns - self._rate_start[0] >= _NS:
+            span_s = (now_ns - self._rate_start[0]) / _NS
+            self._rate_measured_hz = (self.ticks - self._rate_start[1]) / span_s
+            self._rate_start = (now_ns, self.ticks)
+
+    def _status(self, now_ns, decision):
+        safety = self.safety
+        target = decision.pressure_pa
+        command_age_ms = math.nan
+        if safety.command_stamp_ns is not None:
+            command_age_ms = (now_ns - safety.command_stamp_ns) * 1e-6
+        values = [
+            ('state', decision.state),
+            ('fault', decision.fault),
+            ('valve_type', self.valve_type),
+            ('rate_hz', f'{self._rate_measured_hz:.1f}'),
+            ('late_ticks', str(self.late_ticks)),
+            ('target_kpa_gauge', 'vent' if target is None else f'{gauge_kpa(target):.1f}'),
+            ('command_kpa_gauge', f'{gauge_kpa(safety.command_pa):.1f}'),
+            ('command_age_ms', f'{command_age_ms:.1f}'),
+            ('pressure_kpa_gauge', f'{gauge_kpa(safety.pressure.pressure_pa):.1f}'),
+            ('pressure_age_ms', f'{safety.pressure.age_s(now_ns) * 1e3:.1f}'),
+            ('pressure_refused', str(safety.pressure.refused)),
+            ('commands_received', str(safety.commands_received)),
+            ('commands_ignored', str(safety.commands_ignored)),
+            ('commands_clamped', str(safety.commands_clamped)),
+            ('commands_out_of_order', str(safety.order.steps_back)),
+            ('saturation', ('low', 'none', 'high')[self.law.saturated + 1]),
+            ('saturated_ticks', str(self.saturated_ticks)),
+            ('vents', str(safety.vents)),
+        ]
+        if safety.supply.received:
+            values.append(('supply_kpa_gauge', f'{gauge_kpa(safety.supply.pressure_pa):.1f}'))
+        return Status(now_ns, decision.level, 'valve_driver', decision.message, tuple(values))

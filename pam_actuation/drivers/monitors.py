@@ -1,0 +1,185 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Judges of single inputs: is a stamp usable, is a reading believable, who commands.
+
+Used by the safety supervisor. No clock of their own: the time of every question is
+passed in, so that live nodes, simulation and replay give the same answers.
+"""
+
+from collections import deque
+import math
+
+from pam_sim.units import gauge_kpa
+
+NS_PER_S = 1_000_000_000
+
+
+def stamp_problem(stamp_ns, now_ns, oldest_s, ahead_s):
+    """Return why a stamp cannot be used at ``now_ns``, or '' if it can."""
+    age_ns = now_ns - stamp_ns
+    if age_ns > oldest_s * NS_PER_S:
+        if stamp_ns == 0:
+            return 'came without a time stamp (header.stamp is 0)'
+        return f'came {age_ns * 1e-6:.0f} ms old (limit {oldest_s * 1e3:.0f} ms)'
+    if -age_ns > ahead_s * NS_PER_S:
+        return f'is stamped {-age_ns * 1e-6:.0f} ms in the future (limit {ahead_s * 1e3:.0f} ms)'
+    return ''
+
+
+class Channel:
+    """
+    The newest valid reading of one pressure topic and why later ones were refused.
+
+    Attributes: ``stamp_ns`` and ``pressure_pa`` of the newest valid reading (None
+    before the first), ``problem`` of the newest refused one ('' if none since),
+    ``refused`` how many were refused, ``received`` how many came.
+    """
+
+    def __init__(self, oldest_s, ahead_s, lowest_pa, highest_pa):
+        """Accept readings of lowest_pa..highest_pa with stamps -ahead_s..oldest_s old."""
+        self.oldest_s = oldest_s
+        self.ahead_s = ahead_s
+        self.lowest_pa = lowest_pa
+        self.highest_pa = highest_pa
+        self.received = 0
+        self.refused = 0
+        self.forget()
+
+    def forget(self):
+        """Drop the reading (clock change, pause); the counters go on."""
+        self.stamp_ns = None
+        self.pressure_pa = math.nan
+        self.problem = ''
+
+    def offer(self, stamp_ns, pressure_pa, now_ns):
+        """Judge a reading; return True if it became the newest valid one."""
+        self.received += 1
+        problem = stamp_problem(stamp_ns, now_ns, self.oldest_s, self.ahead_s)
+        if not math.isfinite(pressure_pa):
+            problem = f'is not a number ({pressure_pa})'
+        elif pressure_pa < self.lowest_pa or pressure_pa > self.highest_pa:
+            problem = (f'reads {gauge_kpa(pressure_pa):.0f} kPa gauge, believable are '
+                       f'{gauge_kpa(self.lowest_pa):.0f} to {gauge_kpa(self.highest_pa):.0f}')
+        if problem:
+            self.problem = problem
+            self.refused += 1
+            return False
+        if self.stamp_ns is not None and stamp_ns <= self.stamp_ns:
+            return False
+        self.stamp_ns = stamp_ns
+        self.pressure_pa = pressure_pa
+        self.problem = ''
+        return True
+
+    def age_s(self, now_ns):
+        """Return the age of the newest valid reading [s], infinite before the first."""
+        return math.inf if self.stamp_ns is None else (now_ns - self.stamp_ns) / NS_PER_S
+
+
+class FrozenMonitor:
+    """
+    Notices a reading that stays bit-identical although air flowed.
+
+    ``expected_pa`` accumulates the pressure change the valve flow should have made
+    since the reading last changed.
+    """
+
+    def __init__(self, after_s, change_pa):
+        """Call it frozen after ``after_s`` [s] and ``change_pa`` [Pa] without a change."""
+        self.after_s = after_s
+        self.change_pa = change_pa
+        self.forget()
+
+    def forget(self):
+        """Start anew with the next reading."""
+        self._value_pa = None
+        self._since_ns = 0
+        self.expected_pa = 0.0
+        self.frozen = False
+
+    def reading(self, stamp_ns, pressure_pa):
+        """Take a valid reading."""
+        if pressure_pa != self._value_pa:
+            self._value_pa = pressure_pa
+            self._since_ns = stamp_ns
+            self.expected_pa = 0.0
+            self.frozen = False
+
+    def flow(self, change_pa):
+        """Add the pressure change [Pa] expected from the flow of one tick."""
+        self.expected_pa += change_pa
+
+    def check(self, stamp_ns):
+        """Return True while the reading is frozen as of the newest stamp."""
+        if self._value_pa is not None and abs(self.expected_pa) > self.change_pa:
+            if stamp_ns - self._since_ns >= self.after_s * 1e9:
+                self.frozen = True
+        return self.frozen
+
+    def unchanged_s(self, stamp_ns):
+        """Return for how long [s] the reading has not changed."""
+        return 0.0 if self._value_pa is None else (stamp_ns - self._since_ns) / NS_PER_S
+
+
+class CommandOrder:
+    """
+    Notices commands of two publishers mixed on one topic.
+
+    One publisher on a reliable topic gives rising stamps and rising publisher sequence
+    numbers. A single step back is a restart or a late message; two within
+    ``window_s`` are two publishers.
+    """
+
+    def __init__(self, window_s, clear_s):
+        """Set the window [s] for two steps back and the quiet time [s] that ends it."""
+        self.window_s = window_s
+        self.clear_s = clear_s
+        self.steps_back = 0
+        self.forget()
+
+    def forget(self):
+        """Drop the history (clock change); the counter goes on."""
+        self._stamp_ns = None
+        self._pressure_pa = math.nan
+        self._sequence = None
+        self._recent_ns = deque(maxlen=2)
+        self._mixed_ns = None
+
+    def offer(self, stamp_ns, pressure_pa, sequence, now_ns):
+        """Note a command; return True if its stamp is newer than all before."""
+        newer = self._stamp_ns is None or stamp_ns > self._stamp_ns
+        same = stamp_ns == self._stamp_ns and pressure_pa == self._pressure_pa
+        back = not newer and not same
+        if sequence is not None:
+            if self._sequence is not None and sequence <= self._sequence:
+                back = True
+            self._sequence = sequence
+        if back:
+            self.steps_back += 1
+            self._recent_ns.append(now_ns)
+            if len(self._recent_ns) == 2 and (
+                    self._recent_ns[1] - self._recent_ns[0] <= self.window_s * NS_PER_S):
+                self._mixed_ns = now_ns
+        if newer:
+            self._stamp_ns = stamp_ns
+            self._pressure_pa = pressure_pa
+        return newer
+
+    def mixed(self, now_ns):
+        """Return True while two publishers are evident at ``now_ns``."""
+        if self._mixed_ns is not None and now_ns - self._mixed_ns > self.clear_s * NS_PER_S:
+            self._mixed_ns = None
+        return self._mixed_ns is not None

@@ -1,0 +1,121 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Driver law of a proportional pressure regulator (PPR): pressure to volts.
+
+The regulator closes its own pressure loop (static gain ``K_m`` of 100 kPa/V in the
+nominal rig), so the law is its static inverse, clipped to the input range and
+optionally limited in slew. ``ppr_step`` is the compiled form; it shares its
+signature with ``hsv_step`` so that a closed-loop rollout can hold either.
+
+Array layout: ``par`` (``PPR_PAR_SIZE``) volts per pascal gauge, lowest volts,
+highest volts, largest change per step [V] (infinite = free); ``state``
+(``PPR_STATE_SIZE``) last volts, 1 once a step was made; ``out``
+(``PPR_OUT_SIZE``) volts, saturation (-1 low, 0, +1 high), 1 if the slew limit acted.
+"""
+
+from dataclasses import dataclass
+import math
+
+import numba
+import numpy as np
+
+from pam_sim.units import P_ATM_PA
+
+PPR_PAR_SIZE = 4
+PPR_STATE_SIZE = 2
+PPR_OUT_SIZE = 3
+
+
+@numba.njit(cache=True)
+def ppr_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+    """
+    Turn a wanted absolute pressure [Pa] into the volts of the regulator.
+
+    Parameters
+    ----------
+    state, par, out : float64 arrays
+        As laid out in the module docstring; ``state`` and ``out`` are written.
+    p_cmd_pa : float
+        Wanted absolute pressure [Pa].
+    p_meas_pa, supply_pa : float
+        Not used: the regulator measures for itself. Present for the common signature.
+
+    """
+    wanted = (p_cmd_pa - P_ATM_PA) * par[0]
+    volts = min(max(wanted, par[1]), par[2])
+    out[1] = 0.0
+    if wanted > par[2]:
+        out[1] = 1.0
+    elif wanted < par[1]:
+        out[1] = -1.0
+    out[2] = 0.0
+    if state[1] > 0.5 and abs(volts - state[0]) > par[3]:
+        volts = state[0] + math.copysign(par[3], volts - state[0])
+        out[2] = 1.0
+    state[0] = volts
+    state[1] = 1.0
+    out[0] = volts
+
+
+@dataclass(frozen=True)
+class PprConfig:
+    """
+    What the law knows of the regulator.
+
+    ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is
+    ``lowest_v``..``highest_v``; ``slew_v_per_s`` limits the change (0 = no limit);
+    ``period_s`` is the time between two steps; ``time_constant_s`` is the regulator's
+    own lag, used only to judge whether a pressure reading should have moved.
+    """
+
+    gain_pa_per_v: float = 100_000.0
+    lowest_v: float = 0.0
+    highest_v: float = 6.0
+    slew_v_per_s: float = 0.0
+    period_s: float = 0.005
+    time_constant_s: float = 0.060
+
+    def par(self):
+        """Return the parameter array of ``ppr_step``."""
+        slew = self.slew_v_per_s * self.period_s if self.slew_v_per_s > 0.0 else math.inf
+        return np.array([1.0 / self.gain_pa_per_v, self.lowest_v, self.highest_v, slew])
+
+
+class PprLaw:
+    """The law as an object: ``step`` for each tick, ``force`` for an imposed signal."""
+
+    def __init__(self, config=None):
+        """Start at an unknown voltage, so that the first step is free of the slew limit."""
+        self.config = config or PprConfig()
+        self.par = self.config.par()
+        self.state = np.zeros(PPR_STATE_SIZE)
+        self.out = np.zeros(PPR_OUT_SIZE)
+
+    def step(self, p_cmd_pa):
+        """Return the volts for a wanted absolute pressure [Pa]."""
+        ppr_step(self.state, self.par, p_cmd_pa, math.nan, math.nan, self.out)
+        return self.out[0]
+
+    def force(self, volts):
+        """Note that ``volts`` were sent whatever the law says (venting)."""
+        self.state[0] = volts
+        self.state[1] = 1.0
+        self.out[:] = (volts, 0.0, 0.0)
+
+    @property
+    def saturated(self):
+        """Return -1, 0 or +1: at the lower limit, free, at the upper limit."""
+        return int(self.out[1])

@@ -1,0 +1,398 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The safety supervisor of the valve driver: may the command act, and if not, why.
+
+Pure bookkeeping on the stamps passed in: no clock, no ROS. Each tick ends in one of
+four states: ``waiting`` (nothing to follow yet: vent), ``ok``, ``vented`` (a fault
+that ends by itself) and ``emergency_stop`` (latched until ``reset``). What is vented,
+held or ignored is in ``faults.FAULT_TABLE``. This is ordinary software, not a
+certified safety function.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+import math
+
+from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
+from pam_sim.units import gauge_kpa, P_ATM_PA
+
+WAITING = 'waiting'
+OK = 'ok'
+VENTED = 'vented'
+EMERGENCY_STOP = 'emergency_stop'
+
+LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
+
+_NS = 1_000_000_000
+_WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause
+_LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
+_GRACE_NS = 20_000_000
+_QUEUE = 256
+
+
+@dataclass(frozen=True)
+class SafetyLimits:
+    """Limits of the supervisor, SI; gauge pressures say so in the name."""
+
+    command_timeout_s: float = 0.1
+    measurement_timeout_s: float = 0.1
+    supply_timeout_s: float = 0.5
+    stamp_ahead_s: float = 0.02
+    max_pressure_gauge_pa: float = 600_000.0
+    lowest_plausible_gauge_pa: float = -20_000.0
+    highest_plausible_pa: float = 1_500_000.0
+    resume_rate_pa_per_s: float = 500_000.0
+    frozen_after_s: float = 0.2
+    frozen_change_pa: float = 100_000.0
+    pause_s: float = 0.3
+    two_publishers_window_s: float = 0.5
+    two_publishers_clear_s: float = 1.0
+    supply_margin_pa: float = 20_000.0
+
+    @property
+    def trip_gauge_pa(self):
+        """Return the measured gauge pressure [Pa] above which the driver trips."""
+        return 1.05 * self.max_pressure_gauge_pa + 10_000.0
+
+
+@dataclass(frozen=True)
+class Decision:
+    """
+    The outcome of one tick.
+
+    ``pressure_pa`` is the absolute pressure to follow, None = vent; ``fault`` is the
+    key in ``FAULTS`` of the reason ('' if none), ``level`` that of a diagnostic status.
+    """
+
+    state: str
+    pressure_pa: float | None
+    level: int
+    message: str
+    fault: str = ''
+    warnings: tuple = ()
+
+
+class SafetySupervisor:
+    """Judge commands and measurements at each tick of the driver."""
+
+    def __init__(self, limits=None, needs_pressure=True):
+        """
+        Start in state waiting.
+
+        ``needs_pressure``: True for the HSV, whose loop is blind without a reading;
+        a PPR may run where no pressure was ever measured (with a warning).
+        """
+        self.limits = limits or SafetyLimits()
+        self.needs_pressure = needs_pressure
+        lim = self.limits
+        lowest = P_ATM_PA + lim.lowest_plausible_gauge_pa
+        self.pressure = Channel(lim.measurement_timeout_s, lim.stamp_ahead_s, lowest,
+                                lim.highest_plausible_pa)
+        self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest, 5e6)
+        self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
+        self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
+        self.publishers = 1
+        self.command_stamp_ns = None
+        self.command_pa = math.nan
+        self.commands_received = 0
+        self.commands_ignored = 0
+        self.commands_clamped = 0
+        self.vents = 0
+        self._pending = {name: deque(maxlen=_QUEUE) for name in ('command', 'pressure', 'supply')}
+        self._latched = None
+        self._seen_command = False
+        self._seen_pressure = False
+        self._command_problem = ''
+        self._warnings = {}
+        self._fault = ('no_command', '')
+        self._standing = None
+        self._ramp_pa = None
+        self._now_ns = None
+        self._grace_until_ns = 0
+        self._grace_ns = 0
+
+    def on_command(self, stamp_ns, pressure_pa, sequence=None):
+        """Queue a command for the next tick; ``sequence`` is its publisher's number, if known."""
+        self._pending['command'].append((stamp_ns, pressure_pa, sequence))
+
+    def on_pressure(self, stamp_ns, pressure_pa):
+        """Queue a measured absolute pressure [Pa] for the next tick."""
+        self._pending['pressure'].append((stamp_ns, pressure_pa))
+
+    def on_supply(self, stamp_ns, pressure_pa):
+        """Queue a measured absolute supply pressure [Pa] for the next tick."""
+        self._pending['supply'].append((stamp_ns, pressure_pa))
+
+    def flow(self, change_pa):
+        """Tell the pressure change [Pa] the valve should have made in the last tick."""
+        self.frozen.flow(change_pa)
+
+    def emergency_stop(self, why='requested'):
+        """Latch the emergency stop: vent at the next tick and until ``reset``."""
+        if self._latched is None:
+            self._latch('emergency_stop', f'emergency stop: {why}')
+
+    def reset(self):
+        """
+        End a latched stop; return (done, sentence).
+
+        Refused while the measured pressure is above the limit. Afterwards the driver
+        waits for a new command.
+        """
+        if self._latched is None:
+            return True, 'Nothing was latched.'
+        measured = self.pressure.pressure_pa
+        limit = self.limits.max_pressure_gauge_pa
+        if math.isfinite(measured) and measured - P_ATM_PA > limit:
+            return False, (f'Not reset: the measured pressure of {gauge_kpa(measured):.0f} kPa '
+                           f'gauge is above the limit of {limit * 1e-3:.0f} kPa.')
+        text = self._latched[1]
+        self._latched = None
+        self._seen_command = False
+        self.command_stamp_ns = None
+        self.command_pa = math.nan
+        self._pending['command'].clear()
+        return True, f'Reset; it was: {text}. Waiting for a new pressure_command.'
+
+    def tick(self, now_ns):
+        """Take the queued messages and return the Decision for ``now_ns``."""
+        fault = self._clock(now_ns)
+        self._drain(now_ns)
+        if self._latched is not None:
+            fault = self._latched
+        elif fault is None:
+            fault = self._standing_fault(now_ns)
+        if fault is not None:
+            return self._vent(fault)
+        if self._fault is not None:
+            self._start_ramp()
+        return self._follow(now_ns)
+
+    # -- inputs ---------------------------------------------------------------------
+
+    def _clock(self, now_ns):
+        last, self._now_ns = self._now_ns, now_ns
+        self._dt_s = 0.0 if last is None else max(now_ns - last, 0) / _NS
+        if last is None:
+            return None
+        gap_ns = now_ns - last
+        pause_ns = self.limits.pause_s * _NS
+        if 0 <= gap_ns <= pause_ns:
+            if gap_ns > _LATE_TICK_NS:
+                self._grace_until_ns = now_ns + _GRACE_NS
+                self._grace_ns = gap_ns
+            return None
+        self._forget()
+        if gap_ns < 0:
+            self._standing = ('clock_back', 'the clock was set back by '
+                              f'{-gap_ns * 1e-6:.0f} ms, waiting for new messages')
+        else:
+            self._standing = ('driver_paused', 'the driver itself was stopped for '
+                              f'{gap_ns * 1e-6:.0f} ms, waiting for new messages')
+        return self._standing
+
+    def _forget(self):
+        for queue in self._pending.values():
+            queue.clear()
+        for part in (self.pressure, self.supply, self.frozen, self.order):
+            part.forget()
+        self.command_stamp_ns = None
+        self.command_pa = math.nan
+
+    def _drain(self, now_ns):
+        for stamp_ns, value in self._take('pressure'):
+            if self.pressure.offer(stamp_ns, value, now_ns):
+                self._seen_pressure = True
+                self.frozen.reading(stamp_ns, value)
+                self._check_over_pressure(value)
+        for stamp_ns, value in self._take('supply'):
+            self.supply.offer(stamp_ns, value, now_ns)
+        for stamp_ns, value, sequence in self._take('command'):
+            self._take_command(stamp_ns, value, sequence, now_ns)
+
+    def _take(self, name):
+        queue = self._pending[name]
+        while queue:
+            yield queue.popleft()
+
+    def _check_over_pressure(self, measured_pa):
+        trip = self.limits.trip_gauge_pa
+        if measured_pa - P_ATM_PA > trip and self._latched is None:
+            self._latch('over_pressure', (
+                f'over-pressure trip: {gauge_kpa(measured_pa):.0f} kPa gauge measured, '
+                f'trip at {trip * 1e-3:.0f} kPa'))
+
+    def _latch(self, key, text):
+        self._latched = (key, text + '; call the service reset to go on')
+
+    def _take_command(self, stamp_ns, value, sequence, now_ns):
+        lim = self.limits
+        self.commands_received += 1
+        problem = stamp_problem(stamp_ns, now_ns, lim.command_timeout_s, lim.stamp_ahead_s)
+        key = 'command_stamp'
+        if not math.isfinite(value):
+            problem, key = f'is not a number ({value})', 'command_not_finite'
+        if not problem and not self.order.offer(stamp_ns, value, sequence, now_ns):
+            if (stamp_ns, value) == (self.command_stamp_ns, self.command_pa):
+                return      # an exact duplicate harms nobody
+            problem, key = 'is not newer than the one before', 'command_out_of_order'
+        if problem:
+            self.commands_ignored += 1
+            self._command_problem = problem
+            self._warn(key, f'a pressure command was ignored: it {problem}', now_ns)
+            return
+        self.command_stamp_ns, self.command_pa = stamp_ns, value
+        self._command_problem = ''
+        self._seen_command = True
+        highest = P_ATM_PA + lim.max_pressure_gauge_pa
+        if value > highest:
+            self.commands_clamped += 1
+            self._warn('command_above_limit', (
+                f'command of {gauge_kpa(value):.0f} kPa gauge cut to the limit of '
+                f'{gauge_kpa(highest):.0f} kPa'), now_ns)
+        elif value < P_ATM_PA - 1.0:
+            self.commands_clamped += 1
+            self._warn('command_below_atmosphere', (
+                f'command of {value * 1e-3:.0f} kPa absolute is below the atmosphere and taken '
+                'as 0 kPa gauge (commands are absolute pressures)'), now_ns)
+
+    # -- faults ---------------------------------------------------------------------
+
+    def _standing_fault(self, now_ns):
+        grace_s = self._grace_ns / _NS if now_ns <= self._grace_until_ns else 0.0
+        fault = self._pressure_fault(now_ns, grace_s) or self._command_fault(now_ns, grace_s)
+        if self._standing is not None:
+            # After a pause or a clock change: the same reason until all inputs are back.
+            waiting = (self._seen_command and self.command_stamp_ns is None) or (
+                self._seen_pressure and self.pressure.stamp_ns is None)
+            if waiting:
+                return self._standing
+            self._standing = None
+        return fault
+
+    def _pressure_fault(self, now_ns, grace_s):
+        lim = self.limits
+        channel = self.pressure
+        if not self._seen_pressure:
+            if self.needs_pressure:
+                why = f'; the last one {channel.problem}' if channel.problem else ''
+                return 'no_pressure', 'waiting for the first measured pressure' + why
+            self._warn('no_pressure_ppr',
+                       'no measured pressure, so over-pressure is not supervised', now_ns)
+            return None
+        age_s = channel.age_s(now_ns)
+        if age_s > lim.measurement_timeout_s + grace_s:
+            why = f'; the last one {channel.problem}' if channel.problem else ''
+            return 'pressure_timeout', (
+                f'no valid measured pressure for {age_s * 1e3:.0f} ms '
+                f'(limit {lim.measurement_timeout_s * 1e3:.0f} ms){why}')
+        if channel.stamp_ns is not None and self.frozen.check(channel.stamp_ns):
+            text = (f'the measured pressure stands still at {gauge_kpa(channel.pressure_pa):.1f} '
+                    f'kPa gauge for {self.frozen.unchanged_s(channel.stamp_ns) * 1e3:.0f} ms, '
+                    'although the valve moved air: sensor frozen or valve without effect')
+            if self.needs_pressure:
+                return 'pressure_frozen', text
+            self._warn('pressure_frozen_ppr', text, now_ns)
+        return None
+
+    def _command_fault(self, now_ns, grace_s):
+        lim = self.limits
+        if self.order.mixed(now_ns):
+            return 'two_publishers', ('two publishers send pressure_command (stamps or sequence '
+                                      'numbers go back and forth), stop one of them')
+        if not self._seen_command:
+            why = f'; the last one {self._command_problem}' if self._command_problem else ''
+            return 'no_command', 'waiting for the first pressure command' + why
+        age_s = math.inf if self.command_stamp_ns is None else (
+            (now_ns - self.command_stamp_ns) / _NS)
+        if age_s > lim.command_timeout_s + grace_s:
+            why = f'; the last one {self._command_problem}' if self._command_problem else ''
+            return 'command_timeout', (
+                f'no valid pressure command for {age_s * 1e3:.0f} ms '
+                f'(limit {lim.command_timeout_s * 1e3:.0f} ms){why}')
+        return None
+
+    # -- outcome --------------------------------------------------------------------
+
+    def _vent(self, fault):
+        # The text of the first tick stays, so that the reason does not flicker.
+        if self._fault is None or self._fault[0] != fault[0]:
+            if self._fault is None:
+                self.vents += 1
+            self._fault = fault
+        elif not self._fault[1]:
+            self._fault = fault
+        self._ramp_pa = None
+        key, text = self._fault
+        if key in ('emergency_stop', 'over_pressure'):
+            return Decision(EMERGENCY_STOP, None, LEVEL_ERROR, text, key)
+        if key in ('no_command', 'no_pressure'):
+            return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)
+        return Decision(VENTED, None, LEVEL_ERROR, 'vented because ' + text, key)
+
+    def _start_ramp(self):
+        measured = self.pressure.pressure_pa
+        self._ramp_pa = max(measured, P_ATM_PA) if math.isfinite(measured) else P_ATM_PA
+        self._fault = None
+
+    def _follow(self, now_ns):
+        lim = self.limits
+        target = min(max(self.command_pa, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
+        if self._ramp_pa is not None:
+            self._ramp_pa += lim.resume_rate_pa_per_s * self._dt_s
+            if target <= self._ramp_pa:
+                self._ramp_pa = None
+            else:
+                target = self._ramp_pa
+        self._watch_supply(target, now_ns)
+        if self.publishers > 1:
+            self._warn('second_publisher_seen',
+                       f'{self.publishers} publishers of pressure_command are on the graph', now_ns)
+        texts = []
+        if self._ramp_pa is not None:
+            texts.append('resuming, pressure rises at no more than '
+                         f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s')
+        self._warnings = {key: item for key, item in self._warnings.items()
+                          if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}
+        texts += [text for text, _ in self._warnings.values()]
+        level = LEVEL_WARN if self._warnings else LEVEL_OK
+        message = '; '.join(texts) if texts else 'following the pressure command'
+        return Decision(OK, target, level, message, '', tuple(self._warnings))
+
+    def _watch_supply(self, target_pa, now_ns):
+        channel = self.supply
+        if channel.received == 0:
+            return
+        age_s = channel.age_s(now_ns)
+        if age_s > self.limits.supply_timeout_s:
+            self._warn('supply_stale', 'no valid supply pressure reading, the nominal one is '
+                       'assumed', now_ns)
+        elif channel.pressure_pa < target_pa + self.limits.supply_margin_pa:
+            self._warn('supply_low', (
+                f'supply of {gauge_kpa(channel.pressure_pa):.0f} kPa gauge is too low for the '
+                f'command of {gauge_kpa(target_pa):.0f} kPa'), now_ns)
+
+    def supply_pa(self, now_ns):
+        """Return the measured supply pressure [Pa], NaN where none is valid."""
+        if self.supply.age_s(now_ns) > self.limits.supply_timeout_s:
+            return math.nan
+        return self.supply.pressure_pa
+
+    def _warn(self, key, text, now_ns):
+        # Keep the first text while the warning lasts; only its time is renewed.
+        if key in self._warnings and now_ns - self._warnings[key][1] <= _WARNING_HOLD_NS:
+            text = self._warnings[key][0]
+        self._warnings[key] = (text, now_ns)
