@@ -33,6 +33,7 @@ RUN_REQUIRES = [
     'numba>=0.58',
     'PyYAML>=6.0',
     'mcap>=1.1',
+    'lz4>=4.3',
     'zstandard>=0.22',
     'rosbags>=0.10.4',
     'plotly>=5.15',
