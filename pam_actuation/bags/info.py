@@ -71,7 +71,7 @@ class BagInfo:
     Everything ``pam info`` shows.
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good
-    bag. ``complete`` is False when messages are known to be missing, True when
+    bag; ``notes`` are harmless ones. ``complete`` is False when messages are known to be missing, True when
     every topic of the rig has been checked, None where that is not known.
     """
 
@@ -85,6 +85,7 @@ class BagInfo:
     topics: list
     metadata: dict
     remarks: list
+    notes: list
     recovered: bool = False
 
     @property
@@ -150,13 +151,14 @@ def bag_info(path, recover=False):
         remarks += plausibility.topic_remarks(topic, info, stamp_ns, values)
         topics.append(info)
     muscles = namespaces(bag)
-    remarks += plausibility.missing_topics(muscles)
+    missing, notes = plausibility.missing_topics(muscles)
+    remarks += missing
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
         duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
         namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
-        recovered=bag.recovered)
+        notes=notes, recovered=bag.recovered)
 
 
 def _size(path):

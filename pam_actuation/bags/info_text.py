@@ -42,6 +42,7 @@ def render(info):
         lines += ['', *ranges]
     lines += ['', _verdict(info)]
     lines += [f'- {remark}' for remark in info.remarks]
+    lines += [f'Note: {note}' for note in info.notes]
     return '\n'.join(lines)
 
 

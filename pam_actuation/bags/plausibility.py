@@ -40,7 +40,9 @@ def topic_remarks(topic, info, stamp_ns, values):
     Parameters
     ----------
     topic : TopicData
+        Its messages and times.
     info : TopicInfo
+        Its rate, gaps and stamp counts.
     stamp_ns : ndarray of int64
         Header stamps in file order.
     values : dict of str to ndarray
@@ -57,10 +59,15 @@ def topic_remarks(topic, info, stamp_ns, values):
 
 
 def missing_topics(namespaces):
-    """Return sentences on topics that are not there: dict of namespace to set of short names."""
+    """
+    Return (remarks, notes): sentences on topics that are not there.
+
+    Notes are harmless: topics that a rig need not have. ``namespaces`` maps
+    each namespace to the set of its short names.
+    """
     if not namespaces:
-        return ['The bag has no messages on any topic of a muscle.']
-    remarks = []
+        return ['The bag has no messages on any topic of a muscle.'], []
+    remarks, notes = [], []
     for namespace, present in sorted(namespaces.items()):
         needed = [name for name in NEEDED_TOPICS if name not in present]
         optional = [name for name in OPTIONAL_TOPICS if name not in present]
@@ -69,8 +76,8 @@ def missing_topics(namespaces):
                 f'{namespace or "/"} has no messages on {", ".join(needed)}: most analyses '
                 'need them.')
         if optional:
-            remarks.append(f'{namespace or "/"} has no messages on {", ".join(optional)}.')
-    return remarks
+            notes.append(f'{namespace or "/"} has no messages on {", ".join(optional)}.')
+    return remarks, notes
 
 
 def _time_remarks(topic, info, stamp_ns):

@@ -1,0 +1,179 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The written bag: Jazzy layout, and readable by the two independent readers."""
+
+from pathlib import Path
+
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from pam_actuation.bags import codecs, layout
+from pam_actuation.bags.writer import BagWriter
+from pam_sim.errors import InputError
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
+from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
+import yaml
+
+COUNT = 30
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    return write_bag(tmp_path_factory.mktemp('bags') / 'run', COUNT)
+
+
+def test_rosbags_reads_every_message(bag):
+    for opened in (bag, bag / 'run_0.mcap'):
+        with AnyReader([Path(opened)]) as reader:
+            topics = {connection.topic for connection in reader.connections}
+            assert topics == {full_name(short) for short in codecs.TOPIC_TYPES}
+            decoded = 0
+            for connection, log_time_ns, raw in reader.messages():
+                message = reader.deserialize(raw, connection.msgtype)
+                stamp = message.header.stamp
+                stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+                assert log_time_ns == stamp_ns + 400_000
+                decoded += 1
+            assert decoded == reader.message_count == COUNT * len(codecs.TOPIC_TYPES)
+
+
+def test_rosbags_sees_the_metadata_file(bag):
+    with Reader(bag) as reader:
+        assert reader.ros_distro == 'jazzy'
+        assert reader.start_time == START_NS + 400_000
+        assert reader.duration == (COUNT - 1) * STEP_NS + 1
+        for connection in reader.connections:
+            profile, = connection.ext.offered_qos_profiles
+            assert (profile.history.name, profile.reliability.name) == ('KEEP_LAST', 'RELIABLE')
+            assert connection.digest == layout.type_hash(connection.msgtype)
+
+
+def test_mcap_ros2_decodes_with_the_embedded_definitions(bag):
+    sample = example_messages(0)
+    with open(bag / 'run_0.mcap', 'rb') as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        seen = {}
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            seen.setdefault(channel.topic, []).append((message, decoded))
+    assert {topic: len(found) for topic, found in seen.items()} == {
+        full_name(short): COUNT for short in codecs.TOPIC_TYPES}
+    message, pressure = seen['/muscle/pressure'][0]
+    assert pressure.fluid_pressure == sample['pressure'].pressure_pa
+    assert message.log_time - message.publish_time == 300_000 and message.sequence == 0
+    assert seen['/muscle/contraction'][0][1].name == ['muscle']
+    assert seen['/diagnostics'][0][1].status[0].values[1].value == '200.0'
+    assert seen['/muscle/reference_trajectory'][0][1].points[1].positions == [0.015]
+
+
+def test_file_is_laid_out_as_jazzy_does(bag):
+    with open(bag / 'run_0.mcap', 'rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        assert reader.get_header().profile == 'ros2'
+        summary = reader.get_summary()
+        assert {chunk.compression for chunk in summary.chunk_indexes} == {'zstd'}
+        assert all(schema.encoding == 'ros2msg' for schema in summary.schemas.values())
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            assert channel.message_encoding == 'cdr'
+            assert channel.metadata['topic_type_hash'] == layout.type_hash(schema.name)
+            profile, = yaml.safe_load(channel.metadata['offered_qos_profiles'])
+            assert profile['durability'] == 'volatile'
+        assert sum(1 for _ in reader.iter_messages()) == COUNT * len(codecs.TOPIC_TYPES)
+        records = [(record.name, record.metadata) for record in reader.iter_metadata()]
+    assert [name for name, _ in records] == ['rosbag2', 'pam_experiment', 'rosbag2']
+    assert records[1][1] == METADATA
+    final = yaml.safe_load(records[2][1]['serialized_metadata'])
+    assert yaml.safe_load(records[0][1]['serialized_metadata'])['message_count'] == 0
+    assert final == yaml.safe_load((bag / 'metadata.yaml').read_text())[layout.METADATA_ROOT]
+
+
+def test_metadata_file_is_version_9(bag):
+    text = (bag / 'metadata.yaml').read_text()
+    root, = yaml.safe_load(text).items()
+    assert root[0] == 'rosbag2_bagfile_information'
+    facts = root[1]
+    assert list(facts) == [
+        'version', 'storage_identifier', 'duration', 'starting_time', 'message_count',
+        'topics_with_message_count', 'compression_format', 'compression_mode',
+        'relative_file_paths', 'files', 'custom_data', 'ros_distro']
+    assert facts['version'] == 9 and facts['storage_identifier'] == 'mcap'
+    assert facts['duration'] == {'nanoseconds': (COUNT - 1) * STEP_NS}
+    assert facts['relative_file_paths'] == ['run_0.mcap']
+    assert facts['files'][0]['message_count'] == facts['message_count']
+    assert facts['custom_data'] == METADATA
+    topic = facts['topics_with_message_count'][0]
+    assert topic['message_count'] == COUNT
+    assert list(topic['topic_metadata']) == [
+        'name', 'type', 'serialization_format', 'offered_qos_profiles', 'type_description_hash']
+    profile, = topic['topic_metadata']['offered_qos_profiles']
+    assert profile['history'] == 'keep_last' and profile['liveliness'] == 'automatic'
+    assert profile['deadline'] == {'sec': 9223372036, 'nsec': 854775807}
+    assert topic['topic_metadata']['type_description_hash'].startswith('RIHS01_')
+    assert '&' not in text and [path.name for path in bag.iterdir() if path.name[0] == '.'] == []
+
+
+def test_known_type_hashes():
+    # As `ros2 topic info --verbose` prints them on Jazzy.
+    assert layout.type_hash('sensor_msgs/msg/JointState') == (
+        'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e')
+
+
+def test_bag_without_messages_opens(tmp_path):
+    with BagWriter(tmp_path / 'empty', {}) as writer:
+        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+    with Reader(tmp_path / 'empty') as reader:
+        assert reader.message_count == 0
+    with Reader(tmp_path / 'empty' / 'empty_0.mcap') as reader:
+        assert reader.message_count == 0
+
+
+def test_existing_directories_are_respected(tmp_path, bag):
+    taken = tmp_path / 'taken'
+    write_bag(taken, 1)
+    with pytest.raises(InputError, match='not empty'):
+        BagWriter(taken, {})
+    with BagWriter(taken, {}, overwrite=True) as writer:
+        assert writer.counts == {}
+    foreign = tmp_path / 'foreign'
+    foreign.mkdir()
+    (foreign / 'thesis.txt').write_text('mine')
+    with pytest.raises(InputError, match='holds no bag'):
+        BagWriter(foreign, {}, overwrite=True)
+    assert (foreign / 'thesis.txt').read_text() == 'mine'
+    with pytest.raises(InputError, match='a file has this name'):
+        BagWriter(foreign / 'thesis.txt', {})
+
+
+def test_topics_are_checked(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
+        writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
+        with pytest.raises(InputError, match='cannot also be'):
+            writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/JointState')
+        with pytest.raises(InputError, match='full topic name'):
+            writer.add_topic('pressure', 'sensor_msgs/msg/FluidPressure')
+        with pytest.raises(InputError, match='pam_msgs/msg/Muscle'):
+            writer.add_topic('/muscle/x', 'pam_msgs/msg/Muscle')
+
+
+def test_same_messages_give_the_same_bytes(tmp_path):
+    for parent in ('a', 'b'):
+        (tmp_path / parent).mkdir()
+        write_bag(tmp_path / parent / 'run', 5)
+    assert (tmp_path / 'a/run/run_0.mcap').read_bytes() == (
+        tmp_path / 'b/run/run_0.mcap').read_bytes()
+    assert (tmp_path / 'a/run/metadata.yaml').read_bytes() == (
+        tmp_path / 'b/run/metadata.yaml').read_bytes()
