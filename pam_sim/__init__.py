@@ -12,3 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""
+Physics and models of a rig with a pneumatic artificial muscle; no ROS.
+
+``load_rig`` gives a rig from a preset or a model file; ``Rig.simulate`` runs
+it on arrays, ``Rig.plant`` step by step.
+"""
+
+from pam_sim.errors import InputError
+
+__all__ = ['InputError', 'Rig', 'load_rig', 'preset_names']
+
+
+def __getattr__(name):
+    """Import the simulation only when it is asked for: it brings the compiler with it."""
+    if name in ('load_rig', 'preset_names'):
+        from pam_sim import model_file
+        return getattr(model_file, name)
+    if name == 'Rig':
+        from pam_sim.rig import Rig
+        return Rig
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -1,0 +1,176 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What an effect file declares."""
+
+from dataclasses import dataclass, field
+
+from pam_sim.parameters import check_parameters
+import numpy as np
+
+SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """
+    The rig's numbers an effect may need to pack its parameters.
+
+    Parameters
+    ----------
+    dt_s, substep_s : float
+        Step and physics step.
+    valve : str
+        ``ppr`` or ``hsv``.
+    fidelity : str
+        ``averaged`` or ``switching``.
+    parameters : dict
+        Name to value of the rig.
+    signal : tuple of float
+        Valve signal before the start.
+    pressure_pa, contraction_m, force_n : float
+        State at the start, pressure absolute.
+
+    """
+
+    dt_s: float
+    substep_s: float
+    valve: str
+    fidelity: str
+    parameters: dict
+    signal: tuple = (0.0, 0.0)
+    pressure_pa: float = 0.0
+    contraction_m: float = 0.0
+    force_n: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A quantity a result states for an effect; ``function(values, rig)`` computes it."""
+
+    name: str
+    unit: str
+    function: object
+
+
+def _pack_in_order(values, numbers):
+    return tuple(values.values())
+
+
+def _no_states(values, numbers):
+    return ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    One named addition to the nominal rig.
+
+    Parameters
+    ----------
+    name, family, subsystem : str
+        ``subsystem`` is one of :data:`SUBSYSTEMS`.
+    sentence : str
+        What it is, for people.
+    source : str
+        Where the equation comes from.
+    parameters : tuple of Parameter
+        Nominal values are typical sizes, used where a model file gives none.
+    amplitude : tuple of str
+        Parameters that switch it: all zero means the effect is not there.
+    reported : tuple of Reported
+    states : int
+        Number of float64 states.
+    slots : int, optional
+        Number of packed values; by default one per parameter, in order.
+    pack : callable
+        ``pack(values, numbers) -> floats``: what the hooks find at ``par[k…]``.
+    initial : callable
+        ``initial(values, numbers) -> floats``: states at the start.
+    valves : tuple of str
+        Valve types it can act with.
+    order : int
+        Effects of one hook are applied by rising order, then name.
+    active : callable, optional
+        ``active(values, numbers) -> bool``; by default any amplitude not zero.
+
+    """
+
+    name: str
+    family: str
+    subsystem: str
+    sentence: str
+    source: str
+    parameters: tuple
+    amplitude: tuple
+    reported: tuple = ()
+    states: int = 0
+    slots: int = None
+    pack: object = _pack_in_order
+    initial: object = _no_states
+    valves: tuple = ('ppr', 'hsv')
+    order: int = 50
+    active: object = None
+    hooks: dict = field(default_factory=dict, compare=False)
+
+    def __post_init__(self):
+        """Fill in the number of packed values and check the declaration."""
+        if self.slots is None:
+            object.__setattr__(self, 'slots', len(self.parameters))
+        known = {parameter.name for parameter in self.parameters}
+        if self.subsystem not in SUBSYSTEMS or not self.amplitude or set(self.amplitude) - known:
+            raise ValueError(f'effect {self.name}: wrong subsystem or amplitude')
+
+    def values(self, given=(), where=''):
+        """Return all parameter values, checked; nominal where not given (see Parameter)."""
+        return check_parameters(
+            self.parameters, dict(given) if not hasattr(given, 'items') else given,
+            f'parameter of effect `{self.name}`', where)
+
+    def is_active(self, values, numbers):
+        """Return whether the effect acts with these values on this rig."""
+        if numbers.valve not in self.valves:
+            return False
+        if self.active is not None:
+            return bool(self.active(values, numbers))
+        return any(values[name] != 0.0 for name in self.amplitude)
+
+    def pack_into(self, values, numbers, par, k, state, i):
+        """
+        Write flag, packed parameters and initial states.
+
+        Parameters
+        ----------
+        values : dict
+        numbers : Numbers
+        par : ndarray of float64
+            ``par[k - 1]`` is the flag, ``par[k:k + slots]`` the packed values.
+        k : int
+        state : ndarray of float64
+            ``state[i:i + states]`` are the effect's states.
+        i : int
+
+        """
+        if not self.is_active(values, numbers):
+            par[k - 1:k + self.slots] = 0.0
+            return
+        par[k - 1] = 1.0
+        par[k:k + self.slots] = np.asarray(self.pack(values, numbers), dtype=float)
+        first = np.asarray(self.initial(values, numbers), dtype=float)
+        state[i:i + self.states] = 0.0
+        state[i:i + len(first)] = first
+
+    def report(self, values, rig):
+        """Return reported name -> (value, unit) for a rig."""
+        return {item.name: (item.function(values, rig), item.unit) for item in self.reported}

@@ -1,0 +1,86 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Rate-independent memory of the braid: Maxwell slip, four elements in parallel.
+
+    F -> F - (F0 + k_p p_g) sum_j w_j z_j,   dz_j = dx / W_j clipped to [-1, 1]
+
+Generalised Maxwell slip, Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
+Automatic Control 50(11); for muscles Vo-Minh et al. (2011), Mechatronics 21.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+# Break-away travel and weight of each element, design values.
+WIDTHS_M = (0.1e-3, 0.4e-3, 1.2e-3, 3.0e-3)
+WEIGHTS = (0.25, 0.30, 0.25, 0.20)
+_ELEMENTS = len(WIDTHS_M)
+_FORCE, _PER_PA, _ATMOSPHERE, _TABLE = range(4)
+
+
+def _pack(values, numbers):
+    scale = values['width_scale']
+    table = []
+    for width, weight in zip(WIDTHS_M, WEIGHTS):
+        table += [1.0 / (width * scale), weight]
+    return (values['force_n'], values['force_per_pa'], numbers.parameters['p_atm'], *table)
+
+
+EFFECT = Effect(
+    name='hysteresis',
+    family='friction',
+    subsystem='muscle',
+    sentence='The force depends on the path: presliding friction of the braid with memory.',
+    source='Maxwell slip, Al-Bender et al. 2005; Vo-Minh et al. 2011.',
+    parameters=(
+        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
+                  description='Half width of the loop at zero gauge pressure.'),
+        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
+                  description='Growth of the half width with gauge pressure.'),
+        Parameter('width_scale', '-', 1.0, 0.1, 10.0,
+                  description='Scale of the break-away travels 0.1, 0.4, 1.2, 3.0 mm.'),
+    ),
+    amplitude=('force_n', 'force_per_pa'),
+    reported=(Reported(
+        'loop_half_width_at_400kpa_n', 'N',
+        lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),),
+    states=_ELEMENTS,
+    slots=3 + 2 * _ELEMENTS,
+    pack=_pack,
+)
+
+
+@compiled
+def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
+                 state, i, par, k):
+    """Return the force less the slip elements' share at travel ``dx_m`` from the step start."""
+    level = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    if level <= 0.0:
+        return force_n
+    total = 0.0
+    for j in range(_ELEMENTS):
+        z = state[i + j] + dx_m * par[k + _TABLE + 2 * j]
+        total += par[k + _TABLE + 2 * j + 1] * min(max(z, -1.0), 1.0)
+    return force_n - level * total
+
+
+@compiled
+def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Advance the slip states."""
+    for j in range(_ELEMENTS):
+        z = state[i + j] + dx_m * par[k + _TABLE + 2 * j]
+        state[i + j] = min(max(z, -1.0), 1.0)

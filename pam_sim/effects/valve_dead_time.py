@@ -1,0 +1,87 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pure delay from valve command to pressure: a ring buffer with fractional delay."""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
+
+SLOTS = 1024                # samples remembered of each command
+_DELAY, _WHOLE, _SHARE, _SWITCHING = range(4)
+
+
+def _pack(values, numbers):
+    steps = values['delay_s'] / numbers.dt_s
+    if steps > SLOTS - 2:
+        raise InputError(
+            f'`delay_s` is {values["delay_s"]:g}; at a step of {numbers.dt_s:g} s it may be at '
+            f'most {(SLOTS - 2) * numbers.dt_s:g} s', 'valve_dead_time')
+    whole = math.floor(steps + 1e-9)
+    share = max(steps - whole, 0.0)
+    if share < 1e-9:
+        share = 0.0
+    return values['delay_s'], whole, share, float(numbers.fidelity == 'switching')
+
+
+def _initial(values, numbers):
+    signal = tuple(numbers.signal) + (0.0, 0.0)
+    return (0.0,) + (float(signal[0]),) * SLOTS + (float(signal[1]),) * SLOTS
+
+
+EFFECT = Effect(
+    name='valve_dead_time',
+    family='transport',
+    subsystem='valve',
+    sentence='The valve answers a command only after a pure delay.',
+    source='Transport delay; 20-50 ms measured on electro-pneumatic regulators.',
+    parameters=(
+        Parameter('delay_s', 's', 0.030, 0.0, 0.5, description='Delay from command to pressure.'),
+    ),
+    amplitude=('delay_s',),
+    reported=(Reported('delay_s', 's', lambda values, rig: values['delay_s']),),
+    states=1 + 2 * SLOTS,
+    slots=4,
+    pack=_pack,
+    initial=_initial,
+    order=90,               # after anything that changes the command itself
+)
+
+
+@compiled
+def command(signal_0, signal_1, dt_s, state, i, par, k):
+    """Return the command of ``delay_s`` ago; state[i] is the position written last."""
+    position = (int(state[i]) + 1) % SLOTS
+    state[i] = position
+    state[i + 1 + position] = signal_0
+    state[i + 1 + SLOTS + position] = signal_1
+    newer = (position - int(par[k + _WHOLE])) % SLOTS
+    share = par[k + _SHARE]
+    new_0 = state[i + 1 + newer]
+    new_1 = state[i + 1 + SLOTS + newer]
+    # The switching valves latch a duty at the (delayed) period start: no mean of two samples.
+    if share == 0.0 or par[k + _SWITCHING] != 0.0:
+        return new_0, new_1
+    older = (newer - 1) % SLOTS
+    return (new_0 + share * (state[i + 1 + older] - new_0),
+            new_1 + share * (state[i + 1 + SLOTS + older] - new_1))
+
+
+@compiled
+def clock_shift(shift_s, state, i, par, k):
+    """Return how late the PWM clock of the switching valves is."""
+    return shift_s + par[k + _DELAY]

@@ -1,0 +1,92 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Small commands are swallowed.
+
+PPR: the regulator moves only by what the distance of set point and pressure
+exceeds a threshold (overlap of its main valve). HSV: opening and closing times
+swallow short pulses, and a valve not yet shut at the next pulse stays open.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+_HALF_WIDTH, _OPEN, _CLOSE = range(3)
+
+
+def _active(values, numbers):
+    if numbers.valve == 'ppr':
+        return values['half_width_pa'] != 0.0
+    return values['open_time_s'] != 0.0 or values['close_time_s'] != 0.0
+
+
+EFFECT = Effect(
+    name='valve_dead_zone',
+    family='valve_nonlinearity',
+    subsystem='valve',
+    sentence='The valve ignores small commands: threshold of a regulator, opening and closing '
+             'times of switching valves.',
+    source='Valve overlap; switching times of MHE2-class valves 1.7 ms and 2.0 ms.',
+    parameters=(
+        Parameter('half_width_pa', 'Pa', 0.0, 0.0, 100e3,
+                  description='PPR: distance of set point and pressure that does not move it.'),
+        Parameter('open_time_s', 's', 0.0, 0.0, 0.02,
+                  description='HSV: delay from switching on to open.'),
+        Parameter('close_time_s', 's', 0.0, 0.0, 0.02,
+                  description='HSV: delay from switching off to shut.'),
+    ),
+    amplitude=('half_width_pa', 'open_time_s', 'close_time_s'),
+    reported=(
+        Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),
+        Reported('open_time_s', 's', lambda values, rig: values['open_time_s']),
+        Reported('close_time_s', 's', lambda values, rig: values['close_time_s']),
+    ),
+    active=_active,
+)
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the set point less the threshold; the lag towards it stays exact."""
+    distance = set_point_pa - pressure_pa
+    width = par[k + _HALF_WIDTH]
+    return set_point_pa - min(max(distance, -width), width), time_constant_s
+
+
+@compiled
+def mean_opening(duty, period_s, open_s, close_s):
+    """Return the mean opening of one valve driven with a constant duty."""
+    pulse = duty * period_s
+    if pulse <= 0.0:
+        return 0.0
+    if period_s - pulse < close_s:
+        return 1.0                       # never shut between pulses
+    if pulse <= open_s:
+        return 0.0
+    return min((pulse - open_s + close_s) / period_s, 1.0)
+
+
+@compiled
+def opening(fill, vent, period_s, state, i, par, k):
+    """Return the mean openings of the averaged pair."""
+    return (mean_opening(fill, period_s, par[k + _OPEN], par[k + _CLOSE]),
+            mean_opening(vent, period_s, par[k + _OPEN], par[k + _CLOSE]))
+
+
+@compiled
+def switch_times(open_s, close_s, state, i, par, k):
+    """Return the delays of the switching pair."""
+    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]

@@ -1,0 +1,50 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A mass hanging on a vertical guide rail, with inelastic end stops.
+
+    m dv/dt = F(p, eps) - c v - m g - F_ext        for 0 < x < 0.25 L0
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.parameters import Parameter
+
+NAME = 'hanging_mass'
+MOVES_FREELY = True
+NEEDS_CONTRACTION = False
+
+PARAMETERS = (
+    Parameter('mass_kg', 'kg', 5.0, 0.1, 50.0, 0.02, 'Hanging mass.', 'rig of the seed chapter'),
+)
+
+
+@compiled
+def acceleration(net_n, contraction_m, velocity_m_per_s, mass_kg, max_contraction_m):
+    """
+    Return the acceleration [m/s^2], zero where an end stop holds the mass.
+
+    Parameters
+    ----------
+    net_n : float
+        Sum of all forces in the direction of contraction, N.
+    contraction_m, velocity_m_per_s : float
+    mass_kg, max_contraction_m : float
+
+    """
+    if contraction_m <= 0.0 and velocity_m_per_s <= 0.0 and net_n < 0.0:
+        return 0.0
+    if contraction_m >= max_contraction_m and velocity_m_per_s >= 0.0 and net_n > 0.0:
+        return 0.0
+    return net_n / mass_kg

@@ -1,0 +1,163 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Model files and presets: YAML in, Rig out, and back."""
+
+from importlib import resources
+import os
+
+from pam_sim.effects.registry import get_effect
+from pam_sim.errors import InputError
+from pam_sim.load import LOADS
+from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+from pam_sim.muscle import dmsp_5_300
+from pam_sim.parameters import check_parameters
+from pam_sim.rig import EffectSetting, Rig, rig_parameters, VALVES
+from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.valve import hsv
+
+KEYS = ('name', 'rig', 'muscle', 'load', 'valve', 'fidelity', 'parameters', 'tolerance',
+        'effects', 'sensors')
+_PRESET_OF_LOAD = {load: f'dmsp_5_300_{load}' for load in LOADS}
+
+
+def preset_names():
+    """Return the names of the presets, sorted."""
+    return sorted(item.name[:-5] for item in resources.files('pam_sim.presets').iterdir()
+                  if item.name.endswith('.yaml'))
+
+
+def _preset(name):
+    text = resources.files('pam_sim.presets').joinpath(f'{name}.yaml').read_text('utf-8')
+    return load_yaml(text, name=f'{name}.yaml')
+
+
+def load_rig(source, valve=None, fidelity=None):
+    """
+    Return a rig from a preset or a model file.
+
+    Parameters
+    ----------
+    source : str, os.PathLike, Located or Rig
+        Preset name, path of a model file, YAML text, or a mapping already read.
+    valve, fidelity : str, optional
+        Instead of those of the model: ``ppr`` or ``hsv``; ``averaged`` or ``switching``.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    InputError
+        One sentence with file, line, key, value and what is allowed.
+
+    """
+    if isinstance(source, Rig):
+        rig = source
+    elif isinstance(source, Located):
+        rig = _from_mapping(source, None, ())
+    elif isinstance(source, str) and source in preset_names():
+        rig = _from_mapping(_preset(source), source, (source,))
+    elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
+            and ': ' not in source and not source.endswith(('.yaml', '.yml')):
+        raise InputError(f'rig `{source}` is neither a preset nor a file; presets: '
+                         + ', '.join(preset_names()))
+    else:
+        rig = _from_mapping(load_yaml(source), None, ())
+    for value, choices, what in ((valve, VALVES, 'valve'), (fidelity, hsv.FIDELITIES, 'fidelity')):
+        if value is not None and value not in choices:
+            raise InputError(f'{what} `{value}` is not known; allowed: {", ".join(choices)}')
+    return rig.with_(valve=valve, fidelity=fidelity)
+
+
+def _from_mapping(data, name, seen):
+    data.check_keys(KEYS)
+    name = data.get('name', str, name)
+    if 'rig' in data:
+        base_name = data.require('rig', str, choices=preset_names())
+        if base_name in seen:
+            raise data.error(f'`{base_name}` is made from itself', 'rig')
+        base = _from_mapping(_preset(base_name), base_name, (*seen, base_name))
+        for key in ('muscle', 'load'):
+            if key in data:
+                raise data.error(f'`{key}` is given by `rig: {base_name}`', key)
+    else:
+        if 'load' not in data:
+            raise data.error(f'`rig` is missing; allowed: {", ".join(preset_names())}')
+        data.require('muscle', str, choices=(dmsp_5_300.NAME,))
+        base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)))
+    known = rig_parameters(base.load)
+    given = data.get('parameters', dict, Located({})) if data.get('parameters') is not None else {}
+    check_parameters(known, given)
+    tolerance = dict(base.tolerance)
+    stated = data.get('tolerance', dict, {}) if data.get('tolerance') is not None else Located({})
+    stated.check_keys([parameter.name for parameter in known], 'parameter')
+    for key in stated:
+        tolerance[key] = stated.require(key, float, lower=0.0, upper=1.0)
+    sensors = data.get('sensors', dict) if data.get('sensors') is not None else {}
+    check_parameters(SENSOR_PARAMETERS, sensors, 'sensor setting')
+    return Rig(
+        name or base.name, base.load,
+        data.get('valve', str, base.valve, choices=VALVES),
+        data.get('fidelity', str, base.fidelity, choices=hsv.FIDELITIES),
+        {**base.parameters, **dict(given)}, _effects(data, base), {**base.sensors, **dict(sensors)},
+        tolerance)
+
+
+def _effects(data, base):
+    """Return the base's effects with those of the file added; the file wins on equal names."""
+    settings = {item.name: item for item in base.effects}
+    listed = data.get('effects', list) if data.get('effects') is not None else []
+    stated = set()
+    for index, item in enumerate(listed):
+        if not isinstance(item, Located):
+            raise InputError('an effect is a mapping with `name` and `parameters`',
+                             listed.where(index))
+        item.check_keys(('name', 'parameters', 'source'))
+        name = item.require('name', str)
+        effect = get_effect(name, item.where('name'))
+        if name in stated:
+            raise item.error(f'effect `{name}` is listed twice', 'name')
+        stated.add(name)
+        given = item.get('parameters', dict) if item.get('parameters') is not None else {}
+        origin = item.get('source')
+        origin = origin.plain() if isinstance(origin, Located) else (
+            {} if origin is None else {'note': origin})
+        settings[name] = EffectSetting(name, effect.values(given), origin)
+    return list(settings.values())
+
+
+def rig_to_yaml(rig):
+    """Return the text of a model file that gives an equal rig."""
+    known = rig_parameters(rig.load)
+    data = {'name': rig.name, 'rig': _PRESET_OF_LOAD[rig.load], 'valve': rig.valve,
+            'fidelity': rig.fidelity}
+    changed = {p.name: rig.parameters[p.name] for p in known
+               if rig.parameters[p.name] != p.nominal}
+    tolerance = {p.name: rig.tolerance[p.name] for p in known
+                 if rig.tolerance[p.name] != p.tolerance}
+    sensors = {p.name: rig.sensors[p.name] for p in SENSOR_PARAMETERS
+               if rig.sensors[p.name] != p.nominal}
+    effects = []
+    for item in rig.effects:
+        entry = {'name': item.name, 'parameters': dict(item.parameters)}
+        if item.source:
+            entry['source'] = item.source
+        effects.append(entry)
+    for key, value in (('parameters', changed), ('tolerance', tolerance), ('effects', effects),
+                       ('sensors', sensors)):
+        if value:
+            data[key] = value
+    return dump_yaml(data)

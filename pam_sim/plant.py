@@ -1,0 +1,125 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rig as a live object: one physics step at a time, the compiled step of the rollout."""
+
+from pam_sim.errors import InputError
+from pam_sim.rollout import kernel, layout
+import numpy as np
+
+
+class Plant:
+    """
+    A rig that is stepped from outside; its steps equal those of ``Rig.simulate`` to the bit.
+
+    Parameters
+    ----------
+    rig : Rig
+    seed : int
+        Kept for the sensor chain that goes with this plant; the physics is deterministic.
+    dt_s : float
+        Step, s.
+    **initial
+        As for :meth:`Rig.pack`.
+
+    """
+
+    def __init__(self, rig, seed=0, dt_s=0.001, **initial):
+        self.rig = rig
+        self.seed = int(seed)
+        self.dt_s = float(dt_s)
+        self._initial = initial
+        self._inp = np.zeros(layout.INP_SIZE)
+        self._out = np.zeros(layout.OUT_SIZE)
+        self.reset()
+
+    def reset(self):
+        """Go back to the start."""
+        self.state, self.par = self.rig.pack(dt_s=self.dt_s, **self._initial)
+        self._inp[:] = 0.0
+        self._inp[layout.INP_CONTRACTION] = self.state[layout.S_CONTRACTION]
+        kernel.look(self.state, self.par, self._inp, self._out)
+
+    def step(self, signal, external_force_n=0.0, contraction_m=None):
+        """
+        Advance by ``dt_s`` with the valve signal held.
+
+        Parameters
+        ----------
+        signal : float or sequence of float
+            PPR: voltage [V] (or a tuple of it); HSV: (fill duty, vent duty), 0..1.
+        external_force_n : float
+            Force on the load, N, against contraction positive.
+        contraction_m : float, optional
+            Contraction at the end of the step for a driven load, m; held if not given.
+
+        Raises
+        ------
+        InputError
+            The number of signals does not fit the valve, or a number is not finite.
+
+        """
+        values = (signal,) if np.isscalar(signal) else tuple(signal)
+        wanted = 1 if self.rig.valve == 'ppr' else 2
+        if len(values) != wanted:
+            raise InputError(f'valve `{self.rig.valve}` takes {wanted} numbers, got {len(values)}',
+                             'valve signal')
+        inp = self._inp
+        inp[:wanted] = values
+        inp[layout.INP_EXTERNAL_FORCE] = external_force_n
+        if contraction_m is not None:
+            inp[layout.INP_CONTRACTION] = contraction_m
+        if not np.isfinite(inp).all():
+            raise InputError('is not finite', 'valve signal, force or contraction')
+        kernel.step(self.state, self.par, inp, self._out)
+
+    @property
+    def time_s(self):
+        """Time since the start, s."""
+        return float(self._out[layout.OUT_TIME])
+
+    @property
+    def pressure_pa(self):
+        """Absolute pressure as the sensor reads it (no noise), Pa."""
+        return float(self._out[layout.OUT_PRESSURE])
+
+    @property
+    def contraction_m(self):
+        """Contraction as the sensor reads it (no noise), m."""
+        return float(self._out[layout.OUT_CONTRACTION])
+
+    @property
+    def velocity_m_per_s(self):
+        """Contraction rate, true, m/s."""
+        return float(self._out[layout.OUT_VELOCITY])
+
+    @property
+    def force_n(self):
+        """Load cell force as the sensor reads it (no noise), N."""
+        return float(self._out[layout.OUT_FORCE])
+
+    @property
+    def air_mass_kg(self):
+        """Air in muscle and dead volume, kg."""
+        return float(self._out[layout.OUT_AIR_MASS])
+
+    @property
+    def supply_pa(self):
+        """Supply pressure, absolute, Pa."""
+        return float(self._out[layout.OUT_SUPPLY])
+
+    @property
+    def outputs(self):
+        """All outputs after the last step (copy), indexed by ``layout.OUT_*``."""
+        return self._out.copy()

@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a simulation returns."""
+
+import numpy as np
+from pam_sim.rollout import layout
+
+_COLUMNS = {
+    'time_s': layout.OUT_TIME,
+    'pressure_pa': layout.OUT_PRESSURE,
+    'contraction_m': layout.OUT_CONTRACTION,
+    'velocity_m_per_s': layout.OUT_VELOCITY,
+    'force_n': layout.OUT_FORCE,
+    'air_mass_kg': layout.OUT_AIR_MASS,
+    'supply_pa': layout.OUT_SUPPLY,
+    'true_pressure_pa': layout.OUT_TRUE_PRESSURE,
+    'true_contraction_m': layout.OUT_TRUE_CONTRACTION,
+    'true_force_n': layout.OUT_TRUE_FORCE,
+    'filled_kg': layout.OUT_FILLED,
+    'vented_kg': layout.OUT_VENTED,
+    'acceleration_m_per_s2': layout.OUT_ACCELERATION,
+}
+
+
+class Response:
+    """
+    Signals of a simulated run, each an ndarray of shape (N + 1,), row 0 the start.
+
+    Attributes
+    ----------
+    time_s : ndarray
+        Seconds since the start.
+    pressure_pa, contraction_m, force_n : ndarray
+        Absolute pressure [Pa], contraction [m], load cell force [N] as the
+        sensors read them: sensor effects included, noise not.
+    true_pressure_pa, true_contraction_m, true_force_n : ndarray
+        The same without sensor effects.
+    velocity_m_per_s, acceleration_m_per_s2 : ndarray
+        True motion of the load.
+    air_mass_kg : ndarray
+        Air in muscle and dead volume.
+    supply_pa : ndarray
+        Supply pressure, absolute.
+    filled_kg, vented_kg : ndarray
+        Air through the fill and the vent valve since the start; zero for the PPR.
+
+    """
+
+    def __init__(self, outputs):
+        self.outputs = outputs
+
+    def __len__(self):
+        """Return the number of samples, N + 1."""
+        return len(self.outputs)
+
+    def __getattr__(self, name):
+        """Return a signal by name."""
+        if name in _COLUMNS:
+            return self.outputs[:, _COLUMNS[name]]
+        raise AttributeError(name)
+
+    def __dir__(self):
+        """List the signals too."""
+        return [*super().__dir__(), *_COLUMNS]
+
+    def as_dict(self):
+        """Return name -> ndarray of all signals."""
+        return {name: np.ascontiguousarray(self.outputs[:, c]) for name, c in _COLUMNS.items()}

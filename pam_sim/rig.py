@@ -1,0 +1,314 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rig: muscle, valve, load, effects and sensors as one object that can be simulated."""
+
+from dataclasses import dataclass, field, replace
+import math
+
+import numpy as np
+from pam_sim.effects.registry import get_effect
+from pam_sim.errors import InputError
+from pam_sim.load import LOADS
+from pam_sim.muscle import dmsp_5_300, geometry, sarosi
+from pam_sim.parameters import check_parameters
+from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.valve import hsv, ppr
+
+VALVES = ('ppr', 'hsv')
+DEFAULT_TOLERANCE = 0.02
+
+
+def rig_parameters(load):
+    """Return the Parameters a rig with this load has, in the order of model files."""
+    return (*dmsp_5_300.PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS)
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """
+    An effect with its numbers, as a model file lists it.
+
+    Parameters
+    ----------
+    name : str
+    parameters : dict
+        All parameters of the effect, name -> value, SI.
+    source : dict
+        Where the numbers come from (bag, date, ci95); kept, not used.
+
+    """
+
+    name: str
+    parameters: dict = field(default_factory=dict)
+    source: dict = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, item):
+        """
+        Return a checked setting from a name, a mapping with ``name`` and ``parameters``, or itself.
+
+        Raises
+        ------
+        InputError
+            Unknown effect or parameter, value out of bounds.
+
+        """
+        if isinstance(item, str):
+            item = {'name': item}
+        if not isinstance(item, cls):
+            item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
+        return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
+
+
+@dataclass(frozen=True)
+class Rig:
+    """
+    A rig; made by :func:`pam_sim.load_rig`, changed by :meth:`with_`.
+
+    Parameters
+    ----------
+    name : str
+    load : str
+        ``hanging_mass``, ``isometric`` or ``driven``.
+    valve : str
+        ``ppr`` or ``hsv``.
+    fidelity : str
+        HSV only: ``averaged`` or ``switching``.
+    parameters : dict
+        Every rig parameter, name -> value, SI.
+    effects : list of EffectSetting
+    sensors : dict
+        Sensor settings, name -> value (see :class:`pam_sim.sensors.SensorChain`).
+    tolerance : dict
+        Parameter name -> relative standard deviation.
+
+    """
+
+    name: str
+    load: str
+    valve: str = 'ppr'
+    fidelity: str = 'averaged'
+    parameters: dict = field(default_factory=dict)
+    effects: list = field(default_factory=list)
+    sensors: dict = field(default_factory=dict)
+    tolerance: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Check the choices and fill in nominal numbers."""
+        for value, choices, where in ((self.load, tuple(LOADS), 'load'),
+                                      (self.valve, VALVES, 'valve'),
+                                      (self.fidelity, hsv.FIDELITIES, 'fidelity')):
+            if value not in choices:
+                raise InputError(f'`{value}` is not known; allowed: {", ".join(choices)}', where)
+        known = rig_parameters(self.load)
+        tolerance = {parameter.name: parameter.tolerance for parameter in known}
+        tolerance.update(self.tolerance)
+        settings = {}
+        for item in self.effects:
+            setting = EffectSetting.of(item)
+            if setting.name in settings:
+                raise InputError(f'effect `{setting.name}` is listed twice', 'effects')
+            settings[setting.name] = setting
+        for name, value in (
+                ('parameters', check_parameters(known, self.parameters)),
+                ('sensors', check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting')),
+                ('tolerance', tolerance), ('effects', list(settings.values()))):
+            object.__setattr__(self, name, value)
+
+    @property
+    def parameter_list(self):
+        """Parameter descriptions (unit, bounds, nominal, tolerance) of this rig."""
+        return rig_parameters(self.load)
+
+    @property
+    def signal_names(self):
+        """Names of the valve signals, in order."""
+        return ppr.SIGNAL_NAMES if self.valve == 'ppr' else hsv.SIGNAL_NAMES
+
+    def effect(self, name):
+        """Return the setting of an effect of this rig, or None."""
+        return next((item for item in self.effects if item.name == name), None)
+
+    def with_(self, parameters=None, effects=None, valve=None, fidelity=None, load=None,
+              sensors=None, name=None):
+        """
+        Return a changed copy.
+
+        Parameters
+        ----------
+        parameters : dict, optional
+            Numbers to change, the others stay.
+        effects : list, optional
+            The effects instead of the present ones (``EffectSetting``, dict or name).
+        valve, fidelity, load, name : str, optional
+        sensors : dict, optional
+            Sensor settings to change.
+
+        Raises
+        ------
+        InputError
+            Unknown name or value out of bounds.
+
+        """
+        new_load = load or self.load
+        known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
+        kept = {key: value for key, value in self.parameters.items() if key in known}
+        tolerance = {key: value for key, value in self.tolerance.items() if key in known}
+        return replace(
+            self, name=name or self.name, load=new_load, valve=valve or self.valve,
+            fidelity=fidelity or self.fidelity, parameters={**kept, **(parameters or {})},
+            effects=self.effects if effects is None else effects, tolerance=tolerance,
+            sensors={**self.sensors, **(sensors or {})})
+
+    # -- statics ---------------------------------------------------------------------------
+    def static_pressure_pa(self, contraction_m, load_n=None):
+        """
+        Return the absolute pressure [Pa] at which the muscle holds a contraction.
+
+        The force map with its gain, no effects; never below atmospheric pressure.
+
+        Parameters
+        ----------
+        contraction_m : float or ndarray
+        load_n : float or ndarray, optional
+            Tension to hold, N; by default the weight of a hanging mass.
+
+        Raises
+        ------
+        InputError
+            No ``load_n`` for a load without weight.
+
+        """
+        if load_n is None:
+            load_n = self._weight_n()
+        gauge = sarosi.pressure_gauge_pa(
+            np.asarray(load_n, float) / self.parameters['force_map_gain'],
+            np.asarray(contraction_m, float) / geometry.LENGTH_M)
+        pressure = P_ATM_PA + np.maximum(gauge, 0.0)
+        return float(pressure) if np.ndim(pressure) == 0 else pressure
+
+    def static_contraction_m(self, pressure_pa, load_n=None):
+        """
+        Return the contraction [m] at rest, 0 to 0.25 L0, at an absolute pressure [Pa].
+
+        Raises
+        ------
+        InputError
+            No ``load_n`` for a load without weight.
+
+        """
+        if load_n is None:
+            load_n = self._weight_n()
+        wanted = load_n / self.parameters['force_map_gain']
+        low, high = 0.0, geometry.MAX_STRAIN
+        gauge = pressure_pa - P_ATM_PA
+        if sarosi.tension_n(gauge, low) <= wanted:
+            return 0.0
+        if sarosi.tension_n(gauge, high) >= wanted:
+            return high * geometry.LENGTH_M
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if sarosi.tension_n(gauge, middle) > wanted:
+                low = middle
+            else:
+                high = middle
+        return low * geometry.LENGTH_M
+
+    def _weight_n(self):
+        if 'mass_kg' not in self.parameters:
+            raise InputError(f'load `{self.load}` has no weight; give load_n', self.name)
+        return self.parameters['mass_kg'] * GRAVITY_M_PER_S2
+
+    # -- dynamics --------------------------------------------------------------------------
+    def pack(self, dt_s=0.001, initial_pressure_pa=P_ATM_PA, initial_contraction_m=None,
+             initial_signal=None):
+        """
+        Return (state, par), float64 arrays for the kernel (see pam_sim.rollout.layout).
+
+        Parameters
+        ----------
+        dt_s : float
+            Step, s; a switching HSV pair does several physics steps of 0.1 ms in it.
+        initial_pressure_pa : float
+            Absolute, Pa.
+        initial_contraction_m : float, optional
+            By default where the rig rests at that pressure.
+        initial_signal : tuple of float, optional
+            Valve signal before the start; by default PPR the voltage of that
+            pressure, HSV both shut.
+
+        Raises
+        ------
+        InputError
+            A start value or step out of range.
+
+        """
+        from pam_sim.rollout.packing import pack_rig
+        return pack_rig(self, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
+
+    def simulate(self, valve_signal, external_force_n=None, contraction_m=None,
+                 initial_pressure_pa=P_ATM_PA, dt_s=0.001, initial_contraction_m=None,
+                 initial_signal=None):
+        """
+        Simulate with recorded or made-up inputs, each held from sample i to i + 1.
+
+        Parameters
+        ----------
+        valve_signal : array_like, shape (N,) or (N, 2)
+            PPR voltage [V], or HSV fill and vent duty [0..1].
+        external_force_n : float or array_like, shape (N,), optional
+            N, against contraction positive.
+        contraction_m : float or array_like, shape (N + 1,) or (N,), optional
+            Driven load: contraction at the samples, linear in between, m.
+            Isometric load: one number instead of the model's.
+        initial_pressure_pa : float
+            Absolute, Pa.
+        dt_s : float
+            Step, s.
+        initial_contraction_m, initial_signal
+            As for :meth:`pack`.
+
+        Returns
+        -------
+        Response
+
+        Raises
+        ------
+        InputError
+            Wrong shape, number not finite, or the contraction of a driven load missing.
+
+        """
+        from pam_sim.rollout.simulate import simulate_rig
+        return simulate_rig(self, valve_signal, external_force_n, contraction_m, dt_s, {
+            'initial_pressure_pa': initial_pressure_pa,
+            'initial_contraction_m': initial_contraction_m, 'initial_signal': initial_signal})
+
+    def plant(self, seed=0, dt_s=0.001, **initial):
+        """Return a live :class:`pam_sim.plant.Plant` of this rig."""
+        from pam_sim.plant import Plant
+        return Plant(self, seed, dt_s, **initial)
+
+    # -- text ------------------------------------------------------------------------------
+    def to_yaml(self):
+        """Return a model file that :func:`pam_sim.load_rig` turns into an equal rig."""
+        from pam_sim.model_file import rig_to_yaml
+        return rig_to_yaml(self)
+
+    def volume_m3(self, contraction_m):
+        """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
+        thread, turns = geometry.braid()
+        return self.parameters['V_dead'] + geometry.volume_m3(
+            contraction_m, geometry.LENGTH_M, thread * thread, 1.0 / (4.0 * math.pi * turns ** 2))

@@ -1,0 +1,218 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Make the kernel: one module from the step template and the effect registry.
+
+The module is written to a cache folder under the hash of everything that goes
+into it, and compiled there once per machine; a changed or added effect gives
+another hash, hence another module. ``PAM_CACHE_DIR`` moves the folder.
+"""
+
+import hashlib
+import importlib.util
+import inspect
+import os
+from pathlib import Path
+import sys
+import tempfile
+
+import numba
+from pam_sim.effects import registry
+from pam_sim.rollout import hooks as hook_functions, layout
+from pam_sim.rollout.hooks import HOOKS
+
+_PACKAGE = Path(__file__).parent.parent
+_MARK = '# --- kernel'
+
+_HEAD = '''"""Generated from the effect registry; do not edit."""
+
+import math
+
+from numba import njit
+from pam_sim.compiled import compiled
+from pam_sim.effects.registry import effects
+from pam_sim.load.hanging_mass import acceleration
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.muscle.sarosi import tension_n
+from pam_sim.rollout.layout import *
+from pam_sim.valve.flow import mass_flow_kg_per_s
+from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
+from pam_sim.valve.ppr import set_point_pa
+
+_EFFECTS = effects()
+'''
+
+_TAIL = '''
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def step(state, par, inp, out):
+    """Advance ``state`` by one step and fill ``out`` (see pam_sim.rollout.layout)."""
+    step_body(state, par, inp, out)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def look(state, par, inp, out):
+    """Fill ``out`` from ``state`` without a step."""
+    observe(state, par, inp, out)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def settle(state, par):
+    """Make the dependent states agree with pressure and contraction before the first step."""
+    p = state[S_PRESSURE]
+    x = state[S_CONTRACTION]
+    state[S_AIR_MASS] = p * air_volume(p, x, state, par) / par[PAR_RT]
+    state[S_SUPPLY] = apply_supply(par[PAR_SUPPLY], state, par)
+    state[S_MUSCLE_FORCE] = muscle_force(p, x, state[S_VELOCITY], 0.0, 0.0, state, par)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def rollout(state, par, inputs, outputs):
+    """Step through ``inputs`` (N, INP_SIZE); ``outputs`` is (N + 1, OUT_SIZE), row 0 the start."""
+    if inputs.shape[0] == 0:
+        return
+    observe(state, par, inputs[0], outputs[0])
+    for i in range(inputs.shape[0]):
+        step_body(state, par, inputs[i], outputs[i + 1])
+'''
+
+
+def effect_layout():
+    """Return ({name: (k, i)}, par size, state size): where each effect's numbers stand."""
+    k, i = layout.PAR_BASE, layout.STATE_BASE
+    places = {}
+    for name, effect in registry.effects().items():
+        places[name] = (k + 1, i)
+        k += 1 + effect.slots
+        i += effect.states
+    return places, k, i
+
+
+def _dispatchers():
+    places, _, _ = effect_layout()
+    lines = []
+    for name, effect in registry.effects().items():
+        for hook in effect.hooks:
+            lines.append(f'_{name}_{hook} = _EFFECTS[{name!r}].hooks[{hook!r}]')
+    for hook, returned in HOOKS.items():
+        arguments = list(inspect.signature(
+            getattr(hook_functions, f'apply_{hook}')).parameters)
+        result = ', '.join(arguments[:returned])
+        lines += ['', '', '@compiled', f'def apply_{hook}({", ".join(arguments)}):']
+        body = []
+        for name, effect in registry.effects().items():
+            if hook in effect.hooks:
+                k, i = places[name]
+                own = ', '.join(arguments[:-2] + ['state', str(i), 'par', str(k)])
+                body.append(f'    if par[{k - 1}] != 0.0:')
+                call = f'_{name}_{hook}({own})'
+                body.append(f'        {result} = {call}' if returned else f'        {call}')
+        if returned:
+            body.append(f'    return {result}')
+        lines += body or ['    pass']
+    flags = [f'par[{places[name][0] - 1}] != 0.0' for name, effect in registry.effects().items()
+             if 'pressure_rate' in effect.hooks]
+    lines += ['', '', '@compiled', 'def pressure_rate_active(par):',
+              f'    return {" or ".join(flags) or "False"}']
+    return '\n'.join(lines) + '\n'
+
+
+def kernel_source():
+    """Return the source text of the kernel module."""
+    template = (Path(__file__).parent / 'step_template.py').read_text(encoding='utf-8')
+    body = template[template.index(_MARK):].split('\n', 1)[1]
+    return _HEAD + _dispatchers() + body.rstrip('\n') + '\n' + _TAIL
+
+
+def kernel_hash():
+    """Return the hash of everything the compiled kernel depends on (12 hexadecimal digits)."""
+    digest = hashlib.sha256()
+    digest.update(f'{sys.version_info[:2]} {numba.__version__}'.encode())
+    digest.update(kernel_source().encode())
+    files = [_PACKAGE / 'compiled.py', _PACKAGE / 'rollout' / 'layout.py']
+    for folder in ('muscle', 'valve', 'load'):
+        files += sorted((_PACKAGE / folder).glob('*.py'))
+    for path in files + registry.effect_files():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def cache_folder():
+    """Return the folder for generated modules, created; a temporary one if none can be had."""
+    chosen = os.environ.get('PAM_CACHE_DIR')
+    if not chosen:
+        base = os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache')
+        chosen = os.path.join(base, 'pam_actuation')
+    for folder in (Path(chosen), Path(tempfile.gettempdir()) / f'pam_actuation_{os.getuid()}'):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix='pam_actuation_'))
+
+
+def load_cached_module(name, source, key):
+    """
+    Import ``source`` as a module from the cache folder, written once per ``key``.
+
+    Code compiled with ``cache=True`` that calls the kernel belongs in such a
+    module with ``kernel_hash()`` in its key: a compiled caller holds a copy of
+    the kernel and would not notice a change of it.
+
+    Parameters
+    ----------
+    name : str
+        Module name without the key.
+    source : str
+        Python source.
+    key : str
+        Hash of all the module depends on.
+
+    Returns
+    -------
+    module
+
+    """
+    full = f'{name}_{key}'
+    if full in sys.modules:
+        return sys.modules[full]
+    path = cache_folder() / f'{full}.py'
+    try:
+        same = path.read_text(encoding='utf-8') == source
+    except (OSError, UnicodeDecodeError):
+        same = False
+    if not same:
+        # Several processes may be here at once: each writes its own file, the last rename wins.
+        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix='.tmp')
+        with os.fdopen(handle, 'w', encoding='utf-8') as file:
+            file.write(source)
+        os.replace(temporary, path)
+    spec = importlib.util.spec_from_file_location(full, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[full] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[full]
+        raise
+    return module
+
+
+def load_kernel():
+    """Return the kernel module with ``step``, ``look``, ``settle`` and ``rollout``."""
+    return load_cached_module('pam_sim_kernel', kernel_source(), kernel_hash())

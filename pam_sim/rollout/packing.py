@@ -1,0 +1,127 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Turn a rig into the arrays of the kernel."""
+
+import math
+
+import numpy as np
+from pam_sim.effects.effect import Numbers
+from pam_sim.effects.registry import get_effect
+from pam_sim.errors import InputError
+from pam_sim.load import LOADS
+from pam_sim.muscle import geometry
+from pam_sim.rollout import kernel, layout
+from pam_sim.rollout.generate import effect_layout
+from pam_sim.units import (
+    GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
+from pam_sim.valve.flow import flow_function, RATIO_LINEAR
+from pam_sim.valve.hsv import SWITCHING_STEP_S
+
+_PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
+
+
+def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
+    """Return (state, par); arguments and errors as of ``Rig.pack``."""
+    numbers = _numbers(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
+    state = np.zeros(_STATE_SIZE)
+    par = np.zeros(_PAR_SIZE)
+    _pack_base(rig, numbers, state, par)
+    for setting in rig.effects:
+        k, i = _PLACES[setting.name]
+        get_effect(setting.name).pack_into(setting.parameters, numbers, par, k, state, i)
+    kernel.settle(state, par)
+    return state, par
+
+
+def _numbers(rig, dt_s, pressure, contraction, signal):
+    value = rig.parameters
+    for name, number, lower, upper, unit in (
+            ('dt_s', dt_s, 1e-6, 0.02, 's'),
+            ('initial_pressure_pa', pressure, 0.5 * P_ATM_PA, 2e6, 'Pa absolute')):
+        if not lower <= number <= upper:
+            raise InputError(f'`{name}` is {number:g}; allowed {lower:g} to {upper:g} {unit}')
+    if contraction is None:
+        if LOADS[rig.load].MOVES_FREELY:
+            contraction = rig.static_contraction_m(pressure)
+        else:
+            contraction = value.get('contraction_m', 0.0)
+    top = geometry.MAX_STRAIN * geometry.LENGTH_M
+    if not 0.0 <= contraction <= top and LOADS[rig.load].MOVES_FREELY:
+        raise InputError(f'`initial_contraction_m` is {contraction:g}; allowed 0 to {top:g} m')
+    if signal is None:
+        signal = ((min(max((pressure - P_ATM_PA) / value['K_m'], 0.0), 6.0),)
+                  if rig.valve == 'ppr' else (0.0, 0.0))
+    elif np.isscalar(signal):
+        signal = (float(signal),)
+    return Numbers(
+        float(dt_s), _substep(rig, dt_s), rig.valve,
+        rig.fidelity if rig.valve == 'hsv' else 'averaged',
+        {**value, 'p_atm': P_ATM_PA}, tuple(float(s) for s in signal),
+        float(pressure), float(contraction), value.get('mass_kg', 0.0) * GRAVITY_M_PER_S2)
+
+
+def _substep(rig, dt_s):
+    """Return the physics step: 0.1 ms when switching, shorter where the flow law is steep."""
+    if rig.valve == 'ppr':
+        return float(dt_s)
+    value = rig.parameters
+    smallest = rig.volume_m3(0.0)
+    # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
+    slope = flow_function(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
+    rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
+    count = max(1, math.ceil(dt_s * rate / 0.5))
+    if rig.fidelity == 'switching':
+        count = max(count, math.ceil(dt_s / SWITCHING_STEP_S - 1e-9))
+    return dt_s / count
+
+
+def _pack_base(rig, numbers, state, par):
+    value = rig.parameters
+    thread, turns = geometry.braid()
+    substeps = round(numbers.dt_s / numbers.substep_s)
+    valve = layout.VALVE_PPR
+    if rig.valve == 'hsv':
+        valve = (layout.VALVE_HSV_SWITCHING if rig.fidelity == 'switching'
+                 else layout.VALVE_HSV_AVERAGED)
+    mass = value.get('mass_kg', 1.0)
+    for index, number in (
+            (layout.PAR_DT, numbers.dt_s),
+            (layout.PAR_SUBSTEPS, substeps),
+            (layout.PAR_SUBSTEP, numbers.substep_s),
+            (layout.PAR_VALVE, valve),
+            (layout.PAR_FREE_LOAD, LOADS[rig.load].MOVES_FREELY),
+            (layout.PAR_ATMOSPHERE, P_ATM_PA),
+            (layout.PAR_LENGTH, geometry.LENGTH_M),
+            (layout.PAR_FORCE_GAIN, value['force_map_gain']),
+            (layout.PAR_DAMPING, value['damping_n_s_per_m']),
+            (layout.PAR_MASS, mass),
+            (layout.PAR_WEIGHT, mass * GRAVITY_M_PER_S2),
+            (layout.PAR_MAX_CONTRACTION, geometry.MAX_STRAIN * geometry.LENGTH_M),
+            (layout.PAR_THREAD_SQUARED, thread * thread),
+            (layout.PAR_INVERSE_4_PI_N2, 1.0 / (4.0 * math.pi * turns * turns)),
+            (layout.PAR_DEAD_VOLUME, value['V_dead']),
+            (layout.PAR_RT, GAS_CONSTANT_AIR * TEMPERATURE_K),
+            (layout.PAR_CONDUCTANCE,
+             value['C'] * RHO_REFERENCE * math.sqrt(T_REFERENCE_K / TEMPERATURE_K)),
+            (layout.PAR_CRITICAL_RATIO, value['b']),
+            (layout.PAR_SUPPLY, value['supply_pa']),
+            (layout.PAR_GAIN_PPR, value['K_m']),
+            (layout.PAR_TIME_CONSTANT, value['T_m']),
+            (layout.PAR_DECAY_HALF, math.exp(-0.5 * numbers.substep_s / value['T_m'])),
+            (layout.PAR_PWM_PERIOD, value['pwm_period_s'])):
+        par[index] = number
+    state[layout.S_PRESSURE] = numbers.pressure_pa
+    state[layout.S_CONTRACTION] = numbers.contraction_m
+    state[layout.S_PERIOD] = -1e9         # no PWM period yet

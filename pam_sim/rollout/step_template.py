@@ -1,0 +1,394 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One step of the rig: the source from which the kernel is made.
+
+As it stands, with hooks that do nothing, it is the nominal rig of
+``docs``: Runge-Kutta of fourth order over air mass, contraction and velocity,
+the regulator's lag exact. The generator replaces the hooks by calls of the
+registered effects and compiles the rest unchanged.
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.load.hanging_mass import acceleration
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.muscle.sarosi import tension_n
+from pam_sim.rollout.hooks import (
+    apply_clock_shift, apply_command, apply_commit, apply_load_force, apply_load_friction,
+    apply_map_input, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
+    apply_pressure_rate, apply_sensor, apply_sensor_commit, apply_set_point, apply_supply,
+    apply_switch_times, apply_volume, pressure_rate_active)
+from pam_sim.rollout.layout import (
+    INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
+    OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
+    OUT_TRUE_CONTRACTION, OUT_TRUE_FORCE, OUT_TRUE_PRESSURE, OUT_VELOCITY, OUT_VENTED,
+    PAR_ATMOSPHERE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
+    PAR_DECAY_HALF, PAR_DT, PAR_FORCE_GAIN, PAR_FREE_LOAD, PAR_GAIN_PPR, PAR_INVERSE_4_PI_N2,
+    PAR_LENGTH, PAR_MASS, PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP,
+    PAR_SUBSTEPS, PAR_SUPPLY, PAR_THREAD_SQUARED, PAR_TIME_CONSTANT, PAR_VALVE, PAR_WEIGHT,
+    S_AIR_MASS, S_CONTRACTION, S_DIRECTION, S_FILL_OFF, S_FILL_ON, S_FILLED, S_MUSCLE_FORCE,
+    S_PERIOD, S_PRESSURE, S_STEPS, S_SUPPLY, S_TIME, S_VELOCITY, S_VENT_OFF, S_VENT_ON,
+    S_VENTED, VALVE_HSV_AVERAGED, VALVE_PPR)
+from pam_sim.valve.flow import mass_flow_kg_per_s
+from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
+from pam_sim.valve.ppr import set_point_pa
+
+# --- kernel: everything below is copied into the generated module -------------------------
+
+
+@compiled
+def air_volume(p, x, state, par):
+    """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
+    volume = par[PAR_DEAD_VOLUME] + volume_m3(
+        x, par[PAR_LENGTH], par[PAR_THREAD_SQUARED], par[PAR_INVERSE_4_PI_N2])
+    return apply_volume(volume, p, x, state, par)
+
+
+@compiled
+def muscle_force(p, x, v, dx, elapsed, state, par):
+    """Return the force the muscle transmits [N], its dry friction excepted."""
+    gauge, strain = apply_map_input(
+        p - par[PAR_ATMOSPHERE], x / par[PAR_LENGTH], state, par)
+    force = par[PAR_FORCE_GAIN] * tension_n(gauge, strain) - par[PAR_DAMPING] * v
+    return apply_muscle_force(force, p, x, v, dx, elapsed, state, par)
+
+
+@compiled
+def load_force(x, v, dx, elapsed, external, state, par):
+    """Return the force of weight, external load and load effects against contraction [N]."""
+    return apply_load_force(
+        par[PAR_WEIGHT] + external, x, v, dx, elapsed, state, par)
+
+
+@compiled
+def valve_flows(fill, vent, p, supply, par):
+    """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
+    flow_in = 0.0
+    flow_out = 0.0
+    if fill > 0.0:
+        flow_in = fill * mass_flow_kg_per_s(
+            supply, p, par[PAR_CONDUCTANCE], par[PAR_CRITICAL_RATIO])
+    if vent > 0.0:
+        flow_out = vent * mass_flow_kg_per_s(
+            p, par[PAR_ATMOSPHERE], par[PAR_CONDUCTANCE], par[PAR_CRITICAL_RATIO])
+    return flow_in, flow_out
+
+
+@compiled
+def ppr_pressures(voltage, h, state, par):
+    """Return the PPR pressure [Pa] at the middle and the end of a physics step."""
+    p = state[S_PRESSURE]
+    x = state[S_CONTRACTION]
+    target, time_constant = apply_set_point(
+        set_point_pa(voltage, par[PAR_GAIN_PPR], par[PAR_ATMOSPHERE]),
+        par[PAR_TIME_CONSTANT], p, x, state, par)
+    if not pressure_rate_active(par):
+        decay = par[PAR_DECAY_HALF]
+        if time_constant != par[PAR_TIME_CONSTANT]:
+            decay = math.exp(-0.5 * h / time_constant)
+        middle = target + (p - target) * decay
+        return middle, target + (middle - target) * decay
+    middle = p
+    for half in range(2):
+        q = 0.5 * h
+        p = middle
+        k1 = apply_pressure_rate((target - p) / time_constant, p, x, state, par)
+        y = p + 0.5 * q * k1
+        k2 = apply_pressure_rate((target - y) / time_constant, y, x, state, par)
+        y = p + 0.5 * q * k2
+        k3 = apply_pressure_rate((target - y) / time_constant, y, x, state, par)
+        y = p + q * k3
+        k4 = apply_pressure_rate((target - y) / time_constant, y, x, state, par)
+        y = p + q / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        if half == 0:
+            middle = y
+        p = y
+    return middle, p
+
+
+@compiled
+def latch_pulses(fill, vent, state, par):
+    """Fix both valves' edges for the PWM period that begins now."""
+    period = par[PAR_PWM_PERIOD]
+    open_s, close_s = apply_switch_times(0.0, 0.0, state, par)
+    on, off = pulse_edges(clip_duty(fill) * period, state[S_FILL_OFF], period, open_s, close_s)
+    state[S_FILL_ON] = on
+    state[S_FILL_OFF] = off
+    on, off = pulse_edges(clip_duty(vent) * period, state[S_VENT_OFF], period, open_s, close_s)
+    state[S_VENT_ON] = on
+    state[S_VENT_OFF] = off
+
+
+@compiled
+def openings(fill, vent, time_s, h, state, par):
+    """Return the mean openings of both valves over one physics step."""
+    period = par[PAR_PWM_PERIOD]
+    if par[PAR_VALVE] == VALVE_HSV_AVERAGED:
+        return apply_opening(clip_duty(fill), clip_duty(vent), period, state, par)
+    clock = time_s - apply_clock_shift(0.0, state, par)
+    index = math.floor(clock / period + 1e-9)
+    start = max(clock - index * period, 0.0)
+    if index != state[S_PERIOD]:
+        latch_pulses(fill, vent, state, par)
+        state[S_PERIOD] = index
+    end = start + h
+    stop = end if end < period else period
+    fill_s = open_time_in(start, stop, state[S_FILL_ON], state[S_FILL_OFF])
+    vent_s = open_time_in(start, stop, state[S_VENT_ON], state[S_VENT_OFF])
+    if end > period * (1.0 + 1e-9):      # the step reaches into the next period
+        latch_pulses(fill, vent, state, par)
+        state[S_PERIOD] = index + 1.0
+        fill_s += open_time_in(0.0, end - period, state[S_FILL_ON], state[S_FILL_OFF])
+        vent_s += open_time_in(0.0, end - period, state[S_VENT_ON], state[S_VENT_OFF])
+    return fill_s / h, vent_s / h
+
+
+@compiled
+def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
+    """
+    Advance valve, muscle and load by one physics step.
+
+    Dry friction is held at its level and direction during the step; where the
+    velocity changes sign, the instant is located and the mass sticks if the
+    friction can hold it there.
+    """
+    h = par[PAR_SUBSTEP]
+    g = 0.5 * h
+    x0 = state[S_CONTRACTION]
+    v0 = state[S_VELOCITY]
+    p1 = state[S_PRESSURE]
+    m0 = state[S_AIR_MASS]
+    free = par[PAR_FREE_LOAD] != 0.0
+    is_ppr = par[PAR_VALVE] == VALVE_PPR
+    mass = par[PAR_MASS]
+    top = par[PAR_MAX_CONTRACTION]
+    rt = par[PAR_RT]
+
+    # Valve at the start of the step.
+    fill = 0.0
+    vent = 0.0
+    supply = apply_supply(par[PAR_SUPPLY], state, par)
+    state[S_SUPPLY] = supply
+    p2 = p1
+    p3 = p1
+    p4 = p1
+    in1 = 0.0
+    in2 = 0.0
+    in3 = 0.0
+    in4 = 0.0
+    out1 = 0.0
+    out2 = 0.0
+    out3 = 0.0
+    out4 = 0.0
+    q1 = 0.0
+    q2 = 0.0
+    q3 = 0.0
+    q4 = 0.0
+    if is_ppr:
+        p2, p4 = ppr_pressures(signal_0, h, state, par)
+        p3 = p2
+    else:
+        fill, vent = openings(signal_0, signal_1, time_s, h, state, par)
+
+    # Dry friction of this step: direction and level.
+    level = 0.0
+    dry = 0.0
+    stuck = False
+    a1 = 0.0
+    if free:
+        level = apply_muscle_friction(0.0, p1, x0, v0, state, par) + apply_load_friction(
+            0.0, x0, v0, state, par)
+        net = state[S_MUSCLE_FORCE] - load_force(x0, v0, 0.0, 0.0, external, state, par)
+        if level > 0.0:
+            if v0 != 0.0:
+                dry = math.copysign(level, v0)
+            elif abs(net) <= level:
+                stuck = True
+            else:
+                dry = math.copysign(level, net)
+        if not stuck:
+            a1 = acceleration(net - dry, x0, v0, mass, top)
+        v_mean = v0
+    else:
+        v_mean = (x_target - x0) / h
+    moving = free and not stuck
+    drift = 0.0 if free else v_mean       # slope of a prescribed motion
+
+    # Stage 1, 2, 3, 4 of Runge-Kutta: air mass m, contraction x, velocity v.
+    x2 = x0 + g * (v0 if moving else drift)
+    v2 = v0 + g * a1
+    if not is_ppr:
+        in1, out1 = valve_flows(fill, vent, p1, supply, par)
+        q1 = apply_mass_flow(in1 - out1, p1, x0, supply, state, par)
+        p2 = (m0 + g * q1) * rt / air_volume(p1, x2, state, par)
+        in2, out2 = valve_flows(fill, vent, p2, supply, par)
+        q2 = apply_mass_flow(in2 - out2, p2, x2, supply, state, par)
+    a2 = 0.0
+    a3 = 0.0
+    a4 = 0.0
+    x3 = x2
+    v3 = v2
+    if moving:
+        a2 = acceleration(
+            muscle_force(p2, x2, v2, x2 - x0, g, state, par)
+            - load_force(x2, v2, x2 - x0, g, external, state, par) - dry, x2, v2, mass, top)
+        x3 = x0 + g * v2
+        v3 = v0 + g * a2
+    if not is_ppr:
+        p3 = (m0 + g * q2) * rt / air_volume(p2, x3, state, par)
+        in3, out3 = valve_flows(fill, vent, p3, supply, par)
+        q3 = apply_mass_flow(in3 - out3, p3, x3, supply, state, par)
+    x4 = x0 + h * drift
+    v4 = v3
+    if moving:
+        a3 = acceleration(
+            muscle_force(p3, x3, v3, x3 - x0, g, state, par)
+            - load_force(x3, v3, x3 - x0, g, external, state, par) - dry, x3, v3, mass, top)
+        x4 = x0 + h * v3
+        v4 = v0 + h * a3
+    if not is_ppr:
+        p4 = (m0 + h * q3) * rt / air_volume(p3, x4, state, par)
+        in4, out4 = valve_flows(fill, vent, p4, supply, par)
+        q4 = apply_mass_flow(in4 - out4, p4, x4, supply, state, par)
+    x1 = x4
+    v1 = v0
+    if moving:
+        a4 = acceleration(
+            muscle_force(p4, x4, v4, x4 - x0, h, state, par)
+            - load_force(x4, v4, x4 - x0, h, external, state, par) - dry, x4, v4, mass, top)
+        x1 = x0 + h / 6.0 * (v0 + 2.0 * (v2 + v3) + v4)
+        v1 = v0 + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+    elif not free:
+        x1 = x_target
+        v1 = v_mean
+        if v1 != 0.0:
+            state[S_DIRECTION] = math.copysign(1.0, v1)
+
+    # Events: reversal under dry friction, then the end stops.
+    rest = 0.0
+    event = False
+    if dry != 0.0 and v1 * dry < 0.0:
+        share = v0 / (v0 - v1) if v0 != 0.0 else 0.0
+        x1 = x0 + 0.5 * v0 * share * h
+        v1 = 0.0
+        rest = (1.0 - share) * h
+        event = True
+    if moving and (x1 < 0.0 or x1 > top):
+        wall = 0.0 if x1 < 0.0 else top
+        rest = h * (x1 - wall) / (x1 - x0) if x0 != wall and x1 != x0 else 0.0
+        x1 = wall
+        v1 = 0.0
+        event = True
+    elif moving and ((x1 == 0.0 and v1 < 0.0) or (x1 == top and v1 > 0.0)):
+        v1 = 0.0
+    if event and rest > 0.0:
+        # From rest at the event: does the net force pull the mass on within the step?
+        net = muscle_force(p4, x1, 0.0, x1 - x0, h, state, par) - load_force(
+            x1, 0.0, x1 - x0, h, external, state, par)
+        if abs(net) > level:
+            a = acceleration(net - math.copysign(level, net), x1, 0.0, mass, top)
+            v1 = a * rest
+            x1 = x1 + 0.5 * a * rest * rest
+
+    # End of the step.
+    if is_ppr:
+        state[S_PRESSURE] = p4
+    else:
+        sixth = h / 6.0
+        m1 = m0 + sixth * (q1 + 2.0 * (q2 + q3) + q4)
+        state[S_AIR_MASS] = m1
+        state[S_PRESSURE] = m1 * rt / air_volume(p4, x1, state, par)
+        state[S_FILLED] += sixth * (in1 + 2.0 * (in2 + in3) + in4)
+        state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
+    p = state[S_PRESSURE]
+    state[S_CONTRACTION] = x1
+    state[S_VELOCITY] = v1
+    state[S_MUSCLE_FORCE] = muscle_force(p, x1, v1, x1 - x0, h, state, par)
+    apply_commit(p, x1, v1, x1 - x0, h, state, par)
+
+
+@compiled
+def cell_force(external, state, par):
+    """Return (load cell force [N], acceleration [m/s^2]) of the present state."""
+    p = state[S_PRESSURE]
+    x = state[S_CONTRACTION]
+    v = state[S_VELOCITY]
+    force = state[S_MUSCLE_FORCE]
+    inside = apply_muscle_friction(0.0, p, x, v, state, par)
+    if par[PAR_FREE_LOAD] == 0.0:
+        return force - inside * state[S_DIRECTION], 0.0
+    guide = apply_load_friction(0.0, x, v, state, par)
+    against = load_force(x, v, 0.0, 0.0, external, state, par)
+    level = inside + guide
+    net = force - against
+    dry = 0.0
+    if level > 0.0:
+        if v != 0.0:
+            dry = math.copysign(level, v)
+        else:
+            dry = min(max(net, -level), level)
+    a = acceleration(net - dry, x, v, par[PAR_MASS], par[PAR_MAX_CONTRACTION])
+    cell = par[PAR_MASS] * a + against
+    if guide > 0.0:
+        cell += dry * guide / level
+    return cell, a
+
+
+@compiled
+def observe(state, par, inp, out):
+    """Fill ``out`` from ``state`` without advancing anything."""
+    p = state[S_PRESSURE]
+    x = state[S_CONTRACTION]
+    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
+    out[OUT_TIME] = state[S_TIME]
+    out[OUT_VELOCITY] = state[S_VELOCITY]
+    if par[PAR_VALVE] == VALVE_PPR:
+        out[OUT_AIR_MASS] = p * air_volume(p, x, state, par) / par[PAR_RT]
+    else:
+        out[OUT_AIR_MASS] = state[S_AIR_MASS]
+    out[OUT_SUPPLY] = state[S_SUPPLY]
+    out[OUT_TRUE_PRESSURE] = p
+    out[OUT_TRUE_CONTRACTION] = x
+    out[OUT_TRUE_FORCE] = force
+    out[OUT_FILLED] = state[S_FILLED]
+    out[OUT_VENTED] = state[S_VENTED]
+    out[OUT_ACCELERATION] = a
+    read_p, read_x, read_f = apply_sensor(p, x, force, state, par)
+    out[OUT_PRESSURE] = read_p
+    out[OUT_CONTRACTION] = read_x
+    out[OUT_FORCE] = read_f
+
+
+@compiled
+def step_body(state, par, inp, out):
+    """Advance ``state`` by one step of ``par[PAR_DT]`` and fill ``out``."""
+    dt = par[PAR_DT]
+    signal_0, signal_1 = apply_command(inp[INP_SIGNAL_0], inp[INP_SIGNAL_1], dt, state, par)
+    count = int(par[PAR_SUBSTEPS])
+    h = par[PAR_SUBSTEP]
+    start = state[S_CONTRACTION]
+    travel = inp[INP_CONTRACTION] - start
+    for j in range(count):
+        target = inp[INP_CONTRACTION] if j == count - 1 else start + travel * ((j + 1) / count)
+        physics_step(signal_0, signal_1, inp[INP_EXTERNAL_FORCE], target,
+                     state[S_TIME] + j * h, state, par)
+    state[S_STEPS] += 1.0
+    state[S_TIME] = state[S_STEPS] * dt
+    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
+    apply_sensor_commit(
+        state[S_PRESSURE], state[S_CONTRACTION], force, dt, state, par)
+    observe(state, par, inp, out)

@@ -1,0 +1,110 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the sensors add to the signals of the rig."""
+
+import numpy as np
+from pam_sim.parameters import check_parameters, Parameter
+
+SENSOR_PARAMETERS = (
+    Parameter('pressure_noise_pa', 'Pa', 0.0, 0.0, 1e5, description='White noise, 1 sigma.'),
+    Parameter('contraction_noise_m', 'm', 0.0, 0.0, 0.01, description='White noise, 1 sigma.'),
+    Parameter('force_noise_n', 'N', 0.0, 0.0, 100.0, description='White noise, 1 sigma.'),
+    Parameter('pressure_step_pa', 'Pa', 0.0, 0.0, 1e5, description='Quantisation; 0 for none.'),
+    Parameter('contraction_step_m', 'm', 0.0, 0.0, 0.01, description='Quantisation; 0 for none.'),
+    Parameter('force_step_n', 'N', 0.0, 0.0, 100.0, description='Quantisation; 0 for none.'),
+    Parameter('stamp_jitter_s', 's', 0.0, 0.0, 0.01, description='Jitter of the stamp, 1 sigma.'),
+)
+
+
+class SensorChain:
+    """
+    Noise, quantisation and stamp jitter with an explicit seed.
+
+    Parameters
+    ----------
+    settings : mapping of str to float
+        Values of :data:`SENSOR_PARAMETERS`; a ``Rig`` may be given instead.
+        Everything zero (the nominal rig) adds nothing.
+    seed : int
+        Seed of the random numbers.
+
+    Raises
+    ------
+    InputError
+        Unknown or out-of-bound setting.
+
+    """
+
+    def __init__(self, settings=None, seed=0):
+        settings = getattr(settings, 'sensors', settings)
+        self.settings = check_parameters(
+            SENSOR_PARAMETERS, settings or {}, 'sensor setting', 'sensors')
+        self.seed = int(seed)
+        value = self.settings
+        self._sigma = np.array([value['pressure_noise_pa'], value['contraction_noise_m'],
+                                value['force_noise_n'], value['stamp_jitter_s']])
+        self._step = (value['pressure_step_pa'], value['contraction_step_m'],
+                      value['force_step_n'])
+        self._random = np.random.default_rng(self.seed)
+        self._adds_noise = bool(np.any(self._sigma))
+
+    def read(self, time_s, pressure_pa, contraction_m, force_n):
+        """
+        Return one reading.
+
+        Parameters
+        ----------
+        time_s : float
+            Time of the sample, s; the noise is a sequence, not a function of it.
+        pressure_pa, contraction_m, force_n : float
+            Signals at that time, Pa absolute, m, N.
+
+        Returns
+        -------
+        tuple
+            (pressure [Pa absolute], contraction [m], force [N], stamp jitter [ns] as int).
+
+        """
+        reading = [pressure_pa, contraction_m, force_n]
+        jitter_ns = 0
+        if self._adds_noise:
+            noise = self._random.standard_normal(4) * self._sigma
+            reading = [signal + float(part) for signal, part in zip(reading, noise)]
+            jitter_ns = int(round(float(noise[3]) * 1e9))
+        for index, step in enumerate(self._step):
+            if step > 0.0:
+                reading[index] = round(reading[index] / step) * step
+        return (*reading, jitter_ns)
+
+    def read_all(self, time_s, pressure_pa, contraction_m, force_n):
+        """
+        Return readings of whole arrays, the same numbers as sample by sample.
+
+        Parameters
+        ----------
+        time_s, pressure_pa, contraction_m, force_n : ndarray, shape (N,)
+
+        Returns
+        -------
+        tuple of ndarray
+            As :meth:`read`; the jitter is int64 nanoseconds.
+
+        """
+        rows = [self.read(*sample) for sample in zip(
+            np.asarray(time_s, float).tolist(), np.asarray(pressure_pa, float).tolist(),
+            np.asarray(contraction_m, float).tolist(), np.asarray(force_n, float).tolist())]
+        columns = list(zip(*rows)) if rows else [(), (), (), ()]
+        return (*(np.array(column, dtype=float) for column in columns[:3]),
+                np.array(columns[3], dtype=np.int64))

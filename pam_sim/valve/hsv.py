@@ -1,0 +1,82 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Pair of high-speed on/off valves (HSV): fill from the supply, vent to atmosphere.
+
+Two fidelities. Averaged: the mean opening equals the duty. Switching: each
+valve is open or shut; a PWM period latches the duty at its start, and the
+share of a 0.1 ms step in which a valve is open is exact.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.parameters import Parameter
+
+NAME = 'hsv'
+SIGNAL_NAMES = ('fill_duty', 'vent_duty')
+FIDELITIES = ('averaged', 'switching')
+SWITCHING_STEP_S = 1e-4
+
+PARAMETERS = (
+    Parameter('C', 'm3/(s Pa)', 2.0e-10, 1e-12, 1e-8, 0.02,
+              'Sonic conductance of each valve with its restrictor.', 'ISO 6358; fitted restrictor'),
+    Parameter('b', '-', 0.38, 0.05, 0.9, 0.0,
+              'Critical pressure ratio of each valve.', 'ISO 6358; MHJ10-class valves'),
+    Parameter('V_dead', 'm3', 3.0e-6, 0.0, 1e-3, 0.02,
+              'Volume of tube and fittings beside the muscle.', 'design value'),
+    Parameter('supply_pa', 'Pa', 801_325.0, 150e3, 1.6e6, 0.005,
+              'Supply pressure, absolute.', 'design value'),
+    Parameter('pwm_period_s', 's', 0.010, 0.001, 0.1, 0.0,
+              'Period of the pulse width modulation.', 'design value'),
+)
+
+
+@compiled
+def clip_duty(duty):
+    """Return a duty limited to 0 … 1."""
+    return min(max(duty, 0.0), 1.0)
+
+
+@compiled
+def open_time_in(start_s, end_s, on_s, off_s):
+    """Return how long [s] a valve open from ``on_s`` to ``off_s`` is open in [start, end]."""
+    overlap = min(end_s, off_s) - max(start_s, on_s)
+    return overlap if overlap > 0.0 else 0.0
+
+
+@compiled
+def pulse_edges(pulse_s, last_off_s, period_s, open_time_s, close_time_s):
+    """
+    Return (on, off) edges [s] of one valve in the PWM period that begins now.
+
+    Parameters
+    ----------
+    pulse_s : float
+        Energised time, duty x period.
+    last_off_s : float
+        Closing edge in the period before, from that period's start.
+    period_s : float
+    open_time_s, close_time_s : float
+        Delay from energising to open and from de-energising to shut, s. A
+        pulse shorter than the first is swallowed; a valve not yet shut stays open.
+
+    """
+    carry = max(last_off_s - period_s, 0.0)
+    if pulse_s <= 0.0:
+        return 0.0, carry
+    if carry > 0.0:
+        return 0.0, max(carry, pulse_s + close_time_s)
+    if pulse_s <= open_time_s:
+        return 0.0, 0.0
+    return open_time_s, pulse_s + close_time_s
