@@ -56,6 +56,7 @@ TEST_REQUIRES = [
     'mcap-ros2-support>=0.5',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
+    'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
 ]
 
 

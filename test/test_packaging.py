@@ -42,8 +42,9 @@ EXECUTABLES = (
 DISTRIBUTIONS = {'yaml': 'pyyaml'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
 ROSDEP_KEYS = {
-    'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support', 'numba': 'python3-numba',
-    'numpy': 'python3-numpy', 'rosbags': 'python3-rosbags-pip', 'scipy': 'python3-scipy',
+    'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
+    'numba': 'python3-numba', 'numpy': 'python3-numpy', 'rosbags': 'python3-rosbags-pip',
+    'scipy': 'python3-scipy',
     'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml', 'zstandard': 'mcap-ros2-support',
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
