@@ -1,0 +1,82 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the controller nodes share: measurements and reference in, pressure command out."""
+
+from pam_actuation.control.tick import REASONS
+from pam_actuation.messages import Pressure
+from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.diagnostics import WARN
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+
+from pam_sim.units import P_ATM_PA
+
+OK_REASON = REASONS[0]
+INPUTS = ('reference_trajectory', 'reference', 'pressure', 'force', 'contraction')
+
+
+class ControllerNode(ManagedNode):
+    """Call a control law at its rate; on every way out command atmospheric pressure."""
+
+    DEFAULT_CONTROLLER = ''
+    PARAMETERS = (
+        NodeParameter(
+            'controller', '', 'Controller preset, or path of a controller file. Empty: the '
+            'preset that fits the valve.'),
+        NodeParameter(
+            'rig', 'dmsp_5_300_realistic', 'Rig the controller is made for: preset or path.'),
+        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+    )
+
+    learning = False
+
+    def setup(self):
+        """Load the controller, create the topics."""
+        from pam_actuation.control.config import load_controller
+        from pam_actuation.control.loop import ControllerLoop
+        from pam_sim import load_rig
+        valve = self.value('valve_type')
+        rig = load_rig(self.value('rig'), valve=valve)
+        name = self.value('controller') or self.DEFAULT_CONTROLLER.format(valve=valve)
+        self.controller = load_controller(name, rig)
+        self.loop = ControllerLoop(self.controller)
+        self.add_publisher('pressure_command')
+        self.add_publisher('controller_state')
+        self.inputs = [
+            (topic, self.add_subscription(topic), getattr(self.loop, f'on_{topic}'))
+            for topic in INPUTS]
+
+    def start(self):
+        """Begin without memory of a former run; what was learned stays."""
+        self.add_loop(1.0 / self.controller.rate_hz)
+
+    def tick(self):
+        """Take the newest inputs, compute, send command and internals."""
+        for topic, subscription, handler in self.inputs:
+            for message, _ in subscription.take():
+                handler(from_ros(topic, message))
+        command, state = self.loop.tick(self.now_ns(), self.learning)
+        self.send('pressure_command', command)
+        self.send('controller_state', state)
+        if self.loop.reason == OK_REASON:
+            self.diagnostics.update(OK, 'following the reference')
+        else:
+            self.diagnostics.update(WARN, self.loop.reason)
+
+    def safe_stop(self, why):
+        """Command atmospheric pressure: the driver vents."""
+        if self.publishers_counted:
+            self.send('pressure_command', Pressure(self.now_ns(), P_ATM_PA))

@@ -1,0 +1,77 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The health of a node on ``/diagnostics``.
+
+One status per node: its name is the full node name, its message the reason for its
+level. It is sent at a steady pace and at once when level or message change. The
+values hold how many messages each publisher of the node has sent
+(``published.<topic>``), by which a recording proves that it is complete.
+"""
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from pam_actuation.messages import Status
+from pam_actuation.nodes.conversions import diagnostic_array
+from pam_actuation.nodes.endpoints import CountedPublisher
+
+OK, WARN, ERROR, STALE = 0, 1, 2, 3
+SHORTEST_INTERVAL_NS = 20_000_000    # a message that changes with every tick is not a flood
+
+
+class DiagnosticsReporter:
+    """
+    Publish the status of one node.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        Gives full name, clock, ``publishers`` and ``diagnostic_values()``.
+
+    """
+
+    def __init__(self, node):
+        self._node = node
+        self.publisher = CountedPublisher(node, DiagnosticArray, '/diagnostics')
+        self.level = OK
+        self.message = 'starting'
+        self.values = ()
+        self.silent = True
+        self._sent = None
+        self._sent_ns = 0
+
+    def update(self, level, message, values=()):
+        """Set the state; send it at once when level or message changed."""
+        self.level, self.message, self.values = level, message, values
+        if (level, message) != self._sent:
+            now_ns = self._node.now_ns()
+            worse = self._sent is None or level != self._sent[0]
+            if worse or now_ns - self._sent_ns >= SHORTEST_INTERVAL_NS:
+                self.send()
+
+    def send(self):
+        """Send the state now, unless the node is to keep silent."""
+        if self.silent:
+            return
+        now_ns = self._node.now_ns()
+        self._sent, self._sent_ns = (self.level, self.message), now_ns
+        self.publisher.publish(diagnostic_array(Status(
+            now_ns, self.level, self._node.get_fully_qualified_name(), self.message,
+            (*self.values, *self._node.diagnostic_values(), *self._counts()))))
+
+    def _counts(self):
+        """Return the counts of all publishers; the status being sent counts itself."""
+        counts = [(f'published.{one.topic}', one.count) for one in self._node.publishers_counted]
+        return (*counts, (f'published.{self.publisher.topic}', self.publisher.count + 1))

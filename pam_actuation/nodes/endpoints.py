@@ -1,0 +1,172 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Publishers that count what they sent and subscriptions that are read when needed.
+
+A control loop needs the newest inputs once per tick, not a callback per message:
+``PolledSubscription`` keeps the executor asleep between ticks and takes what has
+arrived when the loop asks, each with the time it was received.
+"""
+
+import time
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
+
+from pam_actuation.nodes import qos
+
+
+class CountedPublisher:
+    """
+    Publish on one topic and count.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    message_type : type
+    topic : str
+        Relative or absolute name; ``topic`` holds the resolved full name.
+
+    """
+
+    def __init__(self, node, message_type, topic):
+        self._publisher = node.create_publisher(
+            message_type, topic, qos.PUBLISHER,
+            qos_overriding_options=None if topic.startswith('/') else qos.overridable())
+        self._node = node
+        self.topic = self._publisher.topic_name
+        self.count = 0
+
+    def publish(self, message):
+        """Send a ROS message (or serialized bytes) and count it."""
+        self._publisher.publish(message)
+        self.count += 1
+
+    def matched_with(self, subscriber):
+        """
+        Tell whether messages sent from now on reach the named node and all others known.
+
+        Parameters
+        ----------
+        subscriber : str
+            Full name of a node, such as ``/muscle/experiment_recorder``.
+
+        """
+        endpoints = self._node.get_subscriptions_info_by_topic(self.topic)
+        names = [full_name(end.node_namespace, end.node_name) for end in endpoints]
+        return subscriber in names and self._publisher.get_subscription_count() >= len(names)
+
+    def wait_for_all_acked(self, timeout_s):
+        """Wait until every subscriber has confirmed what was sent; return whether all did."""
+        return self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+
+    def destroy(self):
+        """Remove the publisher from its node."""
+        self._node.destroy_publisher(self._publisher)
+
+
+class _NeverExecuted(CallbackGroup):
+    """A group whose members the executor neither waits for nor runs."""
+
+    def can_execute(self, entity):
+        return False
+
+    def beginning_execution(self, entity):
+        return False
+
+    def ending_execution(self, entity):
+        pass
+
+
+class PolledSubscription:
+    """
+    Subscribe without a callback; ``take`` returns what has arrived since the last call.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    message_type : type
+    topic : str
+    profile : rclpy.qos.QoSProfile, optional
+    raw : bool
+        Return serialized bytes instead of message objects.
+
+    """
+
+    def __init__(self, node, message_type, topic, profile=None, raw=False):
+        self._node = node
+        self._subscription = node.create_subscription(
+            message_type, topic, _unused, profile or qos.CONSUMER,
+            callback_group=_NeverExecuted(), raw=raw,
+            qos_overriding_options=None if topic.startswith('/') else qos.overridable())
+        self._type = message_type
+        self._raw = raw
+        self.topic = self._subscription.topic_name
+        self.received = 0
+
+    def take(self, limit=2000):
+        """
+        Return a list of (message, info) in order of arrival, at most ``limit``.
+
+        ``info`` is rclpy's dictionary with ``source_timestamp``, ``received_timestamp`` [ns]
+        and ``publication_sequence_number``.
+        """
+        taken = []
+        handle = self._subscription.handle
+        with handle:
+            while len(taken) < limit:
+                item = handle.take_message(self._type, self._raw)
+                if item is None:
+                    break
+                taken.append(item)
+        self.received += len(taken)
+        return taken
+
+    @property
+    def publishers(self):
+        """Return the number of publishers this subscription is matched with."""
+        return self._subscription.get_publisher_count()
+
+    def destroy(self):
+        """Remove the subscription from its node."""
+        self._node.destroy_subscription(self._subscription)
+
+
+def _unused(message):
+    """Stand in for the callback a subscription must have."""
+
+
+def full_name(namespace, name):
+    """Return the full name of a node or topic in a namespace."""
+    return f'{namespace.rstrip("/")}/{name}'
+
+
+def wait_until_matched(publishers, subscriber, timeout_s=5.0, stopping=lambda: False):
+    """
+    Wait until every publisher reaches the named subscriber, so that no message is lost.
+
+    Returns
+    -------
+    list of str
+        Topics that were not matched in time; empty when all are.
+
+    """
+    deadline = time.monotonic() + timeout_s
+    open_ones = list(publishers)
+    while open_ones and not stopping() and time.monotonic() < deadline:
+        open_ones = [one for one in open_ones if not one.matched_with(subscriber)]
+        if open_ones:
+            time.sleep(0.01)
+    return [one.topic for one in open_ones]

@@ -1,0 +1,227 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorder on ROS: every message of the rig, as it came, into a bag."""
+
+import json
+import sys
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from pam_actuation.bags.codecs import TOPIC_TYPES
+from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.recorder import RecorderCore
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.plant_simulator import MAX_SEED
+from pam_actuation.nodes.runner import run
+from pam_sim.errors import InputError
+
+TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
+QUIET_S = 0.15              # nothing for this long: all that was sent has arrived
+READY_TIMEOUT_S = 5.0
+FAREWELL_S = 2.0            # stopped together with the others: wait for their last messages
+
+
+class ExperimentRecorder(ManagedNode):
+    """
+    Record while active; each activation writes one bag.
+
+    Messages are taken in serialized form with the times of sending and receiving and
+    the number their publisher gave them, so that losses are seen. When the node is
+    stopped by a signal it goes on until the other nodes are gone (at most 2 s).
+    """
+
+    NAME = 'experiment_recorder'
+    STUCK_AFTER_S = 30.0        # the disk may be slow
+    PARAMETERS = (
+        NodeParameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
+        NodeParameter('overwrite', False, 'Replace an existing bag.'),
+        NodeParameter(
+            'topics', list(TOPIC_TYPES), 'Topics to record, relative to the namespace '
+            '(diagnostics is /diagnostics).'),
+        NodeParameter(
+            'await_topics', [''], 'Activation waits for the publishers of these topics.'),
+        NodeParameter(
+            'metadata_file', '', 'JSON file of texts for the record pam_experiment. Empty: '
+            'made from the parameters below.'),
+        NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
+        NodeParameter('rig', '', 'Rig preset, or path of its file.'),
+        NodeParameter('controller', '', 'Controller preset, or path of its file.'),
+        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        NodeParameter('seed', 0, 'Seed of the simulated sensors.', 0, MAX_SEED),
+    )
+
+    core = None
+
+    def check(self):
+        """Refuse topics that are not known."""
+        for name in ('topics', 'await_topics'):
+            for topic in self.value(name):
+                if topic and topic not in TOPIC_TYPES:
+                    raise InputError(
+                        f'{topic!r} is not a topic of the rig; known are '
+                        f'{", ".join(TOPIC_TYPES)}', f'parameter {name}')
+
+    def setup(self):
+        """Read the metadata, subscribe."""
+        self.metadata = self._metadata()
+        self.sources = {}
+        for topic in self.value('topics'):
+            if topic == 'diagnostics':
+                source = PolledSubscription(
+                    self, DiagnosticArray, '/diagnostics', qos.RECORDER, raw=True)
+                self.subscriptions_polled.append(source)
+            else:
+                source = self.add_subscription(topic, profile=qos.RECORDER, raw=True)
+            self.sources[topic] = source
+
+    def _metadata(self):
+        path = self.value('metadata_file')
+        if path:
+            try:
+                with open(path, encoding='utf-8') as stream:
+                    return json.load(stream)
+            except (OSError, ValueError) as error:
+                raise InputError(f'cannot be read: {error}', path) from None
+        valve = self.value('valve_type')
+        experiment = rig = controller = None
+        if self.value('experiment'):
+            from pam_actuation.experiments import load_experiment
+            experiment = load_experiment(self.value('experiment'))
+        if self.value('rig'):
+            from pam_sim import load_rig
+            rig = load_rig(self.value('rig'), valve=valve)
+        if self.value('controller'):
+            from pam_actuation.control.config import load_controller
+            controller = load_controller(self.value('controller'), rig)
+        return experiment_metadata(
+            experiment, rig, controller, valve, self.value('seed'), origin='live')
+
+    def start(self):
+        """Open the bag; wait until the publishers asked for are connected."""
+        writer = BagWriter(
+            self.value('output'), {'pam_experiment': self.metadata},
+            overwrite=self.value('overwrite'))
+        self.core = RecorderCore(writer)
+        self.known = set()
+        for source in self.sources.values():
+            source.take()               # what came before belongs to no recording
+        missing = self._wait_for_publishers()
+        if missing:
+            self.get_logger().warning(f'nobody publishes {", ".join(missing)} yet')
+        self.get_logger().info(f'ready, recording to {self.value("output")}')
+        self.add_loop(TAKE_PERIOD_S)
+
+    def _wait_for_publishers(self):
+        deadline = time.monotonic() + READY_TIMEOUT_S
+        while True:
+            missing = [topic for topic in self.value('await_topics')
+                       if topic and not self._connected(self.sources[topic])]
+            if not missing or self.stopping or time.monotonic() > deadline:
+                return missing
+            time.sleep(0.01)
+
+    def _connected(self, source):
+        return source.publishers >= max(self.count_publishers(source.topic), 1)
+
+    def tick(self):
+        """Hand over what arrived."""
+        self._take_all()
+        if self.core.write_error:
+            self.diagnostics.update(ERROR, self.core.write_error)
+            return
+        lost = sum(counts.lost or 0 for counts in self.core.counts.values())
+        dropped = sum(counts.dropped for counts in self.core.counts.values())
+        if lost or dropped:
+            self.diagnostics.update(
+                ERROR, f'recording, but {lost} messages were lost and {dropped} dropped')
+        else:
+            self.diagnostics.update(OK, 'recording')
+
+    def _take_all(self):
+        """Take what arrived on all topics; return how many messages it was."""
+        taken = 0
+        receive = self.core.receive
+        for topic, source in self.sources.items():
+            messages = source.take()
+            if not messages:
+                continue
+            name = source.topic
+            if name not in self.known:
+                self.core.add_topic(name, TOPIC_TYPES[topic])
+                self.known.add(name)
+            for data, info in messages:
+                receive(name, data, info['source_timestamp'], info['received_timestamp'],
+                        info['publication_sequence_number'])
+            taken += len(messages)
+        return taken
+
+    def stop(self):
+        """Take the last messages, finish the bag, say whether it is complete."""
+        if self.core is None:
+            return
+        self._take_last()
+        summary = self.core.close()
+        self.core = None
+        if summary.complete:
+            self.get_logger().info(
+                f'{summary.written} messages recorded, none lost: {summary.path}')
+            return
+        self.result_code = 1
+        self.get_logger().error(summary.write_error or (
+            f'{summary.lost} messages lost and {summary.dropped} dropped, '
+            f'{summary.written} recorded: {summary.path}'))
+
+    def _take_last(self):
+        begin = last = time.monotonic()
+        while True:
+            now = time.monotonic()
+            if self._take_all():
+                last = now
+            farewell = self.stopping and now - begin < FAREWELL_S and self._others_publish()
+            if now - last > QUIET_S and not farewell or now - begin > FAREWELL_S:
+                return
+            time.sleep(0.01)
+
+    def _others_publish(self):
+        own = {'/diagnostics': 1}
+        return any(source.publishers > own.get(source.topic, 0)
+                   for source in self.sources.values())
+
+    def diagnostic_values(self):
+        """Add what was recorded."""
+        values = super().diagnostic_values()
+        if self.core is None:
+            return values
+        rows = [('queued', self.core.queued)]
+        for name, counts in self.core.counts.items():
+            rows.append((f'recorded.{name}', counts.received - counts.dropped))
+            if counts.lost:
+                rows.append((f'lost.{name}', counts.lost))
+        return (*values, *rows)
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(ExperimentRecorder, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

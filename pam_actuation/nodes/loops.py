@@ -1,0 +1,78 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Periodic work on the steady clock, without an executor's cost per tick.
+
+rclpy's executor rebuilds its list of everything a node owns for every wake-up, which
+takes longer than a tick of a control loop. The loops of a node therefore run in the main
+thread on plain sleeps, and the executor serves services and parameters in a
+thread of its own, asleep until something is asked. A lock keeps the two apart.
+"""
+
+import threading
+import time
+
+LONGEST_SLEEP_NS = 100_000_000     # how soon an idle node notices that it is to end
+
+
+class Loop:
+    """One callback every ``period_ns``; ticks that were missed are not made up for."""
+
+    def __init__(self, period_ns, callback, now_ns):
+        self.period_ns = period_ns
+        self.callback = callback
+        self.next_ns = now_ns + period_ns
+
+    def advance(self, now_ns):
+        """Set the time of the next tick, in step with the former ones."""
+        late_ns = now_ns - self.next_ns
+        self.next_ns += self.period_ns * (1 + max(late_ns, 0) // self.period_ns)
+
+
+class LoopSet:
+    """The loops of a node; ``lock`` is held while one of them runs."""
+
+    def __init__(self):
+        self.lock = threading.RLock()
+        self._loops = []
+
+    def __bool__(self):
+        """Tell whether there is any loop."""
+        return bool(self._loops)
+
+    def add(self, period_s, callback):
+        """Call ``callback`` every ``period_s`` from now on."""
+        with self.lock:
+            self._loops.append(Loop(round(period_s * 1e9), callback, time.monotonic_ns()))
+
+    def clear(self):
+        """End all loops."""
+        with self.lock:
+            self._loops = []
+
+    def run_once(self):
+        """Sleep until the next tick is due, at most 0.1 s, and run what is due."""
+        now_ns = time.monotonic_ns()
+        loops = self._loops
+        wake_ns = min((loop.next_ns for loop in loops), default=now_ns + LONGEST_SLEEP_NS)
+        sleep_ns = min(wake_ns - now_ns, LONGEST_SLEEP_NS)
+        if sleep_ns > 0:
+            time.sleep(sleep_ns * 1e-9)
+        with self.lock:
+            now_ns = time.monotonic_ns()
+            for loop in self._loops:
+                if loop.next_ns <= now_ns:
+                    loop.advance(now_ns)
+                    loop.callback()

@@ -1,0 +1,299 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The managed node all nodes of the rig are made from.
+
+States and what they mean: *configure* reads the parameters and builds the plain
+objects with safe outputs; *activate* starts the loop from the present state;
+*deactivate* stops it and makes the output safe; *cleanup* drops everything;
+*shutdown* from any state makes the output safe. A node started by plain
+``ros2 run`` goes to active by itself; with ``autostart:=false`` it waits for
+``change_state``. An exception in a transition or in the loop is logged, makes the
+output safe and ends the node's work.
+"""
+
+import gc
+import time
+import traceback
+
+from pam_actuation.nodes.diagnostics import DiagnosticsReporter
+from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.endpoints import CountedPublisher
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.endpoints import wait_until_matched
+from pam_actuation.nodes.conversions import MESSAGE_TYPES
+from pam_actuation.nodes.conversions import RosWriter
+from pam_actuation.nodes.loops import LoopSet
+from pam_actuation.nodes.parameters import declare
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.timing import LoopTiming
+from rclpy.lifecycle import LifecycleNode
+from rclpy.lifecycle import TransitionCallbackReturn
+
+from pam_sim.errors import InputError
+
+COMMON_PARAMETERS = (
+    NodeParameter('autostart', True, 'Configure and activate without being told to.'),
+    NodeParameter(
+        'await_subscriber', '',
+        'Full name of a node that must receive every message, such as the recorder; '
+        'activation waits for it. Empty: none.'),
+    NodeParameter(
+        'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
+    NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),
+)
+
+
+class ManagedNode(LifecycleNode):
+    """
+    A lifecycle node with one loop, counted publishers and diagnostics.
+
+    Derived nodes set ``NAME`` and ``PARAMETERS`` and override ``check``, ``setup``, ``start``,
+    ``tick``, ``safe_stop``, ``stop`` and ``teardown`` as far as they need them.
+    """
+
+    NAME = ''
+    STUCK_AFTER_S = 2.0         # how long the way out may take
+    PARAMETERS = ()
+
+    def __init__(self, **kwargs):
+        self.publishers_counted = []
+        self.exit_code = None       # not None: the process is to end now, with this code
+        self.result_code = 0        # with which it ends otherwise
+        self.stopping = False
+        self.input_error = None     # the user's mistake that stopped the last transition
+        self.timing = None
+        self._writers = {}
+        self.subscriptions_polled = []
+        self.loops = LoopSet()
+        super().__init__(self.NAME, **kwargs)
+        self._refuse_impossible_transitions()
+        declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS))
+        self.diagnostics = DiagnosticsReporter(self)
+        self.diagnostics.silent = bool(self.value('await_subscriber'))
+        self.check()
+
+    # What derived nodes override.
+
+    def check(self):
+        """Raise InputError if the parameters given at start do not make sense."""
+
+    def setup(self):
+        """Build the plain objects, publishers and subscriptions (configure)."""
+
+    def start(self):
+        """Prepare for the first tick (activate)."""
+
+    def tick(self):
+        """Run once per period of the loop."""
+
+    def safe_stop(self, why):
+        """Make the output safe; called on every way out, perhaps more than once."""
+
+    def stop(self):
+        """Finish work after safe output and last diagnostics (deactivate)."""
+
+    def teardown(self):
+        """Drop what ``setup`` built, apart from publishers and subscriptions (cleanup)."""
+
+    def diagnostic_values(self):
+        """Return (key, value) pairs that every status of this node shows."""
+        return self.timing.values() if self.timing else ()
+
+    # What derived nodes use.
+
+    def value(self, name):
+        """Return the value of a parameter."""
+        return self.get_parameter(name).value
+
+    def now_ns(self):
+        """Return the time for stamps [ns]: ROS time, simulated if use_sim_time is set."""
+        return self.get_clock().now().nanoseconds
+
+    def add_publisher(self, topic):
+        """Create the publisher of a topic of the rig; ``send`` publishes on it."""
+        publisher = CountedPublisher(self, MESSAGE_TYPES[topic], topic)
+        self.publishers_counted.append(publisher)
+        self._writers[topic] = (publisher, RosWriter(topic, self.value('muscle')))
+
+    def send(self, topic, plain):
+        """Publish a plain message."""
+        publisher, writer = self._writers[topic]
+        publisher.publish(writer.fill(plain))
+
+    def add_subscription(self, topic, **options):
+        """Create and return a polled subscription of a topic of the rig."""
+        subscription = PolledSubscription(self, MESSAGE_TYPES[topic], topic, **options)
+        self.subscriptions_polled.append(subscription)
+        return subscription
+
+    def add_loop(self, period_s):
+        """Run ``tick`` every ``period_s`` on the steady clock while active."""
+        self.timing = LoopTiming(period_s)
+        self.loops.add(period_s, self._timed_tick)
+
+    def _timed_tick(self):
+        self.timing.begin(time.monotonic_ns())
+        try:
+            self.tick()
+        except Exception as error:
+            self.fail(f'the loop of this node failed: {error}', traceback.format_exc())
+            return
+        self.timing.end(time.monotonic_ns())
+
+    def fail(self, why, details=''):
+        """Make the output safe, say why and end the process with exit code 1."""
+        self.get_logger().error(f'{why}\n{details}' if details else why)
+        self._make_safe(why)
+        self._end_loops()
+        self.diagnostics.update(ERROR, why)
+        self.exit_code = 1
+
+    def _make_safe(self, why):
+        """Call ``safe_stop``; a fault in it must not stop the way out."""
+        try:
+            self.safe_stop(why)
+        except Exception:
+            self.get_logger().error(f'the safe stop failed:\n{traceback.format_exc()}')
+
+    def _end_loops(self):
+        self.loops.clear()
+        if self.timing:
+            self.timing.pause()
+
+    def finish(self, why):
+        """Leave safely from whatever state: the end of every process comes through here."""
+        with self.loops.lock:
+            was_active = bool(self.loops)
+            self._end_loops()
+            self._make_safe(why)
+            if was_active:
+                self._end_work(why)
+                self.get_logger().info(why)
+
+    def _end_work(self, why):
+        self.diagnostics.update(self.diagnostics.level, why)
+        self.diagnostics.send()
+        for publisher in (*self.publishers_counted, self.diagnostics.publisher):
+            publisher.wait_for_all_acked(0.5)
+        self.stop()
+
+    # Transitions: each is wrapped, since rclpy swallows exceptions without a word.
+
+    def on_configure(self, state):
+        """Read parameters, build everything with safe outputs."""
+        return self._transition('configure', self._configure)
+
+    def on_activate(self, state):
+        """Wait for the receivers that must not miss anything, start the loop."""
+        return self._transition('activate', self._activate)
+
+    def on_deactivate(self, state):
+        """Stop the loop, make the output safe."""
+        return self._transition('deactivate', self._deactivate)
+
+    def on_cleanup(self, state):
+        """Drop everything."""
+        return self._transition('cleanup', self._cleanup)
+
+    def on_shutdown(self, state):
+        """Make the output safe and end the process."""
+        self.exit_code = self.exit_code or 0
+        return self._transition('shutdown', self._deactivate)
+
+    def on_error(self, state):
+        """Make the output safe after a failed transition; the node is unconfigured then."""
+        self._end_loops()
+        self._make_safe('a transition failed')
+        return self._transition('recover', self._cleanup)
+
+    def _transition(self, word, action):
+        try:
+            with self.loops.lock:
+                action()
+            return TransitionCallbackReturn.SUCCESS
+        except InputError as error:
+            self.get_logger().error(f'cannot {word}: {error}')
+            self.diagnostics.update(ERROR, f'cannot {word}: {error}')
+            self.input_error = error
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:
+            self.get_logger().error(f'cannot {word}:\n{traceback.format_exc()}')
+            self._end_loops()
+            self._make_safe(f'cannot {word}: {error}')
+            self.diagnostics.update(ERROR, f'cannot {word}: {error}')
+            return TransitionCallbackReturn.ERROR
+
+    def _configure(self):
+        self.input_error = None
+        self.setup()
+        self.diagnostics.update(OK, 'configured, not active')
+
+    def _activate(self):
+        self._await_subscriber()
+        self.start()
+        self.diagnostics.silent = False
+        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send)
+        self.diagnostics.update(OK, 'active')
+        self.get_logger().info('active')
+        gc.collect()
+        gc.freeze()                  # what exists now stays: no long collections in the loop
+
+    def _await_subscriber(self):
+        subscriber = self.value('await_subscriber')
+        if subscriber:
+            publishers = (*self.publishers_counted, self.diagnostics.publisher)
+            missed = wait_until_matched(
+                publishers, subscriber, stopping=lambda: self.stopping)
+            if missed:
+                raise InputError(
+                    f'{subscriber} does not receive {", ".join(missed)}',
+                    'parameter await_subscriber')
+
+    def _deactivate(self):
+        was_active = bool(self.loops)
+        self._end_loops()
+        self._make_safe('deactivated')
+        if was_active:
+            self._end_work('deactivated')
+
+    def _cleanup(self):
+        self.teardown()
+        for publisher in self.publishers_counted:
+            publisher.destroy()
+        for subscription in self.subscriptions_polled:
+            subscription.destroy()
+        self.publishers_counted, self.subscriptions_polled, self._writers = [], [], {}
+
+    def _refuse_impossible_transitions(self):
+        """
+        Answer a transition that the present state does not know with success = false.
+
+        rclpy 7.1 lets the error of the state machine through to the executor, so that one
+        wrong ``ros2 lifecycle set`` would end the node and with it the loop.
+        """
+        service = self._service_change_state
+        original = service.callback
+
+        def change_state(request, response):
+            try:
+                return original(request, response)
+            except Exception as error:
+                self.get_logger().warning(f'refused a transition: {error}')
+                response.success = False
+                return response
+
+        service.callback = change_state

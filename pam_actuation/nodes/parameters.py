@@ -1,0 +1,145 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Declared parameters: one table per node, with description, range and choices.
+
+A node lists ``NodeParameter`` entries; declaring them gives ``ros2 param describe``
+its text and turns a wrong value, at start or live, into one sentence.
+"""
+
+from dataclasses import dataclass
+import difflib
+
+from rcl_interfaces.msg import FloatingPointRange
+from rcl_interfaces.msg import IntegerRange
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import InvalidParameterValueException
+
+from pam_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class NodeParameter:
+    """
+    One parameter of a node.
+
+    ``description`` says what it is and its unit; ``lower`` and ``upper`` bound a number,
+    ``choices`` lists the allowed texts; ``live`` parameters may change while running.
+    """
+
+    name: str
+    default: object
+    description: str
+    lower: float | None = None
+    upper: float | None = None
+    choices: tuple = ()
+    live: bool = False
+
+    @property
+    def allowed(self):
+        """Return what is allowed, for people: ``0.1 to 5.0`` or ``ppr or hsv``."""
+        if self.choices:
+            return ' or '.join(str(choice) for choice in self.choices)
+        if self.lower is not None:
+            return f'{self.lower:g} to {self.upper:g}'
+        return type(self.default).__name__
+
+    def problem(self, value):
+        """Return one sentence on what is wrong with a value, '' when it is fine."""
+        if type(value) is not type(self.default):
+            return f'{value!r} is not allowed, it must be of type {type(self.default).__name__}'
+        if self.choices and value not in self.choices:
+            return f'{value!r} is not allowed, it must be {self.allowed}'
+        if self.lower is not None and not self.lower <= value <= self.upper:
+            return f'{value:g} is not allowed, it must lie in {self.allowed}'
+        return ''
+
+    def descriptor(self):
+        """Return the ROS descriptor."""
+        descriptor = ParameterDescriptor(
+            description=self.description, read_only=not self.live,
+            additional_constraints=f'one of {self.allowed}' if self.choices else '')
+        if self.lower is not None and isinstance(self.default, float):
+            descriptor.floating_point_range = [FloatingPointRange(
+                from_value=float(self.lower), to_value=float(self.upper), step=0.0)]
+        elif self.lower is not None:
+            descriptor.integer_range = [IntegerRange(
+                from_value=int(self.lower), to_value=int(self.upper), step=1)]
+        return descriptor
+
+
+def _check_overrides(node, table):
+    """Raise InputError on a wrong given value; warn of one no parameter is declared for."""
+    for name, override in node._parameter_overrides.items():
+        if name in table:
+            value = override.value
+            if isinstance(table[name].default, float) and type(value) is int:
+                continue                      # `-p rate:=200` is meant as 200.0
+            problem = table[name].problem(value)
+            if problem:
+                raise InputError(problem, f'parameter {name}')
+        elif name != 'use_sim_time' and not name.startswith('qos_overrides.'):
+            near = difflib.get_close_matches(name, table, n=1)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            node.get_logger().warning(f'parameter {name} is not known here, ignored{hint}')
+
+
+def declare(node, parameters):
+    """
+    Declare the parameters of a node and check the values given at start.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    parameters : iterable of NodeParameter
+
+    Raises
+    ------
+    InputError
+        A given value has the wrong type or lies outside what is allowed.
+
+    """
+    table = {parameter.name: parameter for parameter in parameters}
+    _check_overrides(node, table)
+    for parameter in table.values():
+        override = node._parameter_overrides.get(parameter.name)
+        default = parameter.default
+        given_as_integer = (
+            override is not None and type(override.value) is int and isinstance(default, float))
+        try:
+            if given_as_integer:
+                value = float(override.value)
+                problem = parameter.problem(value)
+                if problem:
+                    raise InputError(problem, f'parameter {parameter.name}')
+                node.declare_parameter(
+                    parameter.name, value, parameter.descriptor(), ignore_override=True)
+            else:
+                node.declare_parameter(parameter.name, default, parameter.descriptor())
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            raise InputError(str(error), f'parameter {parameter.name}') from None
+
+    def check(changes):
+        for change in changes:
+            known = table.get(change.name)
+            problem = known.problem(change.value) if known else ''
+            if problem:
+                return SetParametersResult(
+                    successful=False, reason=f'parameter {change.name}: {problem}')
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)

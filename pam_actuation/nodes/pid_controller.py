@@ -1,0 +1,36 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The PID baseline on ROS: same topics as the self-organizing controller, no learning."""
+
+import sys
+
+from pam_actuation.nodes.controller_node import ControllerNode
+from pam_actuation.nodes.runner import run
+
+
+class PidNode(ControllerNode):
+    """Control with fixed gains."""
+
+    NAME = 'pid_controller'
+    DEFAULT_CONTROLLER = 'pid'
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(PidNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,90 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The reference on ROS: what the muscle is asked to do, now and ahead."""
+
+import sys
+
+from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.runner import run
+
+FINISHED = 'finished'      # beginning of the diagnostic message once the experiment is over
+
+
+class ReferenceGenerator(ManagedNode):
+    """
+    Play one experiment; afterwards keep sending its last value.
+
+    An experiment in the pressure domain sends ``pressure_command`` itself and runs
+    without a controller.
+    """
+
+    NAME = 'reference_generator'
+    PARAMETERS = (
+        NodeParameter(
+            'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file.'),
+        NodeParameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
+        NodeParameter(
+            'start_delay_s', 0.0, 'Wait after activation before the experiment starts [s].',
+            0.0, 60.0),
+        NodeParameter('exit_when_finished', False, 'End the process when the experiment is over.'),
+    )
+
+    def setup(self):
+        """Load the experiment, create the topics of its domain."""
+        from pam_actuation.experiments import load_experiment
+        from pam_actuation.experiments.reference import ReferenceLoop
+        self.experiment = load_experiment(self.value('experiment'))
+        self.loop = ReferenceLoop(self.experiment, self.value('rate_hz'))
+        in_pressure = self.experiment.domain == 'pressure'
+        topics = ('pressure_command',) if in_pressure else ('reference', 'reference_trajectory')
+        for topic in topics:
+            self.add_publisher(topic)
+
+    def start(self):
+        """Start the experiment's clock after the delay."""
+        self.begin_ns = self.now_ns() + round(self.value('start_delay_s') * 1e9)
+        self.add_loop(1.0 / self.loop.rate_hz)
+
+    def tick(self):
+        """Send what is due."""
+        now_ns = self.now_ns()
+        if now_ns < self.begin_ns:
+            self.diagnostics.update(OK, 'waiting for the start')
+            return
+        for topic, plain in self.loop.tick(now_ns).items():
+            self.send(topic, plain)
+        if not self.loop.finished(now_ns):
+            self.diagnostics.update(OK, f'playing {self.experiment.name}')
+            return
+        self.diagnostics.update(OK, f'{FINISHED} {self.experiment.name}')
+        if self.value('exit_when_finished'):
+            self.exit_code = 0
+
+    def diagnostic_values(self):
+        """Add how far the experiment is."""
+        loop = getattr(self, 'loop', None)
+        elapsed_s = loop.elapsed_s(self.now_ns()) if loop else 0.0
+        return (*super().diagnostic_values(), ('elapsed_s', f'{elapsed_s:.3f}'))
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(ReferenceGenerator, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,151 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The one main function of all nodes: start, spin, and leave safely on every way out.
+
+rclpy's own signal handlers end the context first, after which nothing can be sent.
+Here signals only ask the loop to end; the safe signal and the last diagnostics go
+out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad input.
+"""
+
+import os
+import signal
+import socket
+import sys
+import threading
+
+from pam_actuation.nodes.diagnostics import WARN
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from pam_sim.errors import InputError
+
+SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+
+
+class _Stopper(threading.Thread):
+    """
+    Learn of a signal in a thread of its own and ask the main thread to end.
+
+    Python runs a handler only between two steps of the main thread, which may hang
+    inside the middleware; the wake-up file tells this thread at once, whichever thread the
+    system chose to interrupt. If the main thread does not end its work within
+    the node's ``STUCK_AFTER_S``, this thread makes the output safe itself and ends the process.
+    """
+
+    def __init__(self):
+        super().__init__(daemon=True, name='signals')
+        self._read_end, write_end = socket.socketpair()
+        write_end.setblocking(False)
+        self._write_end = write_end
+        for number in SIGNALS:
+            signal.signal(number, _noted)
+        signal.set_wakeup_fd(write_end.fileno(), warn_on_full_buffer=False)
+        self.node = None
+        self.reason = ''
+        self.safe = threading.Event()
+
+    def run(self):
+        """Handle the first signal."""
+        number = self._read_end.recv(1)[0]
+        while number not in SIGNALS:
+            number = self._read_end.recv(1)[0]
+        self.reason = f'stopped by {SIGNALS[number]}'
+        self.node.stopping = True
+        if not self.safe.wait(self.node.STUCK_AFTER_S):
+            self.node.safe_stop(f'{self.reason}, the loop did not answer')
+            os._exit(1)
+
+
+def _noted(number, frame):
+    """Stand in for the default action of a signal; the thread above does the work."""
+
+
+def run(node_class, args=None):
+    """
+    Run one node as a process.
+
+    Parameters
+    ----------
+    node_class : type
+        Class made from ``ManagedNode``, built without arguments.
+    args : list of str, optional
+        Command line; default ``sys.argv``.
+
+    Returns
+    -------
+    int
+        Exit code.
+
+    """
+    stopper = _Stopper()
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = node_class()
+    except InputError as error:
+        return _refuse(node_class, error)
+    except Exception as error:
+        if type(error).__name__ in ('UnknownROSArgsError', 'RCLInvalidROSArgsError'):
+            return _refuse(node_class, f'these ROS arguments are not known: {error}')
+        raise
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    serving = threading.Thread(target=_serve, args=(executor,), daemon=True, name='services')
+    stopper.node = node
+    stopper.start()
+    serving.start()
+    try:
+        if node.value('autostart'):
+            _bring_up(node)
+        while not node.stopping and node.exit_code is None:
+            node.loops.run_once()
+    finally:
+        why = stopper.reason or 'ended'
+        node.finish(why)
+        stopper.safe.set()
+        executor.shutdown(timeout_sec=1.0)
+        serving.join(timeout=1.0)
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return node.exit_code or node.result_code
+
+
+def _serve(executor):
+    """Answer services and parameter requests until the executor is shut down."""
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        pass
+
+
+def _bring_up(node):
+    """Configure and activate; a mistake of the user ends the process with exit code 2."""
+    for trigger in (node.trigger_configure, node.trigger_activate):
+        trigger()
+        if node.input_error is not None:
+            node.exit_code = 2
+            return
+        if node.diagnostics.level > WARN or node.exit_code is not None:
+            node.exit_code = node.exit_code or 1
+            return
+
+
+def _refuse(node_class, sentence):
+    """Print one sentence on what was wrong with the command line; return exit code 2."""
+    print(f'{node_class.NAME}: {sentence}', file=sys.stderr)
+    rclpy.try_shutdown()
+    return 2

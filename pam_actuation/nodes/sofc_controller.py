@@ -1,0 +1,109 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The self-organizing fuzzy controller on ROS, with services for its rules."""
+
+import os
+import sys
+
+from pam_actuation.nodes.controller_node import ControllerNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.runner import run
+from pam_sim.errors import InputError
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+
+
+class SofcNode(ControllerNode):
+    """Control with rules that change while running, unless learning is frozen."""
+
+    NAME = 'sofc_controller'
+    DEFAULT_CONTROLLER = 'sofc_{valve}'
+    PARAMETERS = (
+        *ControllerNode.PARAMETERS,
+        NodeParameter(
+            'rules_file', '', 'File of the rules: read at configure if it exists, written by '
+            'the service save_rules. Empty: start from the rules of the controller file.'),
+        NodeParameter('learning', True, 'Whether the rules change while running.'),
+    )
+
+    def setup(self):
+        """Load the controller and its rules, offer the services for the rules."""
+        super().setup()
+        self.learning = self.value('learning')
+        path = self.value('rules_file')
+        if path and os.path.exists(path):
+            self._load()
+        self._rule_services = [
+            self.create_service(SetBool, '~/freeze_learning', self._freeze),
+            self.create_service(Trigger, '~/save_rules', self._answered(self._save)),
+            self.create_service(Trigger, '~/load_rules', self._answered(self._load)),
+            self.create_service(Trigger, '~/reset_rules', self._answered(self._reset)),
+        ]
+
+    def teardown(self):
+        """Take the services back."""
+        for service in self._rule_services:
+            self.destroy_service(service)
+
+    def diagnostic_values(self):
+        """Add whether the rules change."""
+        return (*super().diagnostic_values(), ('learning', self.learning))
+
+    def _freeze(self, request, response):
+        with self.loops.lock:
+            self.learning = not request.data
+        response.success = True
+        response.message = 'learning is on' if self.learning else 'learning is frozen'
+        return response
+
+    def _answered(self, action):
+        """Return a Trigger callback that reports what the action says or what is wrong."""
+        def callback(request, response):
+            try:
+                with self.loops.lock:
+                    response.message = action()
+                response.success = True
+            except InputError as error:
+                response.message = str(error)
+            return response
+        return callback
+
+    def _path(self):
+        path = self.value('rules_file')
+        if not path:
+            raise InputError('is empty, give a file', 'parameter rules_file')
+        return os.path.expanduser(path)
+
+    def _save(self):
+        self.controller.rules.save(self._path())
+        return f'rules saved to {self._path()}'
+
+    def _load(self):
+        rules = type(self.controller.rules).load(self._path(), self.controller.rules)
+        self.controller.replace_rules(rules, self._path())
+        return f'rules loaded from {self._path()}'
+
+    def _reset(self):
+        self.controller.reset_rules()
+        return 'rules are the initial ones again'
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(SofcNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
