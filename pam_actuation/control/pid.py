@@ -24,9 +24,11 @@ import math
 
 from numba import njit
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.units import P_ATM_PA
 
 from pam_actuation.control import inputs as place
+from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.settings import checked_settings, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 
@@ -57,7 +59,7 @@ STATE_NAMES = (
     'slew_limited', 'start_offset_m')
 
 
-@njit(cache=True)
+@compiled
 def _start(par, inverse, st, inp):
     """Begin so that the reference starts where the muscle is and the command where it is."""
     st[S_STARTED] = 1.0
@@ -73,14 +75,9 @@ def _start(par, inverse, st, inp):
         st[S_INTEGRAL] = st[S_OUTPUT] - P_ATM_PA
 
 
-@njit(cache=True)
-def pid_step(par, inverse, st, inp, out):
-    """
-    Run one tick; return the pressure command [absolute Pa].
-
-    ``par`` holds ``SETTINGS`` in order, ``inverse`` the static inverse table, ``st`` the
-    state, ``inp`` the inputs (``inputs.IN_*``), ``out`` receives ``STATE_NAMES``.
-    """
+@compiled
+def _tick(par, inverse, st, inp, out):
+    """Run one tick; see ``pid_step``."""
     period = 1.0 / par[P_RATE]
     if st[S_STARTED] < 0.5:
         _start(par, inverse, st, inp)
@@ -128,6 +125,27 @@ def pid_step(par, inverse, st, inp, out):
     out[10] = 1.0 if command != inside else 0.0
     out[11] = offset
     return command
+
+
+def _entry(key):
+    """Return the step function as one unit of compiled code, stored under ``key``."""
+    @njit(cache=True, error_model='numpy', nogil=True)
+    def pid_step(par, inverse, st, inp, out):
+        """
+        Run one tick; return the pressure command [absolute Pa].
+
+        ``par`` holds ``SETTINGS`` in order, ``inverse`` the static inverse table, ``st`` the
+        state, ``inp`` the inputs (``inputs.IN_*``), ``out`` receives ``STATE_NAMES``.
+        """
+        if key < 0:       # never; makes the key part of what is stored
+            return P_ATM_PA
+        return _tick(par, inverse, st, inp, out)
+
+    return pid_step
+
+
+SOURCES = ('inputs.py', 'static_inverse.py', 'pid.py')
+pid_step = _entry(source_key(*SOURCES))
 
 
 class PidController:
@@ -187,6 +205,10 @@ class PidController:
             pressure_pa, force_n)
         return pid_step(
             self.parameters, self.static_inverse, self._state, self._inputs, self._outputs)
+
+    def compiled_arguments(self):
+        """Return the arrays ``pid_step`` takes, for compiled closed loops."""
+        return self.parameters, self.static_inverse, self._state, self._inputs, self._outputs
 
     def state_values(self):
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""

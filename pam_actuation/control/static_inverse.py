@@ -19,14 +19,14 @@ The table is one vector ``[lowest contraction m, step m, Pa, Pa, ...]`` so that
 it can be handed to compiled code and written to a file exactly.
 """
 
-from numba import njit
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.units import P_ATM_PA
 
 _HEAD = 2       # entries before the pressures
 
 
-@njit(cache=True)
+@compiled
 def inverse_pressure_pa(table, contraction_m):
     """Return the tabulated absolute pressure [Pa] at a contraction [m], linear between nodes."""
     last = table.shape[0] - _HEAD - 1

@@ -143,6 +143,10 @@ class SelfOrganizingFuzzyController:
         inputs[8] = force_n
         return sofc_step(*self._arguments)
 
+    def compiled_arguments(self):
+        """Return the arrays ``sofc_step`` takes, for compiled closed loops."""
+        return self._arguments
+
     def state_values(self):
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
         return tuple(self._outputs.tolist())
@@ -208,10 +212,6 @@ class SelfOrganizingFuzzyController:
             + infer_feedforward(
                 self.rules.feedforward, share,
                 int(out[layout.O_KNOT]), out[layout.O_KNOT_DEGREE]))
-
-    def to_mapping(self):
-        """Return everything that makes this controller, for ``config.controller_to_yaml``."""
-        return {'settings': dict(self.settings), 'rules': self.rules}
 
     def to_yaml(self):
         """Return YAML text from which ``load_controller`` builds an identical controller."""

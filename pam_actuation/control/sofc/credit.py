@@ -22,7 +22,7 @@ the delay is not known well, to those of ``delay - spread .. delay + spread``
 ticks ago with triangular weights that sum to 1.
 """
 
-from numba import njit
+from pam_sim.compiled import compiled
 
 ENTRY_ERROR_SET = 0       # lower active set of the error
 ENTRY_ERROR_DEGREE = 1    # degree of the set above it
@@ -41,7 +41,7 @@ def ring_rows(delay, spread):
     return delay + spread + 1
 
 
-@njit(cache=True)
+@compiled
 def push(ring, tick, i, wi, j, wj, share, k, wk, valid, output_pa):
     """Write the firing strengths of a tick over the oldest entry."""
     row = tick % ring.shape[0]
@@ -56,13 +56,13 @@ def push(ring, tick, i, wi, j, wj, share, k, wk, valid, output_pa):
     ring[row, ENTRY_OUTPUT] = output_pa
 
 
-@njit(cache=True)
+@compiled
 def row_of(ring, tick, ago):
     """Return the row of the entry ``ago`` ticks before ``tick``."""
     return (tick - ago) % ring.shape[0]
 
 
-@njit(cache=True)
+@compiled
 def kernel_weight(offset, spread):
     """Return the triangular weight of the entry ``offset`` ticks off the credit delay."""
     side = spread + 1

@@ -23,7 +23,7 @@ usual protections: bounds, a limit per tick, a dead zone, and a leak towards the
 initial rules on visited rules only.
 """
 
-from numba import njit
+from pam_sim.compiled import compiled
 
 LEARNING = 0
 FROZEN_OFF = 1            # learning switched off
@@ -38,12 +38,12 @@ REASONS = (
     'error within the dead zone', 'muscle slack', 'pressure does not follow the command')
 
 
-@njit(cache=True)
+@compiled
 def _bounded(value, limit):
     return min(max(value, -limit), limit)
 
 
-@njit(cache=True)
+@compiled
 def modify_feedback(table, initial, share, i, wi, j, wj, gain, leak, step_limit):
     """
     Change the feedback rules that were active; return the squared norm of the change.
@@ -68,7 +68,7 @@ def modify_feedback(table, initial, share, i, wi, j, wj, gain, leak, step_limit)
     return squares
 
 
-@njit(cache=True)
+@compiled
 def modify_feedforward(table, initial, share, k, wk, gain_pa, leak, step_limit_pa, limit_pa):
     """
     Change the feed-forward rules that were active; return the squared norm [Pa^2].

@@ -20,8 +20,8 @@ At any value at most two neighbouring sets are active and the degrees sum to 1
 Outside the universe the outermost set is fully active (saturation).
 """
 
-from numba import njit
 import numpy as np
+from pam_sim.compiled import compiled
 
 SET_COUNT = 7
 SET_NAMES = ('NB', 'NM', 'NS', 'ZE', 'PS', 'PM', 'PB')
@@ -30,7 +30,7 @@ SET_WORDS = (
     'small positive', 'medium positive', 'large positive')
 
 
-@njit(cache=True)
+@compiled
 def locate(value, lower, upper, count):
     """
     Return the lower one of the two active sets and the degree of the upper one.

@@ -24,8 +24,8 @@ first-order decay of the error. Two forms:
   commonly reproduced, on quantised error and change of error, scaled to ``limit``.
 """
 
-from numba import njit
 import numpy as np
+from pam_sim.compiled import compiled
 
 LEVELS = 13
 _POSITIVE_ROWS = (
@@ -51,13 +51,13 @@ def _full_table():
 TABLE = _full_table()     # rows error level -6..6, columns change-of-error level -6..6
 
 
-@njit(cache=True)
+@compiled
 def index_linear(error_m, rate_m_per_s, tau_s, limit_m):
     """Return the linear performance index [m]."""
     return min(max(error_m + tau_s * rate_m_per_s, -limit_m), limit_m)
 
 
-@njit(cache=True)
+@compiled
 def index_table(error_scaled, rate_scaled, limit_m):
     """Return the tabulated performance index [m] of error and change scaled to [-1, 1]."""
     row = int(np.rint(6.0 * min(max(error_scaled, -1.0), 1.0))) + 6

@@ -30,8 +30,8 @@ Automatica 15, 1979).
 from dataclasses import dataclass, field
 import hashlib
 
-from numba import njit
 import numpy as np
+from pam_sim.compiled import compiled
 
 from pam_actuation.control.sofc.membership import SET_COUNT, SET_NAMES, SET_WORDS
 
@@ -39,14 +39,14 @@ CONTRACTING, EXTENDING = 0, 1
 DIRECTIONS = ('contracting', 'extending')
 
 
-@njit(cache=True)
+@compiled
 def contracting_share(rate_m_per_s, blend_speed_m_per_s):
     """Return the degree 0..1 of direction 'contracting' at a rate of the reference [m/s]."""
     share = 0.5 + 0.5 * rate_m_per_s / blend_speed_m_per_s
     return min(max(share, 0.0), 1.0)
 
 
-@njit(cache=True)
+@compiled
 def infer_feedback(table, share, i, wi, j, wj):
     """
     Return the output of the feedback rules in [-1, 1].
@@ -61,7 +61,7 @@ def infer_feedback(table, share, i, wi, j, wj):
     return share * up + (1.0 - share) * down
 
 
-@njit(cache=True)
+@compiled
 def infer_feedforward(table, share, k, wk):
     """Return the output of the feed-forward rules [Pa] at the active knots ``k, wk``."""
     return (share * ((1.0 - wk) * table[0, k] + wk * table[0, k + 1])

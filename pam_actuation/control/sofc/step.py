@@ -23,9 +23,11 @@ strengths; modification of the rules that were active one credit delay ago.
 import math
 
 from numba import njit
+from pam_sim.compiled import compiled
 from pam_sim.units import P_ATM_PA
 
 from pam_actuation.control import inputs as place
+from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.sofc import credit, layout as at, learning
 from pam_actuation.control.sofc.membership import locate, SET_COUNT
 from pam_actuation.control.sofc.performance_index import index_linear, index_table
@@ -40,7 +42,7 @@ _START_TRIM_PA = 3e4      # largest integral taken over at the start
 _LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
 
 
-@njit(cache=True)
+@compiled
 def _start(par, inverse, st, inp):
     """Begin so that the reference starts where the muscle is and the command where it is."""
     x = inp[place.IN_CONTRACTION]
@@ -64,7 +66,7 @@ def _start(par, inverse, st, inp):
             st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
 
 
-@njit(cache=True)
+@compiled
 def _update_rate(par, st, inp):
     """Update and return the filtered change of error [m/s] from the contraction alone."""
     elapsed = inp[place.IN_ELAPSED]
@@ -81,7 +83,7 @@ def _update_rate(par, st, inp):
     return st[at.S_RATE]
 
 
-@njit(cache=True)
+@compiled
 def _jumped(par, st, inp):
     """Tell whether a reference moved otherwise than its rate says since the former tick."""
     period = par[at.P_PERIOD]
@@ -94,7 +96,7 @@ def _jumped(par, st, inp):
     return now > par[at.P_JUMP] or lead > par[at.P_JUMP]
 
 
-@njit(cache=True)
+@compiled
 def _reason(par, ring, st, inp, error, limited):
     """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
     tick = int(st[at.S_TICK])
@@ -120,7 +122,7 @@ def _reason(par, ring, st, inp, error, limited):
     return learning.LEARNING
 
 
-@njit(cache=True)
+@compiled
 def _learn(par, fb, ff, fb0, ff0, ring, st, index):
     """Modify the rules active one credit delay ago; return the squared norms of the change."""
     tick = int(st[at.S_TICK])
@@ -152,7 +154,7 @@ def _learn(par, fb, ff, fb0, ff0, ring, st, index):
     return fb_squares, ff_squares
 
 
-@njit(cache=True)
+@compiled
 def _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk):
     """Add the firing strengths of this tick to the counts of the rules."""
     for d in range(2):
@@ -165,23 +167,9 @@ def _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk):
         ff_fired[d, k + 1] += direction * wk
 
 
-@njit(cache=True)
-def sofc_step(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
-    """
-    Run one tick; return the pressure command [absolute Pa].
-
-    Parameters
-    ----------
-    par, inverse : float64[:]
-        Parameter vector (``settings.parameter_vector``) and static inverse table.
-    fb, ff, fb0, ff0, fb_fired, ff_fired : float64[:, :, :] and float64[:, :]
-        Feedback and feed-forward rules, their initial values, their firing counts.
-    ring : float64[:, :]
-        Credit memory (``credit.ring_rows`` rows).
-    st, inp, out : float64[:]
-        State (``layout.S_*``), inputs (``inputs.IN_*``), outputs (``layout.O_*``).
-
-    """
+@compiled
+def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
+    """Run one tick; see ``sofc_step``."""
     period = par[at.P_PERIOD]
     if st[at.S_STARTED] < 0.5:
         _start(par, inverse, st, inp)
@@ -277,3 +265,36 @@ def sofc_step(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp,
     st[at.S_HISTORY] += 1.0
     st[at.S_FREEZE_LEFT] = max(0.0, st[at.S_FREEZE_LEFT] - period)
     return command
+
+
+def _entry(key):
+    """Return the step function as one unit of compiled code, stored under ``key``."""
+    @njit(cache=True, error_model='numpy', nogil=True)
+    def sofc_step(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
+        """
+        Run one tick; return the pressure command [absolute Pa].
+
+        Parameters
+        ----------
+        par, inverse : float64[:]
+            Parameter vector (``settings.parameter_vector``) and static inverse table.
+        fb, ff, fb0, ff0, fb_fired, ff_fired : float64[:, :, :] and float64[:, :]
+            Feedback and feed-forward rules, their initial values, their firing counts.
+        ring : float64[:, :]
+            Credit memory (``credit.ring_rows`` rows).
+        st, inp, out : float64[:]
+            State (``layout.S_*``), inputs (``inputs.IN_*``), outputs (``layout.O_*``).
+
+        """
+        if key < 0:       # never; makes the key part of what is stored
+            return P_ATM_PA
+        return _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out)
+
+    return sofc_step
+
+
+SOURCES = (
+    'inputs.py', 'static_inverse.py', 'sofc/layout.py', 'sofc/membership.py',
+    'sofc/rule_table.py', 'sofc/performance_index.py', 'sofc/credit.py', 'sofc/learning.py',
+    'sofc/step.py')
+sofc_step = _entry(source_key(*SOURCES))

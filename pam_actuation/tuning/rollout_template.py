@@ -1,0 +1,159 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The whole closed loop as compiled code: controller, driver law, valve, muscle, load.
+
+Not imported by its name: ``closed_loop`` loads this text as a module of its own,
+named after the hash of everything it is compiled from (the plant kernel, the
+controllers, the driver laws), so that no stale machine code survives a change.
+
+Timing of one controller tick: measure, controller, driver (every
+``driver_every`` ticks), then the physics steps of one period; the new valve
+signal arrives after ``latency_steps`` of them.
+"""
+
+from numba import njit
+import numpy as np
+from pam_sim.rollout import layout
+from pam_sim.rollout.kernel import step
+
+from pam_actuation.control import inputs as place
+from pam_actuation.control.pid import pid_step
+from pam_actuation.control.sofc.step import sofc_step
+from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
+from pam_actuation.drivers.ppr import ppr_step
+
+LOG_CONTRACTION = 0       # m, true, at the tick
+LOG_PRESSURE = 1          # Pa absolute, true
+LOG_FORCE = 2             # N
+LOG_COMMAND = 3           # Pa absolute
+LOG_SIGNAL_0 = 4          # V or fill duty
+LOG_SIGNAL_1 = 5          # vent duty
+LOG_MEASURED = 6          # m
+LOG_SIZE = 7
+
+
+@njit(error_model='numpy', nogil=True)
+def _read(value, step_size):
+    """Quantise a reading, 0 = no quantisation."""
+    if step_size > 0.0:
+        return np.rint(value / step_size) * step_size
+    return value
+
+
+@njit(error_model='numpy', nogil=True)
+def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row):
+    """Fill the inputs of the controller and the measured part of the log."""
+    inp[place.IN_CONTRACTION] = _read(
+        plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
+    inp[place.IN_PRESSURE] = _read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
+    inp[place.IN_FORCE] = _read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
+    inp[place.IN_REFERENCE] = position[tick]
+    inp[place.IN_REFERENCE_RATE] = rate[tick]
+    whole = int(lead_ticks)
+    part = lead_ticks - whole
+    at = min(tick + whole, position.shape[0] - 2)
+    inp[place.IN_LEAD_REFERENCE] = (1.0 - part) * position[at] + part * position[at + 1]
+    inp[place.IN_LEAD_RATE] = (1.0 - part) * rate[at] + part * rate[at + 1]
+    inp[place.IN_LEARN] = learn[tick]
+    inp[place.IN_ELAPSED] = np.nan
+    row[LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
+    row[LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
+    row[LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
+    row[LOG_MEASURED] = inp[place.IN_CONTRACTION]
+
+
+@njit(error_model='numpy', nogil=True)
+def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
+             external_n, plant_state, plant_par, plant_inp, plant_out, row):
+    """Run the driver law where it is due and the physics of one controller period."""
+    driver_state, driver_par, driver_out = driver
+    signal_0 = plant_inp[layout.INP_SIGNAL_0]
+    signal_1 = plant_inp[layout.INP_SIGNAL_1]
+    if tick % driver_every == 0:
+        if hsv:
+            driver_state[S_AGE] = 0.0
+            hsv_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
+            signal_0, signal_1 = driver_out[0], driver_out[1]
+        else:
+            ppr_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
+            signal_0, signal_1 = driver_out[0], 0.0
+    plant_inp[layout.INP_EXTERNAL_FORCE] = external_n[tick]
+    for j in range(steps):
+        if j == latency_steps:
+            plant_inp[layout.INP_SIGNAL_0] = signal_0
+            plant_inp[layout.INP_SIGNAL_1] = signal_1
+        step(plant_state, plant_par, plant_inp, plant_out)
+    row[LOG_COMMAND] = command_pa
+    row[LOG_SIGNAL_0] = signal_0
+    row[LOG_SIGNAL_1] = signal_1
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+                 learn, controller, log):
+    """
+    Track a reference with the self-organizing controller; its rules change in place.
+
+    Parameters
+    ----------
+    plant : tuple
+        state, par, inp, out of the kernel; ``out`` holds the start.
+    hsv : bool
+        Which driver law ``driver`` (state, par, out) belongs to.
+    timing : tuple of int
+        Physics steps per tick, ticks per driver step, latency in physics steps.
+    lead_ticks : float
+        Preview in ticks.
+    reference : tuple
+        Position [m] and rate [m/s] per tick, longer than ``log`` by the preview.
+    noise, quantum, external_n, learn : float64 arrays
+        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force
+        (N) [N]; 1 where the rules may change (N).
+    controller : tuple
+        Arguments of ``sofc_step``.
+    log : float64[:, :]
+        (N, LOG_SIZE), written.
+
+    """
+    plant_state, plant_par, plant_inp, plant_out = plant
+    steps, driver_every, latency_steps = timing
+    position, rate = reference
+    inp = controller[10]
+    for tick in range(log.shape[0]):
+        row = log[tick]
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
+        command_pa = sofc_step(
+            controller[0], controller[1], controller[2], controller[3], controller[4],
+            controller[5], controller[6], controller[7], controller[8], controller[9], inp,
+            controller[11])
+        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
+                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+                learn, controller, log):
+    """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
+    plant_state, plant_par, plant_inp, plant_out = plant
+    steps, driver_every, latency_steps = timing
+    position, rate = reference
+    inp = controller[3]
+    for tick in range(log.shape[0]):
+        row = log[tick]
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
+        command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
+        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
+                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)

@@ -1,0 +1,217 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Inference by hand, performance index, credit and rule modification."""
+
+import numpy as np
+from pam_actuation.control.sofc import credit, layout, learning
+from pam_actuation.control.sofc.membership import locate
+from pam_actuation.control.sofc.performance_index import index_linear, index_table, TABLE
+from pam_actuation.control.sofc.rule_table import (
+    contracting_share, infer_feedback, infer_feedforward, linear_feedback_table)
+import pytest
+
+from straight_rig import sofc
+
+
+def test_inference_of_a_hand_computed_example():
+    table = np.zeros((2, 7, 7))
+    # Error 0.25 -> sets 3 and 4 with degrees 0.25 and 0.75; change -0.5 -> sets 1 and 2, half.
+    table[0, 3, 1], table[0, 3, 2], table[0, 4, 1], table[0, 4, 2] = 0.4, -0.2, 0.8, 0.1
+    table[1, 4, 2] = -1.0
+    i, wi = locate(0.25, -1.0, 1.0, 7)
+    j, wj = locate(-0.5, -1.0, 1.0, 7)
+    assert (i, j) == (3, 1)
+    assert wi == pytest.approx(0.75)
+    assert wj == pytest.approx(0.5)
+    up = 0.25 * (0.5 * 0.4 + 0.5 * -0.2) + 0.75 * (0.5 * 0.8 + 0.5 * 0.1)
+    down = 0.75 * 0.5 * -1.0
+    assert infer_feedback(table, 1.0, i, wi, j, wj) == pytest.approx(up)
+    assert infer_feedback(table, 0.8, i, wi, j, wj) == pytest.approx(0.8 * up + 0.2 * down)
+
+
+def test_linear_initial_table_is_a_plane():
+    table = linear_feedback_table()
+    for error in (-0.9, -0.31, 0.0, 0.44, 1.0):
+        for change in (-1.0, 0.12, 0.77):
+            i, wi = locate(error, -1.0, 1.0, 7)
+            j, wj = locate(change, -1.0, 1.0, 7)
+            expected = 0.5 * (error + change)
+            assert infer_feedback(table, 0.3, i, wi, j, wj) == pytest.approx(expected)
+
+
+def test_feedforward_rules_interpolate_between_knots_and_directions():
+    table = np.array([[0.0, 10.0, 20.0], [0.0, -10.0, -20.0]])
+    assert infer_feedforward(table, 1.0, 1, 0.25) == pytest.approx(12.5)
+    assert infer_feedforward(table, 0.5, 1, 0.25) == pytest.approx(0.0)
+
+
+def test_direction_is_blended_at_small_speed():
+    assert contracting_share(0.01, 5e-4) == 1.0
+    assert contracting_share(-0.01, 5e-4) == 0.0
+    assert contracting_share(0.0, 5e-4) == 0.5
+    assert contracting_share(2.5e-4, 5e-4) == pytest.approx(0.75)
+
+
+def test_linear_index_is_zero_on_the_wanted_decay_and_bounded():
+    assert index_linear(1e-3, -1e-3 / 0.06, 0.06, 2e-3) == pytest.approx(0.0, abs=1e-12)
+    assert index_linear(0.5, 0.0, 0.06, 2e-3) == 2e-3
+    assert index_linear(-0.5, 0.0, 0.06, 2e-3) == -2e-3
+
+
+def test_tabulated_index_is_antisymmetric_and_reads_the_published_entries():
+    assert np.array_equal(TABLE, -TABLE[::-1, ::-1])
+    assert index_table(1.0, 1.0, 6.0) == 6.0
+    assert index_table(2.0 / 6.0, 3.0 / 6.0, 6.0) == 3.0
+    assert index_table(0.0, 0.0, 6.0) == 0.0
+    assert index_table(-1.0, 0.0, 6.0) == -6.0
+
+
+def test_credit_goes_to_the_rules_active_the_delay_ago():
+    ring = np.zeros((credit.ring_rows(5, 0), credit.ENTRY_SIZE))
+    for tick in range(23):
+        credit.push(ring, tick, tick % 6, 0.1, 0, 0.0, 1.0, tick % 9, 0.2, 1.0, 1e5 + tick)
+        if tick >= 5:
+            row = credit.row_of(ring, tick, 5)
+            assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6
+            assert ring[row, credit.ENTRY_KNOT] == (tick - 5) % 9
+            assert ring[row, credit.ENTRY_OUTPUT] == 1e5 + tick - 5
+
+
+def test_credit_kernel_sums_to_one_and_peaks_in_the_middle():
+    for spread in (0, 1, 4):
+        weights = [credit.kernel_weight(k, spread) for k in range(-spread, spread + 1)]
+        assert sum(weights) == pytest.approx(1.0)
+        assert max(weights) == weights[spread]
+
+
+def test_only_active_rules_change_and_stay_in_bounds():
+    table, initial = linear_feedback_table(), linear_feedback_table()
+    for _ in range(400):
+        learning.modify_feedback(table, initial, 1.0, 3, 0.5, 3, 0.25, 0.5, 0.0, 0.02)
+    changed = np.argwhere(table != initial)
+    assert {tuple(cell) for cell in changed} == {
+        (0, 3, 3), (0, 3, 4), (0, 4, 3), (0, 4, 4)}
+    assert table.max() == 1.0
+    knots = np.zeros((2, 9))
+    for _ in range(400):
+        learning.modify_feedforward(knots, knots * 0, 0.0, 4, 0.5, -900.0, 0.0, 1e3, 5e3)
+    assert set(np.flatnonzero(knots[1])) == {4, 5}
+    assert not knots[0].any()
+    assert knots.min() == -5e3
+
+
+def test_change_per_tick_is_limited_and_leak_returns_to_the_initial_rule():
+    table, initial = linear_feedback_table(), linear_feedback_table()
+    learning.modify_feedback(table, initial, 1.0, 3, 0.0, 3, 0.0, 9.0, 0.0, 0.02)
+    assert table[0, 3, 3] - initial[0, 3, 3] == pytest.approx(0.02)
+    for _ in range(100):
+        learning.modify_feedback(table, initial, 1.0, 3, 0.0, 3, 0.0, 0.0, 0.1, 0.02)
+    assert table[0, 3, 3] == pytest.approx(initial[0, 3, 3], abs=1e-5)
+
+
+def feed(controller, ticks, error_m, reference_m=0.01, rate=0.01, learn=True, **more):
+    """Run ticks at a standing error; return the last values by name."""
+    for _ in range(ticks):
+        controller.step(reference_m - error_m, reference_m, rate, reference_m, rate, learn, **more)
+    return dict(zip(controller.state_names, controller.state_values()))
+
+
+QUIET = {'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05, 'start_time_s': 0.01,
+         'feedback_leak_per_m_s': 0.0}
+
+
+def test_a_standing_positive_error_raises_the_rules_that_fired():
+    controller = sofc(QUIET)
+    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+    feed(controller, 60, 5e-4)
+    assert controller.rules.feedforward[0].max() > 0.0
+    assert not controller.rules.feedforward[1].any()
+    moved = np.flatnonzero(controller.rules.feedforward[0])
+    knots = controller.rules.knots_m()[moved]
+    assert np.all(np.abs(knots - 0.01) < 0.00125)
+    assert (controller.rules.feedback >= controller.rules.feedback_initial).all()
+    assert controller.rules.feedback_fired.sum() == pytest.approx(61.0)
+
+
+def test_dead_zone_freeze_and_start_leave_the_rules_alone():
+    for settings, learn, error_m, reason in (
+            (QUIET, False, 5e-4, learning.FROZEN_OFF),
+            ({**QUIET, 'dead_zone_m': 1e-3}, True, 5e-4, learning.FROZEN_DEAD_ZONE)):
+        controller = sofc(settings)
+        controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+        values = feed(controller, 60, error_m, learn=learn)
+        assert values['learning_reason'] == reason
+        assert not controller.rules.feedforward.any()
+    controller = sofc(QUIET)
+    controller.freeze_learning = True
+    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+    assert feed(controller, 60, 5e-4)['learning_reason'] == learning.FROZEN_OFF
+    controller = sofc(QUIET)
+    assert feed(controller, 3, 5e-4)['learning_reason'] == learning.FROZEN_START
+
+
+def test_learning_freezes_on_saturation_slack_valve_and_reference_jump():
+    controller = sofc({**QUIET, 'max_pressure_gauge_pa': 1e5})
+    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+    values = feed(controller, 60, 5e-4)
+    assert values['learning_reason'] == learning.FROZEN_SATURATED
+    assert values['saturated_high'] == 1.0
+    controller = sofc(QUIET)
+    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+    assert feed(controller, 60, 5e-4, force_n=0.1)['learning_reason'] == learning.FROZEN_SLACK
+    values = feed(controller, 60, 5e-4, pressure_pa=101325.0)
+    assert values['learning_reason'] == learning.FROZEN_VALVE
+    assert not controller.rules.feedforward.any()
+    values = feed(controller, 1, 5e-4, reference_m=0.02)
+    assert values['learning_reason'] == learning.FROZEN_JUMP
+
+
+def test_output_never_leaves_the_limits_and_the_slew():
+    controller = sofc({'slew_pa_per_s': 1e6})
+    former = 101325.0
+    random = np.random.default_rng(1)
+    for _ in range(500):
+        reference = random.uniform(-0.05, 0.2)
+        command = controller.step(random.uniform(0.0, 0.03), reference, 0.0, reference, 0.0)
+        assert 101325.0 <= command <= 701325.0
+        assert abs(command - former) <= 1e6 * 0.005 * (1 + 1e-9)
+        former = command
+
+
+def test_exchange_of_rules_makes_no_step_in_the_command():
+    controller = sofc()
+    for _ in range(100):
+        before = controller.step(0.0098, 0.01, 0.0, 0.01, 0.0, learn=False)
+    other = controller.rules.copy()
+    other.feedforward += 2e4
+    other.feedback[...] = 0.3
+    controller.replace_rules(other)
+    after = controller.step(0.0098, 0.01, 0.0, 0.01, 0.0, learn=False)
+    assert abs(after - before) < 500.0
+    assert controller.rules_replaced == 1
+
+
+def test_rules_read_as_sentences():
+    controller = sofc(QUIET)
+    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+    feed(controller, 60, 5e-4)
+    text = ' '.join(controller.rules.sentences())
+    assert 'if contracting and the reference is near 10.0 mm then add +' in text
+    assert 'the error is small positive' in text
+
+
+def test_every_output_has_a_name():
+    assert len(layout.STATE_NAMES) == layout.OUTPUT_COUNT
+    assert len(set(layout.STATE_NAMES)) == layout.OUTPUT_COUNT
