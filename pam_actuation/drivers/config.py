@@ -90,7 +90,7 @@ _RANGES = {
     'hsv.band_pa': (0.0, 5e4, 'half width of the set-point band'),
     'hsv.rest_share': (0.0, 1.0, 'errors below this share of the shortest pulse rest'),
     'hsv.correct': (0.0, 1.0, 'observer: correction of the pressure'),
-    'hsv.correct_volume': (0.0, 1.0, 'observer: correction of the volume'),
+    'hsv.correct_volume': (-1.0, 1.0, 'observer: correction of the volume'),
     'hsv.correct_rate': (0.0, 1.0, 'observer: correction of the volume rate'),
     'hsv.learn_drift': (0.0, 0.5, 'observer: learning of the drift'),
     'hsv.learn_gain': (0.0, 0.5, 'observer: learning of the flow gains'),

@@ -25,6 +25,7 @@ certified safety function.
 from collections import deque
 from dataclasses import dataclass
 import math
+import re
 
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
 from pam_sim.units import gauge_kpa, P_ATM_PA
@@ -83,6 +84,10 @@ class Decision:
     message: str
     fault: str = ''
     warnings: tuple = ()
+
+
+def _without_figures(fault):
+    return fault[0], re.sub(r'[-\d.]', '', fault[1])
 
 
 class SafetySupervisor:
@@ -328,12 +333,10 @@ class SafetySupervisor:
     # -- outcome --------------------------------------------------------------------
 
     def _vent(self, fault):
-        # The text of the first tick stays, so that the reason does not flicker.
-        if self._fault is None or self._fault[0] != fault[0]:
-            if self._fault is None:
-                self.vents += 1
-            self._fault = fault
-        elif not self._fault[1]:
+        if self._fault is None:
+            self.vents += 1
+        # The first text stays while only its figures change: the reason must not flicker.
+        if self._fault is None or _without_figures(self._fault) != _without_figures(fault):
             self._fault = fault
         self._ramp_pa = None
         key, text = self._fault

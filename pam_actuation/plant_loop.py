@@ -1,0 +1,131 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The simulated rig on a clock: valve signal in, measurements out, no ROS.
+
+The plant takes the place of the hardware behind the topics: it holds the last valve
+signal without limit, steps its physics up to the time it is told and reads its sensors
+when asked. The simulator node and the offline simulation both use it.
+"""
+
+import math
+
+from pam_actuation.messages import Contraction, Force, Pressure, ValveSignal
+from pam_sim.sensors import SensorChain
+
+_NS = 1_000_000_000
+_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
+
+
+class PlantLoop:
+    """
+    A live plant that follows a clock in integer nanoseconds.
+
+    Attributes: ``steps`` physics steps done, ``overruns`` calls that came so late that
+    time was skipped, ``skipped_s`` that time, ``signals`` and ``signals_ignored``
+    valve messages taken and efforts not usable.
+    """
+
+    def __init__(self, rig, seed=0, longest_catch_up_s=0.25):
+        """
+        Build the plant of a rig.
+
+        ``seed`` fixes the sensor noise; ``longest_catch_up_s`` is the most time one call
+        of ``advance_to`` simulates; more than that is skipped and counted.
+        """
+        self.rig = rig
+        self.plant = rig.plant(seed)
+        self.sensors = SensorChain(rig.sensors, seed)
+        self.dt_ns = round(self.plant.dt_s * _NS)
+        self.longest_catch_up_ns = round(longest_catch_up_s * _NS)
+        self._names = _NAMES[rig.valve]
+        self._signal = [0.0] * len(self._names)
+        self._external_n = 0.0
+        self._start_ns = None
+        self.steps = 0
+        self.overruns = 0
+        self.skipped_s = 0.0
+        self.signals = 0
+        self.signals_ignored = 0
+
+    @property
+    def signal(self):
+        """Return the efforts that act on the valve."""
+        return tuple(self._signal)
+
+    @property
+    def now_ns(self):
+        """Return the time of the plant's state [ns], None before the start."""
+        return None if self._start_ns is None else self._start_ns + self.steps * self.dt_ns
+
+    def set_signal(self, message: ValveSignal):
+        """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
+        self.signals += 1
+        for name, effort in zip(message.names, message.efforts):
+            if name in self._names and math.isfinite(effort):
+                self._signal[self._names.index(name)] = float(effort)
+            else:
+                self.signals_ignored += 1
+
+    def set_external_force(self, message: Force):
+        """Take the disturbance force on the load [N]; not finite is ignored."""
+        if math.isfinite(message.force_n):
+            self._external_n = float(message.force_n)
+
+    def advance_to(self, now_ns):
+        """
+        Step the physics up to ``now_ns``; return the number of steps done.
+
+        The first call only sets the start time. A clock that goes back does nothing
+        until it has caught up.
+        """
+        if self._start_ns is None:
+            self._start_ns = now_ns
+            return 0
+        behind_ns = now_ns - self.now_ns
+        if behind_ns > self.longest_catch_up_ns:
+            skipped_ns = (behind_ns - self.longest_catch_up_ns) // self.dt_ns * self.dt_ns
+            self._start_ns += skipped_ns
+            self.overruns += 1
+            self.skipped_s += skipped_ns / _NS
+            behind_ns -= skipped_ns
+        count = max(behind_ns // self.dt_ns, 0)
+        signal = tuple(self._signal)
+        for _ in range(count):
+            self.plant.step(signal, self._external_n)
+        self.steps += count
+        return count
+
+    def sample(self, now_ns):
+        """
+        Read the sensors; return the messages by short topic name.
+
+        Stamps are the time of the plant's state (at most one step before ``now_ns``)
+        with the jitter of the rig's sensor settings. Contraction carries no velocity:
+        the rig does not measure one. ``supply_pressure`` is there for the HSV only.
+        """
+        plant = self.plant
+        stamp_ns = now_ns if self.now_ns is None else self.now_ns
+        pressure_pa, contraction_m, force_n, jitter_ns = self.sensors.read(
+            plant.time_s, plant.pressure_pa, plant.contraction_m, plant.force_n)
+        stamp_ns += int(jitter_ns)
+        messages = {
+            'pressure': Pressure(stamp_ns, float(pressure_pa)),
+            'contraction': Contraction(stamp_ns, float(contraction_m)),
+            'force': Force(stamp_ns, float(force_n)),
+        }
+        if self.rig.valve == 'hsv':
+            messages['supply_pressure'] = Pressure(stamp_ns, float(plant.supply_pa))
+        return messages
