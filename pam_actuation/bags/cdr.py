@@ -23,6 +23,7 @@ included), the bytes and the NUL; a sequence is a count and its items.
 
 from dataclasses import dataclass
 import functools
+import math
 import struct
 
 ENCAPSULATION = b'\x00\x01\x00\x00'
@@ -30,7 +31,7 @@ NS_PER_S = 1_000_000_000
 _START = len(ENCAPSULATION)
 _STAMP = struct.Struct('<iI')
 _COUNT = struct.Struct('<I')
-_MAX_NAMES = 100_000
+_DOUBLE = struct.Struct('<d')
 
 
 class CdrError(ValueError):
@@ -100,11 +101,23 @@ class _Walker:
         except UnicodeDecodeError as error:
             raise CdrError(f'a text is not UTF-8 ({error})') from None
 
-    def strings(self):
+    def limited_count(self):
+        """Return a count of items of at least one byte each."""
         number = self.count()
-        if number > _MAX_NAMES:
-            raise CdrError(f'{number} names announced')
-        return tuple(self.string() for _ in range(number))
+        if number > len(self.raw) - self.offset:
+            raise CdrError(f'{number} items announced in {len(self.raw)} bytes')
+        return number
+
+    def strings(self):
+        return tuple(self.string() for _ in range(self.limited_count()))
+
+    def byte(self):
+        return self.raw[self._take(1)]
+
+    def duration_ns(self):
+        self.offset = _aligned(self.offset, 4)
+        seconds, nanoseconds = _STAMP.unpack_from(self.raw, self._take(8))
+        return seconds * NS_PER_S + nanoseconds
 
     def doubles(self, number):
         """Return the offset of the first of ``number`` float64."""
@@ -151,6 +164,48 @@ def joint_state_layout(raw):
         begin, number = walker.double_sequence()
         columns.update(((field, i), begin + 8 * i) for i in range(number))
     return names, Layout(columns, tuple(walker.fixed))
+
+
+def joint_trajectory(raw):
+    """
+    Return (times, positions, velocities) of a trajectory_msgs/JointTrajectory.
+
+    Tuples of equal length: ``time_from_start`` [ns], first position and first
+    velocity (NaN if left out) of every point that has a position.
+    """
+    walker = _Walker(raw)
+    walker.string()
+    walker.strings()
+    points = []
+    for _ in range(walker.limited_count()):
+        (position, number), (velocity, velocities) = (
+            walker.double_sequence(), walker.double_sequence())
+        walker.double_sequence()
+        walker.double_sequence()
+        after_ns = walker.duration_ns()
+        if number:
+            points.append((
+                after_ns, _DOUBLE.unpack_from(raw, position)[0],
+                _DOUBLE.unpack_from(raw, velocity)[0] if velocities else math.nan))
+    return tuple(zip(*points)) if points else ((), (), ())
+
+
+def diagnostic_array(raw):
+    """
+    Return the statuses of a diagnostic_msgs/DiagnosticArray.
+
+    One tuple each: level, name, message, hardware_id, ((key, value), …).
+    """
+    walker = _Walker(raw)
+    walker.string()
+    statuses = []
+    for _ in range(walker.limited_count()):
+        level = walker.byte()
+        name, message, hardware_id = walker.string(), walker.string(), walker.string()
+        values = tuple(
+            (walker.string(), walker.string()) for _ in range(walker.limited_count()))
+        statuses.append((level, name, message, hardware_id, values))
+    return statuses
 
 
 def _string_bytes(text):

@@ -16,21 +16,20 @@
 Plain messages to CDR bytes and back, per topic, without ROS.
 
 A topic may be given by its short name (``pressure``) or in full
-(``/left_knee/flexor/pressure``); the last part decides. Frequent messages use
-the fixed layouts of ``cdr.py``, trajectories and diagnostics the type store of
-``rosbags``. Any ``name`` and ``frame_id`` is accepted when reading.
+(``/left_knee/flexor/pressure``); the last part decides. Reading uses the layouts
+of ``cdr.py``; it minds neither the content of alignment bytes nor bytes behind
+the message, which ROS 2 leaves unset. Any ``name`` and ``frame_id`` is accepted when reading.
 """
 
 import math
 import struct
 
 import numpy as np
-from rosbags.serde import SerdeError
-
 from pam_actuation import messages
 from pam_actuation.bags import cdr
 from pam_actuation.bags.layout import typestore
 from pam_sim.errors import InputError
+from rosbags.serde import SerdeError
 
 _PRESSURE = 'sensor_msgs/msg/FluidPressure'
 _JOINTS = 'sensor_msgs/msg/JointState'
@@ -216,28 +215,14 @@ def _encode_diagnostics(message):
 
 
 def _decode_trajectory(raw):
-    wire = typestore().deserialize_cdr(raw, _TRAJECTORY)
-    points = [point for point in wire.points if len(point.positions)]
-    return messages.ReferenceTrajectory(
-        stamp_ns=cdr.stamp_of(raw),
-        time_from_start_ns=tuple(
-            point.time_from_start.sec * cdr.NS_PER_S + point.time_from_start.nanosec
-            for point in points),
-        contraction_m=tuple(float(point.positions[0]) for point in points),
-        velocity_m_per_s=tuple(
-            float(point.velocities[0]) if len(point.velocities) else math.nan
-            for point in points))
+    return messages.ReferenceTrajectory(cdr.stamp_of(raw), *cdr.joint_trajectory(raw))
 
 
 def _decode_diagnostics(raw):
-    wire = typestore().deserialize_cdr(raw, _DIAGNOSTICS)
     stamp_ns = cdr.stamp_of(raw)
     return tuple(
-        messages.Status(
-            stamp_ns=stamp_ns, level=int(status.level), name=status.name,
-            message=status.message,
-            values=tuple((pair.key, pair.value) for pair in status.values))
-        for status in wire.status)
+        messages.Status(stamp_ns, level, name, message, values)
+        for level, name, message, _, values in cdr.diagnostic_array(raw))
 
 
 def _decode_valve_signal(stamp_ns, values):

@@ -71,8 +71,9 @@ class BagInfo:
     Everything ``pam info`` shows.
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good
-    bag; ``notes`` are harmless ones. ``complete`` is False when messages are known to be missing, True when
-    every topic of the rig has been checked, None where that is not known.
+    bag; ``notes`` are harmless ones. ``complete`` is False when messages are
+    known to be missing, True when every topic of the rig has been checked, None
+    where that is not known.
     """
 
     path: str

@@ -22,10 +22,9 @@ Message definitions and RIHS01 hashes come from the Jazzy type store of the
 from dataclasses import dataclass
 import functools
 
+from pam_sim.errors import InputError
 from rosbags.typesys import get_typestore, Stores
 import yaml
-
-from pam_sim.errors import InputError
 
 METADATA_VERSION = 9
 STORAGE_IDENTIFIER = 'mcap'

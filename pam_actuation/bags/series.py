@@ -21,9 +21,8 @@ deciding places are read together as columns of one array.
 """
 
 import numpy as np
-from rosbags.serde import SerdeError
-
 from pam_actuation.bags import cdr, codecs
+from rosbags.serde import SerdeError
 
 # Value columns that a series always has, NaN where no message carries them.
 VALUES = {

@@ -23,14 +23,13 @@ that rosbag2 writes through the ``rosbags`` package.
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.errors import ReaderError
-import yaml
-
 from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC, scan
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.errors import ReaderError
+import yaml
 
 _RECOVER = 'or read that beginning with the option recover'
 

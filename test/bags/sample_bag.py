@@ -30,7 +30,7 @@ METADATA = {
 def example_messages(i=0, valve='ppr'):
     """Return short name to one plain message of every topic, number ``i`` of a run."""
     stamp_ns = START_NS + i * STEP_NS
-    phase = 0.01 * i
+    phase = 0.05 * i
     signal = (('ppr_voltage',), (2.0 + 0.1 * math.sin(phase),))
     if valve == 'hsv':
         signal = (('fill_duty', 'vent_duty'), (0.25, 0.5 * abs(math.sin(phase))))

@@ -1,0 +1,209 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said about a bag: rates, gaps, losses, and what cannot be true."""
+
+import json
+
+from pam_actuation import messages
+from pam_actuation.bags import codecs
+from pam_actuation.bags.info import bag_info
+from pam_actuation.bags.info_text import render
+from pam_actuation.bags.metadata import experiment_metadata, UNITS
+from pam_actuation.bags.recorder import RecorderCore
+from pam_actuation.bags.writer import BagWriter
+from pam_sim.errors import InputError
+import pytest
+from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
+
+COUNT = 400
+
+
+def said(info, *words):
+    return any(all(word in remark for word in words) for remark in info.remarks)
+
+
+def test_good_bag(tmp_path):
+    info = bag_info(write_bag(tmp_path / 'run', COUNT))
+    assert info.remarks == [] and info.notes == []
+    assert info.message_count == COUNT * len(codecs.TOPIC_TYPES)
+    assert info.namespaces == ['/muscle'] and info.metadata == METADATA
+    assert info.duration_s == pytest.approx((COUNT - 1) * 0.005)
+    pressure = info.topic('/muscle/pressure')
+    assert pressure.type_name == 'sensor_msgs/msg/FluidPressure' and pressure.count == COUNT
+    assert pressure.rate_hz == pytest.approx(200.0)
+    assert pressure.max_gap_s == pytest.approx(0.005) and pressure.gaps == 0
+    assert pressure.stamp_jitter_s == pytest.approx(0.0, abs=1e-9)
+    assert pressure.ranges['pressure_pa'] == (pytest.approx(2.89e5, abs=50),
+                                              pytest.approx(2.91e5, abs=50))
+    signal = info.topic('/muscle/valve_signal')
+    assert (signal.published, signal.count, signal.lost) == (COUNT, COUNT, 0)
+    # Only one topic is reported as published, so completeness is not known.
+    assert info.complete is None
+    data = json.loads(json.dumps(info.to_dict()))
+    assert data['topics'][1]['name'] == '/muscle/contraction' and data['lost'] == 0
+    with pytest.raises(InputError, match='no topic /x'):
+        info.topic('/x')
+
+
+def test_text_is_in_units_of_people(tmp_path):
+    text = render(bag_info(write_bag(tmp_path / 'run', COUNT)))
+    assert '/muscle/pressure: 187.7 to 189.7 kPa gauge' in text
+    assert '/muscle/contraction: 13.00 to 15.00 mm' in text
+    assert '200.0 Hz' in text and 'experiment_name: sine' in text
+    assert 'Nothing is known to be missing' in text
+
+
+def test_gap_and_loss_against_published(tmp_path):
+    def lose(short, i, message):
+        return None if short == 'valve_signal' and 100 <= i < 110 else message
+
+    info = bag_info(write_bag(tmp_path / 'run', COUNT, change=lose))
+    signal = info.topic('/muscle/valve_signal')
+    assert (signal.count, signal.published, signal.lost) == (COUNT - 10, COUNT, 10)
+    assert signal.gaps == 1 and signal.max_gap_s == pytest.approx(0.055)
+    assert info.complete is False
+    assert said(info, '/muscle/valve_signal', '10 messages of 400 published never arrived')
+    assert said(info, '/muscle/valve_signal', '1 gaps, the longest 55 ms')
+    assert 'Incomplete: 10 messages lost' in render(info)
+
+
+def test_loss_of_a_node_that_died_before_its_last_report(tmp_path):
+    def change(short, i, message):
+        if short == 'diagnostics' and i > 200:
+            return None
+        return None if short == 'valve_signal' and i == 50 else message
+
+    info = bag_info(write_bag(tmp_path / 'run', COUNT, change=change))
+    assert info.topic('/muscle/valve_signal').lost == 1
+
+
+def test_recorder_counts_reach_the_info(tmp_path):
+    core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
+    for short, type_name in codecs.TOPIC_TYPES.items():
+        core.add_topic(full_name(short), type_name)
+    for i in range(20):
+        for short, message in example_messages(i).items():
+            if short == 'diagnostics':
+                statuses = [messages.Status(
+                    message[0].stamp_ns, 0, '/muscle/node', 'ok',
+                    ((f'published.{full_name("diagnostics")}', str(i + 1)),))]
+                message = statuses
+            skip = 3 if short == 'force' and i > 10 else 0
+            received_ns = START_NS + i * STEP_NS
+            core.receive(
+                full_name(short), codecs.encode(short, message), received_ns - 1000,
+                received_ns, i + 1 + skip)
+    core.close()
+    info = bag_info(tmp_path / 'run')
+    assert info.topic('/muscle/force').lost == 3 and info.lost == 3 and info.dropped == 0
+    assert info.complete is False
+    # Without that loss every topic is accounted for.
+    info.topic('/muscle/force').lost = 0
+    assert info.complete is True and 'Complete' in render(info)
+
+
+@pytest.mark.parametrize('short, message, words', [
+    ('pressure', messages.Pressure(0, 2.5e5 - 101325.0 - 1.2e5), ('mostly below', 'gauge')),
+    ('contraction', messages.Contraction(0, 0.09, 0.0), ('leaves 0 to 75 mm',)),
+    ('contraction', messages.Contraction(0, -0.01, 0.0), ('-10.0',)),
+    ('pressure', messages.Pressure(0, 2e6), ('more than the muscle stands',)),
+    ('force', messages.Force(0, float('nan')), ('not finite',)),
+    ('valve_signal', messages.ValveSignal(0, ('ppr_voltage',), (11.0,)), ('leaves 0 to 10 V',)),
+    ('valve_signal', messages.ValveSignal(0, ('fill_duty',), (1.5,)), ('leaves 0 to 1',)),
+])
+def test_values_that_cannot_be_true(tmp_path, short, message, words):
+    def change(name, i, given):
+        if name != short:
+            return given
+        fields = {field: getattr(message, field) for field in message.__slots__}
+        return type(message)(**{**fields, 'stamp_ns': given.stamp_ns})
+
+    info = bag_info(write_bag(tmp_path / 'run', 30, change=change))
+    assert said(info, f'/muscle/{short}', *words)
+
+
+def restamped(move):
+    def change(short, i, message):
+        if short != 'pressure':
+            return message
+        return messages.Pressure(message.stamp_ns + move(i), message.pressure_pa)
+    return change
+
+
+def test_stamps_that_cannot_be_true(tmp_path):
+    future = bag_info(write_bag(tmp_path / 'a', 30, change=restamped(lambda i: 10**9)))
+    assert said(future, '/muscle/pressure', '30 stamps lie in the future', '1 s')
+    other = bag_info(write_bag(tmp_path / 'b', 30, change=restamped(lambda i: -10**12)))
+    assert said(other, '/muscle/pressure', 'different clocks')
+    slow = bag_info(write_bag(tmp_path / 'c', 30, change=restamped(lambda i: -i * 10**7 + 10**7)))
+    assert said(slow, '/muscle/pressure', 'goes back 29 times')
+    frozen = bag_info(write_bag(tmp_path / 'd', 30, change=restamped(lambda i: -i * STEP_NS)))
+    assert said(frozen, '/muscle/pressure', '29 messages repeat')
+
+
+def test_slow_and_missing_topics(tmp_path):
+    def every_fourth(short, i, message):
+        return message if i % 4 == 0 or short != 'contraction' else None
+
+    path = write_bag(tmp_path / 'run', 100, leave_out=('valve_signal', 'force', 'diagnostics'),
+                     change=every_fourth)
+    info = bag_info(path)
+    assert said(info, '/muscle/contraction', '50.0 Hz is below 100 Hz')
+    assert said(info, 'no messages on valve_signal')
+    assert info.notes == ['/muscle has no messages on force.']
+
+
+def test_foreign_topics_are_listed(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/chatter', 'std_msgs/msg/String')
+        for i in range(5):
+            writer.write('/chatter', b'\x00\x01\x00\x00\x01\x00\x00\x00\x00', START_NS + i, 0)
+    info = bag_info(tmp_path / 'run')
+    assert info.topic('/chatter').count == 5 and info.namespaces == []
+    assert said(info, 'no messages on any topic of a muscle')
+    assert info.complete is None and '/chatter' in render(info)
+
+
+def test_bag_that_ended_early(tmp_path):
+    data = (write_bag(tmp_path / 'run', 1500) / 'run_0.mcap').read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(data[:len(data) // 2])
+    with pytest.raises(InputError, match='ended early'):
+        bag_info(cut)
+    info = bag_info(cut, recover=True)
+    assert info.recovered and info.complete is False and said(info, 'ended early')
+
+
+class Thing:
+    """Stands for an experiment, a rig or a controller."""
+
+    name = 'sine'
+    valve = 'hsv'
+
+    def to_yaml(self):
+        return 'a: 1\n'
+
+
+def test_experiment_record():
+    record = experiment_metadata(Thing(), Thing(), 'kind: pid\n', seed=3, origin='live')
+    assert record['experiment_name'] == 'sine' and record['valve'] == 'hsv'
+    assert record['rig'] == record['experiment'] == 'a: 1\n'
+    assert record['controller'] == 'kind: pid\n' and record['seed'] == '3'
+    assert record['units'] == UNITS and record['origin'] == 'live'
+    assert record['software_version']
+    assert all(isinstance(text, str) for text in record.values())
+    assert 'controller' not in experiment_metadata(valve='ppr')
+    with pytest.raises(InputError, match='xyz'):
+        experiment_metadata(valve='xyz')

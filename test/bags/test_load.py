@@ -1,0 +1,345 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Loading: this package's bags, those of others, and those that are broken."""
+
+from pathlib import Path
+import shutil
+
+from mcap.writer import CompressionType, Writer
+import numpy as np
+from pam_actuation import messages
+from pam_actuation.bags import codecs, layout
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.writer import BagWriter
+from pam_sim.errors import InputError
+from pam_sim.run import Run
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
+
+COUNT = 40
+VALUES = {
+    'pressure': {'pressure_pa': 'Pa'},
+    'pressure_command': {'pressure_pa': 'Pa'},
+    'supply_pressure': {'pressure_pa': 'Pa'},
+    'contraction': {'contraction_m': 'm', 'velocity_m_per_s': 'm/s'},
+    'reference': {'contraction_m': 'm', 'velocity_m_per_s': 'm/s'},
+    'force': {'force_n': 'N'},
+    'external_force': {'force_n': 'N'},
+    'valve_signal': {'ppr_voltage': 'V'},
+    'controller_state': {'tick': '1', 'error_m': 'm', 'learning': '1'},
+}
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    return write_bag(tmp_path_factory.mktemp('bags') / 'run', COUNT)
+
+
+def assert_same_run(run, valve='ppr', count=COUNT):
+    assert isinstance(run, Run)
+    for short in VALUES:
+        one = run.topics[short]
+        assert one.stamp_ns.dtype == np.int64 and len(one) == count
+        for i in range(count):
+            message = example_messages(i, valve)[short]
+            assert one.stamp_ns[i] == message.stamp_ns
+            if hasattr(message, 'names'):
+                numbers = getattr(message, 'efforts', None) or message.values
+                expected = dict(zip(message.names, numbers))
+            else:
+                expected = {name: getattr(message, name) for name in VALUES[short]}
+            assert {name: column[i] for name, column in one.values.items()} == expected
+    assert run.reference_trajectories == tuple(
+        example_messages(i)['reference_trajectory'] for i in range(count))
+
+
+def test_every_topic_is_loaded_exactly(bag):
+    run = load_run(bag)
+    assert_same_run(run)
+    assert {short: one.unit for short, one in run.topics.items()} == VALUES
+    assert run.namespace == '/muscle' and run.metadata == METADATA and run.valve == 'ppr'
+    assert run.remarks == () and run.path == str(bag)
+
+
+def test_lone_file_and_directory_without_metadata(bag, tmp_path):
+    lone = tmp_path / 'other_name.mcap'
+    shutil.copy(bag / 'run_0.mcap', lone)
+    assert_same_run(load_run(lone))
+    assert_same_run(load_run(tmp_path))
+    assert load_run(lone).metadata == METADATA
+    assert_same_run(load_run(bag / 'metadata.yaml'))
+
+
+def test_hsv_signals(tmp_path):
+    run = load_run(write_bag(tmp_path / 'run', 5, valve='hsv'))
+    assert set(run.topics['valve_signal'].values) == {'fill_duty', 'vent_duty'}
+    assert run.topics['valve_signal'].unit == {'fill_duty': '1', 'vent_duty': '1'}
+    assert run.valve == 'hsv'
+
+
+def test_missing_optional_topics(tmp_path):
+    left_out = ('force', 'supply_pressure', 'reference', 'reference_trajectory',
+                'external_force', 'controller_state', 'pressure_command', 'diagnostics')
+    run = load_run(write_bag(tmp_path / 'run', 5, leave_out=left_out))
+    assert set(run.topics) == {'pressure', 'contraction', 'valve_signal'}
+    assert run.reference_trajectories == ()
+
+
+def write_with_rosbags(directory, plugin, namespace='/rig_7/hip'):
+    store = layout.typestore()
+    with RosbagsWriter(directory, version=9, storage_plugin=plugin) as writer:
+        connections = {}
+        for i in range(COUNT):
+            for short, message in example_messages(i).items():
+                type_name = codecs.TOPIC_TYPES[short]
+                if short not in connections:
+                    connections[short] = writer.add_connection(
+                        full_name(short, namespace), type_name, typestore=store)
+                writer.write(
+                    connections[short], START_NS + i * STEP_NS, codecs.encode(short, message))
+    return directory
+
+
+@pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_bags_of_another_writer(tmp_path, plugin):
+    directory = write_with_rosbags(tmp_path / 'foreign', plugin)
+    run = load_run(directory)
+    assert_same_run(run)
+    assert run.namespace == '/rig_7/hip' and run.metadata == {}
+    data_file, = (path for path in directory.iterdir() if path.name != 'metadata.yaml')
+    assert_same_run(load_run(data_file))
+    (directory / 'metadata.yaml').unlink()
+    assert_same_run(load_run(directory))
+
+
+@pytest.mark.parametrize('options', [
+    {'compression': CompressionType.NONE},
+    {'compression': CompressionType.LZ4, 'chunk_size': 500},
+    {'use_chunking': False},
+    {'compression': CompressionType.ZSTD, 'enable_crcs': False},
+])
+def test_other_ways_to_write_mcap(tmp_path, options):
+    path = tmp_path / 'plain.mcap'
+    with open(path, 'wb') as stream:
+        writer = Writer(stream, **options)
+        writer.start('ros2')
+        channels = {}
+        for i in range(COUNT):
+            for short, message in example_messages(i).items():
+                if short not in channels:
+                    type_name = codecs.TOPIC_TYPES[short]
+                    schema = writer.register_schema(
+                        type_name, 'ros2msg', layout.schema_text(type_name).encode())
+                    channels[short] = writer.register_channel(
+                        full_name(short, ''), 'cdr', schema)
+                writer.add_message(
+                    channels[short], START_NS + i, codecs.encode(short, message), 0)
+        writer.finish()
+    run = load_run(path)
+    assert_same_run(run)
+    assert run.namespace == ''
+
+
+def test_split_bag_is_read_in_order(tmp_path, bag):
+    for number in (0, 2, 10):
+        part = write_bag(
+            tmp_path / f'part{number}', COUNT,
+            change=lambda short, i, message, n=number: message if i // 4 == n // 2 else None)
+        shutil.copy(part / f'part{number}_0.mcap', tmp_path / f'split_{number}.mcap')
+    run = load_run(tmp_path)
+    wanted = [START_NS + i * STEP_NS for i in (*range(0, 8), *range(20, 24))]
+    assert list(run.topics['pressure'].stamp_ns) == wanted and run.remarks == ()
+
+
+def test_namespace_is_chosen_or_asked_for(tmp_path):
+    both = write_bag(tmp_path / 'both', 5, namespaces=('/left/knee', '/right/knee'))
+    with pytest.raises(InputError, match='/left/knee, /right/knee'):
+        load_run(both)
+    assert load_run(both, namespace='/right/knee').namespace == '/right/knee'
+    assert load_run(both, namespace='left/knee/').namespace == '/left/knee'
+    with pytest.raises(InputError, match='/ankle; the bag has /left/knee, /right/knee'):
+        load_run(both, namespace='ankle')
+
+
+def test_namespaces_that_are_no_muscle_do_not_disturb(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        for name, type_name in (
+                ('/muscle/pressure', 'sensor_msgs/msg/FluidPressure'),
+                ('/muscle/contraction', 'sensor_msgs/msg/JointState'),
+                ('/weather/pressure', 'sensor_msgs/msg/FluidPressure'),
+                ('/arm/force', 'geometry_msgs/msg/WrenchStamped'),
+                ('/hand/contraction', 'geometry_msgs/msg/WrenchStamped'),
+                ('/muscle/force', 'std_msgs/msg/Float64'),
+                ('/image', 'sensor_msgs/msg/Image')):
+            writer.add_topic(name, type_name)
+            short = name.rsplit('/', 1)[-1]
+            if short in codecs.TOPIC_TYPES:
+                raw = codecs.encode(short, example_messages()[short])
+                writer.write(name, raw, START_NS, START_NS)
+    run = load_run(tmp_path / 'run')
+    assert run.namespace == '/muscle' and set(run.topics) == {'pressure', 'contraction'}
+    assert any('/muscle/force is std_msgs/msg/Float64' in remark for remark in run.remarks)
+
+
+def test_bag_without_a_muscle(tmp_path):
+    path = write_bag(tmp_path / 'run', 2, leave_out=('pressure', 'contraction'))
+    with pytest.raises(InputError, match='no messages on a pressure or contraction topic'):
+        load_run(path)
+
+
+def test_stamps_out_of_order_are_sorted_stably_and_said(tmp_path):
+    stamps = [0, 2, 1, 1, 3]
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
+        for i, stamp in enumerate(stamps):
+            raw = codecs.encode('pressure', messages.Pressure(stamp, 2e5 + i))
+            writer.write('/muscle/pressure', raw, START_NS + i, START_NS + i)
+    run = load_run(tmp_path / 'run')
+    one = run.topics['pressure']
+    assert list(one.stamp_ns) == [0, 1, 1, 2, 3]
+    assert list(one.values['pressure_pa'] - 2e5) == [0, 2, 3, 1, 4]
+    assert any('goes back 1 times' in remark for remark in run.remarks)
+    assert any('1 messages repeat' in remark for remark in run.remarks)
+
+
+def test_messages_without_stamps(tmp_path):
+    def unstamped(short, i, message):
+        if short == 'pressure':
+            return messages.Pressure(0, message.pressure_pa)
+        if short == 'force' and i == 3:
+            return messages.Force(0, 1.0)
+        return message
+
+    run = load_run(write_bag(tmp_path / 'run', 6, change=unstamped))
+    assert run.topics['pressure'].stamp_ns[0] == START_NS + 400_000
+    assert len(run.topics['force']) == 5
+    assert any('receive times' in remark for remark in run.remarks)
+    assert any('1 messages without a header stamp' in remark for remark in run.remarks)
+
+
+def test_valve_signal_is_what_the_valve_holds(tmp_path):
+    nan = float('nan')
+    signals = [
+        (('fill_duty',), (nan,)), (('fill_duty', 'vent_duty'), (0.1, 0.2)),
+        (('vent_duty',), (0.3,)), (('fill_duty', 'vent_duty'), (nan, 0.4)),
+        (('vent_duty', 'fill_duty'), (0.6, 0.5))]
+
+    def change(short, i, message):
+        if short != 'valve_signal':
+            return message
+        return messages.ValveSignal(message.stamp_ns, *signals[i])
+
+    one = load_run(write_bag(tmp_path / 'run', 5, change=change)).topics['valve_signal']
+    assert list(one.values['fill_duty']) == [0.1, 0.1, 0.1, 0.5]
+    assert list(one.values['vent_duty']) == [0.2, 0.3, 0.4, 0.6]
+
+
+def test_undecodable_messages_are_left_out(tmp_path, monkeypatch):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
+        for i in range(5):
+            raw = codecs.encode('pressure', messages.Pressure(START_NS + i, 2e5))
+            raw = raw[:12] if i == 2 else raw
+            writer.write('/muscle/pressure', raw, START_NS + i, START_NS + i)
+    run = load_run(tmp_path / 'run')
+    assert len(run.topics['pressure']) == 4
+    assert any('1 messages are not' in remark for remark in run.remarks)
+
+
+@pytest.fixture
+def whole_file(bag):
+    return (bag / 'run_0.mcap').read_bytes()
+
+
+@pytest.mark.parametrize('content, said', [
+    (b'', 'the file is empty'),
+    (b'hello, this is a text\n', 'not an MCAP file'),
+    (b'\x89MC', 'the recording ended early'),
+    (b'\x89MCAP0\r\n', 'the recording ended early'),
+    (b'\x89MCAP0\r\n' + bytes(range(256)) * 3, 'no message can be read'),
+])
+def test_files_that_are_no_bag(tmp_path, content, said):
+    path = tmp_path / 'bad.mcap'
+    path.write_bytes(content)
+    for recover in (False, True):
+        with pytest.raises(InputError) as caught:
+            load_run(path, recover=recover)
+        assert said in str(caught.value) and str(path) in str(caught.value)
+        assert '\n' not in str(caught.value)
+
+
+def test_recording_that_ended_early(tmp_path):
+    whole = write_bag(tmp_path / 'run', 2000)
+    data = (whole / 'run_0.mcap').read_bytes()
+    path = tmp_path / 'cut.mcap'
+    path.write_bytes(data[:len(data) * 2 // 3])
+    with pytest.raises(InputError, match=r'ended early .* \d+ messages .* can still be read'):
+        load_run(path)
+    run = load_run(path, recover=True)
+    complete = load_run(whole)
+    count = len(run.topics['pressure'])
+    assert 500 < count < 2000
+    np.testing.assert_array_equal(
+        run.topics['pressure'].values['pressure_pa'],
+        complete.topics['pressure'].values['pressure_pa'][:count])
+    assert any('ended early' in remark for remark in run.remarks)
+    path.write_bytes(data[:-1])
+    with pytest.raises(InputError, match=f'{2000 * len(codecs.TOPIC_TYPES)} messages'):
+        load_run(path)
+
+
+def test_damage_in_the_middle_is_found(tmp_path, bag):
+    whole = write_bag(tmp_path / 'run', 2000)
+    path = whole / 'run_0.mcap'
+    data = bytearray(path.read_bytes())
+    middle = data.index(b'zstd', len(data) // 2) + 2000
+    data[middle:middle + 4] = b'\x00\xff\x00\xff'
+    path.write_bytes(data)
+    with pytest.raises(InputError, match='damaged'):
+        load_run(whole)
+    assert 0 < len(load_run(whole, recover=True).topics['pressure']) < 2000
+
+
+def test_places_without_a_bag(tmp_path):
+    with pytest.raises(InputError, match='no such file'):
+        load_run(tmp_path / 'nowhere')
+    with pytest.raises(InputError, match='no bag in this directory'):
+        load_run(tmp_path)
+    text = tmp_path / 'notes.txt'
+    text.write_text('notes')
+    with pytest.raises(InputError, match='not a bag'):
+        load_run(text)
+    database = tmp_path / 'x.db3'
+    database.write_bytes(b'no database')
+    with pytest.raises(InputError, match='not a readable rosbag2 bag'):
+        load_run(database)
+
+
+@pytest.mark.parametrize('text', ['', 'a: [', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
+                                  'rosbag2_bagfile_information:\n  relative_file_paths: []\n'])
+def test_foreign_metadata_file(tmp_path, bag, text):
+    shutil.copytree(bag, tmp_path / 'run')
+    (tmp_path / 'run' / 'metadata.yaml').write_text(text)
+    with pytest.raises(InputError, match='not the metadata of a rosbag2 bag'):
+        load_run(tmp_path / 'run')
+
+
+def test_missing_data_file(tmp_path, bag):
+    (tmp_path / 'run').mkdir()
+    shutil.copy(bag / 'metadata.yaml', tmp_path / 'run')
+    with pytest.raises(InputError, match='run_0.mcap named in metadata.yaml is missing'):
+        load_run(Path(tmp_path / 'run'))

@@ -1,0 +1,225 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorder's count: what came, what was written, what was dropped, what never came."""
+
+import errno
+import threading
+
+from pam_actuation.bags import codecs
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.recorder import RecorderCore, SequenceCheck
+from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.writer import BagWriter
+from pam_sim.errors import InputError
+import pytest
+from sample_bag import example_messages, METADATA, START_NS
+
+TOPIC = '/muscle/pressure'
+
+
+def payload(i):
+    return codecs.encode('pressure', example_messages(i)['pressure'])
+
+
+class HeldWriter(BagWriter):
+    """A bag on a disk that stands still until ``go`` is set."""
+
+    def __init__(self, directory):
+        super().__init__(directory, METADATA)
+        self.go = threading.Event()
+        self.waiting = threading.Event()
+
+    def write(self, *args):
+        self.waiting.set()
+        assert self.go.wait(10.0)
+        super().write(*args)
+
+
+class FullDiskWriter(BagWriter):
+    """A bag on a disk with room for ``room`` messages."""
+
+    room = 0
+
+    def write(self, *args):
+        if sum(self.counts.values()) >= self.room:
+            raise OSError(errno.ENOSPC, 'No space left on device')
+        super().write(*args)
+
+
+def recorder_on(writer, **options):
+    core = RecorderCore(writer, **options)
+    core.add_topic(TOPIC, codecs.TOPIC_TYPES['pressure'])
+    return core
+
+
+def test_everything_received_is_written(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+    for i in range(3000):
+        assert core.receive(TOPIC, payload(i), START_NS + i - 5, START_NS + i, sequence=i + 1)
+    summary = core.close()
+    assert summary is core.close()
+    assert summary.complete and summary.written == summary.received == 3000
+    counts = summary.counts[TOPIC]
+    assert (counts.lost, counts.missed_at_start, counts.dropped) == (0, 0, 0)
+    bag = read_bag(tmp_path / 'run')
+    assert bag.topics[TOPIC].payloads == [payload(i) for i in range(3000)]
+    assert bag.topics[TOPIC].publish_time_ns[:2] == [START_NS - 5, START_NS - 4]
+    assert bag.topics[TOPIC].log_time_ns[:2] == [START_NS, START_NS + 1]
+    assert bag.records['pam_recording'][f'{TOPIC}.written'] == '3000'
+    assert bag.records['pam_recording'][f'{TOPIC}.lost'] == '0'
+
+
+def test_several_threads_may_hand_over(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+
+    def send(name):
+        core.add_topic(name, codecs.TOPIC_TYPES['pressure'])
+        for i in range(500):
+            core.receive(name, payload(i), START_NS + i, START_NS + i, sequence=i + 1)
+
+    threads = [threading.Thread(target=send, args=(f'/m{n}/pressure',)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    summary = core.close()
+    assert summary.complete and summary.written == 2000
+    counts = read_bag(tmp_path / 'run').counts
+    assert counts == {TOPIC: 0, **{f'/m{n}/pressure': 500 for n in range(4)}}
+
+
+def test_unknown_send_time_becomes_the_receive_time(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+    core.receive(TOPIC, payload(0), 0, START_NS)
+    summary = core.close()
+    assert summary.counts[TOPIC].lost is None
+    assert read_bag(tmp_path / 'run').topics[TOPIC].publish_time_ns == [START_NS]
+
+
+def test_a_disk_that_cannot_follow_drops_and_counts(tmp_path):
+    writer = HeldWriter(tmp_path / 'run')
+    core = recorder_on(writer, max_queued=10)
+    assert core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+    assert writer.waiting.wait(10.0)
+    taken = [core.receive(TOPIC, payload(i), START_NS, START_NS, i + 1) for i in range(1, 31)]
+    assert taken == [True] * 10 + [False] * 20
+    assert core.counts[TOPIC].dropped == 20 and core.queued == 10
+    writer.go.set()
+    summary = core.close()
+    counts = summary.counts[TOPIC]
+    assert not summary.complete
+    assert (counts.received, counts.written, counts.dropped, counts.lost) == (31, 11, 20, 0)
+    assert read_bag(tmp_path / 'run').counts[TOPIC] == 11
+
+
+def test_a_full_disk_is_reported_and_the_beginning_kept(tmp_path):
+    FullDiskWriter.room = 4000
+    core = recorder_on(FullDiskWriter(tmp_path / 'run', METADATA))
+    for i in range(6000):
+        core.receive(TOPIC, payload(i), START_NS + i, START_NS + i, i + 1)
+    summary = core.close()
+    assert 'No space left on device' in summary.write_error and not summary.complete
+    counts = summary.counts[TOPIC]
+    assert counts.received == 6000 == counts.written + counts.dropped
+    assert 0 < counts.written <= 4000
+    with pytest.raises(InputError, match=f'{counts.written} messages'):
+        load_run(tmp_path / 'run')
+    assert len(load_run(tmp_path / 'run', recover=True).topics['pressure']) == counts.written
+
+
+def test_error_at_close_is_reported(tmp_path, monkeypatch):
+    writer = BagWriter(tmp_path / 'run', METADATA)
+    core = recorder_on(writer)
+    core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+
+    def refuse():
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(writer, 'close', refuse)
+    summary = core.close()
+    assert 'Input/output error' in summary.write_error
+    assert summary.counts[TOPIC].received == 1 == summary.dropped
+    assert core.receive(TOPIC, payload(1), START_NS, START_NS, 2) is False
+
+
+def test_gaps_are_lost_messages(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+    for sequence in (4, 5, 7, 8, 12):
+        core.receive(TOPIC, payload(0), START_NS, START_NS, sequence)
+    summary = core.close()
+    counts = summary.counts[TOPIC]
+    assert (counts.lost, counts.missed_at_start) == (4, 3)
+    assert not summary.complete and summary.to_dict()['topics'][TOPIC]['lost'] == 4
+
+
+def test_diagnostics_have_no_sequence_check(tmp_path):
+    core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
+    core.add_topic('/diagnostics', codecs.TOPIC_TYPES['diagnostics'])
+    raw = codecs.encode('diagnostics', example_messages()['diagnostics'])
+    for sequence in (1, 1, 9, 2, 5):
+        core.receive('/diagnostics', raw, START_NS, START_NS, sequence)
+    summary = core.close()
+    assert summary.counts['/diagnostics'].lost is None and summary.complete
+
+
+def check(sequence, **options):
+    result = SequenceCheck()
+    for number in sequence:
+        result.add(number, **options)
+    return result.lost, result.missed_at_start, result.publishers
+
+
+def test_publishers_are_told_apart_by_continuity():
+    assert check([1, 2, 3]) == (0, 0, 1)
+    # A second publisher joins; both go on in turn.
+    assert check([10, 11, 1, 12, 2, 13, 3]) == (0, 9, 2)
+    # The publisher restarts.
+    assert check([1, 2, 3, 1, 2, 3, 4]) == (0, 0, 2)
+    # One of two loses a message.
+    assert check([10, 11, 1, 12, 2, 14, 3, 4, 15]) == (1, 9, 2)
+
+
+def test_given_publishers_are_counted_apart():
+    result = SequenceCheck()
+    for publisher, number in (('a', 5), ('b', 900), ('a', 6), ('b', 902), ('a', 7)):
+        result.add(number, publisher)
+    assert (result.lost, result.missed_at_start, result.publishers) == (1, 4 + 899, 2)
+
+
+def test_killed_recorder_leaves_a_readable_beginning(tmp_path):
+    writer = BagWriter(tmp_path / 'run', METADATA)
+    core = recorder_on(writer)
+    for i in range(20_000):
+        core.receive(TOPIC, payload(i), START_NS + i, START_NS + i, i + 1)
+        if i % 5000 == 4999:
+            while core.queued:
+                threading.Event().wait(0.01)
+    while core.counts[TOPIC].written < 20_000:
+        threading.Event().wait(0.01)
+    # As the file is now, a killed process would leave it.
+    left = tmp_path / 'left.mcap'
+    left.write_bytes(writer.file.read_bytes())
+    core.close()
+    with pytest.raises(InputError, match='ended early'):
+        load_run(left)
+    run = load_run(left, recover=True)
+    assert len(run.topics['pressure']) > 15_000
+    assert run.metadata['experiment_name'] == 'sine'
+
+
+def test_queue_length_is_checked(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        with pytest.raises(InputError, match='max_queued'):
+            RecorderCore(writer, max_queued=0)
