@@ -286,3 +286,17 @@ def test_the_printed_fault_table_is_the_one_the_driver_uses():
     printed = re.search(
         r'<!-- fault table: begin -->\n(.*)<!-- fault table: end -->', text, re.S)[1]
     assert printed == fault_table_markdown(), 'copy what fault_table_markdown() returns'
+
+
+def test_the_architecture_page_names_what_exists():
+    text = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
+    tree = re.search(r'```\n(pam_sim/\n.*?)```', text, re.S)[1]
+    folders = []
+    for line in tree.splitlines():
+        depth = (len(line) - len(line.lstrip())) // 2
+        name = line.split()[0]
+        path = ROOT.joinpath(*folders[:depth], name)
+        assert path.is_dir() if name.endswith('/') else path.is_file(), path
+        folders[depth:] = [name]
+    for path in re.findall(r'`((?:pam_sim|pam_actuation)/[\w/.]+)`', text):
+        assert (ROOT / path).exists(), path
