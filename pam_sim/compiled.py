@@ -18,4 +18,4 @@ from numba import njit
 
 # numpy error model: a division by zero gives inf as in NumPy instead of a check
 # on every division. No fastmath: compiled and interpreted results stay equal.
-compiled = njit(error_model='numpy', nogil=True)
+compiled = njit(error_model='numpy', nogil=True, forceinline=True)

@@ -22,8 +22,10 @@ points, and a shift of the whole signal, act smoothly.
 
 import numpy as np
 
+from pam_sim.effects.registry import get_effect
 from pam_sim.gap.health import VALVE_FIELDS
 from pam_sim.gap.result import FIELD, SIGNALS
+from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
 START_S = 0.05               # the state at the start is the median of this stretch
@@ -42,6 +44,8 @@ class Recording:
         A recording that passed ``check_health``.
     valve : {'ppr', 'hsv'}
         Its valve.
+    driven : bool
+        Contraction is an input of the model (isometric or driven load), no output.
 
     Attributes
     ----------
@@ -56,16 +60,18 @@ class Recording:
 
     """
 
-    def __init__(self, run, valve):
+    def __init__(self, run, valve, driven=False):
         self.valve = valve
-        self.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
-        used = [run.topics[s].stamp_ns for s in self.signals + ('valve_signal',)]
+        self.driven = driven
+        known = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
+        self.signals = tuple(s for s in known if not (driven and s == 'contraction'))
+        used = [run.topics[s].stamp_ns for s in known + ('valve_signal',)]
         self.start_ns = max(int(np.min(s)) for s in used)
         end_ns = min(int(np.max(s)) for s in used)
         self.steps = int((end_ns - self.start_ns) * 1e-9 / GRID_S)
         self.grid_s = np.arange(self.steps + 1) * GRID_S
         self.stamp_ns, self.time_s, self.measured = {}, {}, {}
-        for signal in self.signals:
+        for signal in known:
             stamp, value = _ordered(run.topics[signal], FIELD[signal])
             seconds = (stamp - self.start_ns) * 1e-9
             inside = (seconds >= 0.0) & (seconds <= self.grid_s[-1])
@@ -139,26 +145,49 @@ def run_from_pressure(rig, recording):
     A fast ideal regulator takes the place of the valve, so that only muscle and
     load remain; valve effects of the model are left out.
     """
-    seconds, value = recording.time_s['pressure'], recording.measured['pressure']
-    # Midpoint of each step, ahead by the lag of the fast regulator.
-    wanted = np.interp(recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S, seconds, value)
-    volts = (wanted - 101_325.0) / FAST_GAIN_PA_PER_V
-    return recording.at_stamps(simulate(pressure_driven(rig), recording, volts))
+    return recording.at_stamps(simulate(
+        pressure_driven(rig), recording, _fast_command(recording)))
+
+
+def simulate_driven(rig, recording, contraction_m, valve_signal=None):
+    """
+    Run the rig with the contraction prescribed on the grid; return its Response.
+
+    Without a valve signal the measured pressure is the input, for a rig from
+    ``pressure_driven``. Force is then the tension of the muscle alone.
+    """
+    if valve_signal is None:
+        valve_signal = _fast_command(recording)
+    return rig.with_(load='driven').simulate(
+        valve_signal, contraction_m=np.maximum(contraction_m, 0.0),
+        initial_pressure_pa=max(recording.start('pressure'), P_ATM_PA), dt_s=GRID_S)
+
+
+def _fast_command(recording):
+    """Return the voltage at which the fast regulator gives the measured pressure."""
+    # Midpoint of each step, ahead by the lag of the regulator.
+    wanted = np.interp(recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S,
+                       recording.time_s['pressure'], recording.measured['pressure'])
+    return (wanted - P_ATM_PA) / FAST_GAIN_PA_PER_V
 
 
 def pressure_driven(rig):
     """Return the rig with a regulator that follows its command at once."""
-    kept = [e for e in rig.effects if e.subsystem in ('muscle', 'load')]
+    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load')]
     return rig.with_(valve='ppr', effects=kept, parameters={
         'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
 
 
 def simulate(rig, recording, valve_signal):
     """Run the rig on the recording's grid from the recorded start; return its Response."""
+    if recording.driven:
+        x = np.interp(recording.grid_s, recording.time_s['contraction'],
+                      recording.measured['contraction'])
+        return simulate_driven(rig, recording, x, valve_signal)
     return rig.simulate(
         valve_signal, external_force_n=recording.external_force_n,
-        initial_pressure_pa=recording.start('pressure'),
-        initial_contraction_m=recording.start('contraction'), dt_s=GRID_S)
+        initial_pressure_pa=max(recording.start('pressure'), P_ATM_PA),
+        initial_contraction_m=max(recording.start('contraction'), 0.0), dt_s=GRID_S)
 
 
 def held_mean(time_s, value, grid_s, before=None):

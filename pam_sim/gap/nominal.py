@@ -31,6 +31,7 @@ from scipy.optimize import least_squares
 
 from pam_sim.gap.free_run import free_run
 from pam_sim.gap.result import Calibrated
+from pam_sim.valve import hsv, ppr
 
 LATENCY_PRIOR_S = 1e-3       # up to 2 ms is normal: mean and standard deviation 1 ms
 LATENCY_SD_S = 1e-3
@@ -39,7 +40,7 @@ FIT_RATE_HZ = 200.0
 ROUNDS = 4
 REFERENCE_PULL = 3.5         # beyond it a number is wrong rather than inexact
 MAX_PULL = 60.0
-HYSTERESIS = 1e-3            # relative change of the weights that ends the rounds
+SETTLED = 0.15               # relative change of the weights that ends the rounds
 
 
 @dataclass
@@ -106,7 +107,7 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
             kwargs={'temper': temper}, max_nfev=15, xtol=1e-5, ftol=1e-6, gtol=1e-8)
         z = solution.x
         fresh = problem.tempering(z)
-        settled = all(abs(fresh[s] / temper[s] - 1.0) < 0.15 for s in temper)
+        settled = all(abs(fresh[s] / temper[s] - 1.0) < SETTLED for s in temper)
         temper = fresh
         if settled:
             complete = True
@@ -119,7 +120,7 @@ class _Problem:
 
     def __init__(self, rig, recording, floor, chosen):
         self.rig, self.recording, self.floor = rig, recording, floor
-        self.parameters = uncertain_numbers(rig, recording.signals)
+        self.parameters = uncertain_numbers(rig)
         self.nominal = np.array([p.value for p in self.parameters])
         self.sd = np.array([p.sd for p in self.parameters])
         self.size = len(self.parameters) + 1
@@ -210,18 +211,19 @@ class Uncertain:
     upper: float
 
 
-def uncertain_numbers(rig, signals):
+def uncertain_numbers(rig):
     """
-    Return the numbers of a rig that have a tolerance and act on a recorded signal.
+    Return the numbers of a rig that have a tolerance and act with its valve.
 
-    Dead volume and conductance act on pressure through their ratio alone; both stay
-    free, each held by its own prior.
+    Dead volume and conductance act on pressure nearly through their ratio alone;
+    both stay free, each held by its own prior.
     """
+    other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
     found = []
-    for parameter in rig.specification():
-        tolerance = rig.tolerance(parameter.name)
+    for parameter in rig.parameter_list:
+        tolerance = rig.tolerance[parameter.name]
         value = rig.parameters[parameter.name]
-        if tolerance > 0.0 and value != 0.0:
+        if tolerance > 0.0 and value != 0.0 and parameter.name not in other:
             found.append(Uncertain(parameter.name, parameter.unit, value,
                                    abs(value) * tolerance, parameter.lower, parameter.upper))
     return found

@@ -31,7 +31,7 @@ PARAMETERS = (
 
 
 @compiled
-def acceleration(net_n, contraction_m, velocity_m_per_s, mass_kg, max_contraction_m):
+def acceleration(net_n, contraction_m, velocity_m_per_s, inverse_mass_per_kg, max_contraction_m):
     """
     Return the acceleration [m/s^2], zero where an end stop holds the mass.
 
@@ -40,11 +40,11 @@ def acceleration(net_n, contraction_m, velocity_m_per_s, mass_kg, max_contractio
     net_n : float
         Sum of all forces in the direction of contraction, N.
     contraction_m, velocity_m_per_s : float
-    mass_kg, max_contraction_m : float
+    inverse_mass_per_kg, max_contraction_m : float
 
     """
     if contraction_m <= 0.0 and velocity_m_per_s <= 0.0 and net_n < 0.0:
         return 0.0
     if contraction_m >= max_contraction_m and velocity_m_per_s >= 0.0 and net_n > 0.0:
         return 0.0
-    return net_n / mass_kg
+    return net_n * inverse_mass_per_kg

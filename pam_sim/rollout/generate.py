@@ -75,7 +75,8 @@ def settle(state, par):
     x = state[S_CONTRACTION]
     state[S_AIR_MASS] = p * air_volume(p, x, state, par) / par[PAR_RT]
     state[S_SUPPLY] = apply_supply(par[PAR_SUPPLY], state, par)
-    state[S_MUSCLE_FORCE] = muscle_force(p, x, state[S_VELOCITY], 0.0, 0.0, state, par)
+    state[S_MUSCLE_FORCE] = muscle_force(
+        map_tension(p, x, state, par), p, x, state[S_VELOCITY], 0.0, 0.0, state, par)
 
 
 @njit(cache=True, error_model='numpy', nogil=True)

@@ -86,7 +86,10 @@ PAR_GAIN_PPR = 19           # Pa/V
 PAR_TIME_CONSTANT = 20      # s
 PAR_DECAY_HALF = 21         # exp(-substep / 2 T_m)
 PAR_PWM_PERIOD = 22         # s
-PAR_BASE = 24
+PAR_INVERSE_LENGTH = 23     # 1/m
+PAR_INVERSE_MASS = 24       # 1/kg
+PAR_INVERSE_RT = 25         # kg/J
+PAR_BASE = 26
 
 VALVE_PPR = 0
 VALVE_HSV_AVERAGED = 1

@@ -120,7 +120,10 @@ def _pack_base(rig, numbers, state, par):
             (layout.PAR_GAIN_PPR, value['K_m']),
             (layout.PAR_TIME_CONSTANT, value['T_m']),
             (layout.PAR_DECAY_HALF, math.exp(-0.5 * numbers.substep_s / value['T_m'])),
-            (layout.PAR_PWM_PERIOD, value['pwm_period_s'])):
+            (layout.PAR_PWM_PERIOD, value['pwm_period_s']),
+            (layout.PAR_INVERSE_LENGTH, 1.0 / geometry.LENGTH_M),
+            (layout.PAR_INVERSE_MASS, 1.0 / mass),
+            (layout.PAR_INVERSE_RT, 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K))):
         par[index] = number
     state[layout.S_PRESSURE] = numbers.pressure_pa
     state[layout.S_CONTRACTION] = numbers.contraction_m

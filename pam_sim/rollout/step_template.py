@@ -15,10 +15,16 @@
 """
 One step of the rig: the source from which the kernel is made.
 
-As it stands, with hooks that do nothing, it is the nominal rig of
-``docs``: Runge-Kutta of fourth order over air mass, contraction and velocity,
-the regulator's lag exact. The generator replaces the hooks by calls of the
-registered effects and compiles the rest unchanged.
+As it stands, with hooks that do nothing, it is the nominal rig. The generator
+replaces the hooks by calls of the registered effects and compiles the rest
+unchanged.
+
+Scheme of one physics step h: the regulator's lag exactly; air mass by
+Runge-Kutta of fourth order; the motion by a Nystroem step whose contraction at
+middle and end follow from accelerations already known, so that the force map is
+read twice a step, velocities by Simpson's rule. Second order where a force
+depends on velocity, fourth elsewhere. Contraction and velocity end at events
+(end stop, reversal under dry friction).
 """
 
 import math
@@ -38,7 +44,7 @@ from pam_sim.rollout.layout import (
     OUT_TRUE_CONTRACTION, OUT_TRUE_FORCE, OUT_TRUE_PRESSURE, OUT_VELOCITY, OUT_VENTED,
     PAR_ATMOSPHERE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
     PAR_DECAY_HALF, PAR_DT, PAR_FORCE_GAIN, PAR_FREE_LOAD, PAR_GAIN_PPR, PAR_INVERSE_4_PI_N2,
-    PAR_LENGTH, PAR_MASS, PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP,
+    PAR_INVERSE_LENGTH, PAR_INVERSE_MASS, PAR_INVERSE_RT, PAR_LENGTH, PAR_MASS, PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP,
     PAR_SUBSTEPS, PAR_SUPPLY, PAR_THREAD_SQUARED, PAR_TIME_CONSTANT, PAR_VALVE, PAR_WEIGHT,
     S_AIR_MASS, S_CONTRACTION, S_DIRECTION, S_FILL_OFF, S_FILL_ON, S_FILLED, S_MUSCLE_FORCE,
     S_PERIOD, S_PRESSURE, S_STEPS, S_SUPPLY, S_TIME, S_VELOCITY, S_VENT_OFF, S_VENT_ON,
@@ -59,12 +65,18 @@ def air_volume(p, x, state, par):
 
 
 @compiled
-def muscle_force(p, x, v, dx, elapsed, state, par):
-    """Return the force the muscle transmits [N], its dry friction excepted."""
+def map_tension(p, x, state, par):
+    """Return the static tension [N] at pressure p [Pa] and contraction x [m]."""
     gauge, strain = apply_map_input(
-        p - par[PAR_ATMOSPHERE], x / par[PAR_LENGTH], state, par)
-    force = par[PAR_FORCE_GAIN] * tension_n(gauge, strain) - par[PAR_DAMPING] * v
-    return apply_muscle_force(force, p, x, v, dx, elapsed, state, par)
+        p - par[PAR_ATMOSPHERE], x * par[PAR_INVERSE_LENGTH], state, par)
+    return par[PAR_FORCE_GAIN] * tension_n(gauge, strain)
+
+
+@compiled
+def muscle_force(tension, p, x, v, dx, elapsed, state, par):
+    """Return the force the muscle transmits [N], its dry friction excepted."""
+    return apply_muscle_force(
+        tension - par[PAR_DAMPING] * v, p, x, v, dx, elapsed, state, par)
 
 
 @compiled
@@ -168,157 +180,141 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     """
     h = par[PAR_SUBSTEP]
     g = 0.5 * h
+    sixth = h * (1.0 / 6.0)
     x0 = state[S_CONTRACTION]
     v0 = state[S_VELOCITY]
-    p1 = state[S_PRESSURE]
-    m0 = state[S_AIR_MASS]
+    p0 = state[S_PRESSURE]
     free = par[PAR_FREE_LOAD] != 0.0
-    is_ppr = par[PAR_VALVE] == VALVE_PPR
-    mass = par[PAR_MASS]
+    inverse_mass = par[PAR_INVERSE_MASS]
     top = par[PAR_MAX_CONTRACTION]
-    rt = par[PAR_RT]
-
-    # Valve at the start of the step.
-    fill = 0.0
-    vent = 0.0
     supply = apply_supply(par[PAR_SUPPLY], state, par)
     state[S_SUPPLY] = supply
-    p2 = p1
-    p3 = p1
-    p4 = p1
-    in1 = 0.0
-    in2 = 0.0
-    in3 = 0.0
-    in4 = 0.0
-    out1 = 0.0
-    out2 = 0.0
-    out3 = 0.0
-    out4 = 0.0
-    q1 = 0.0
-    q2 = 0.0
-    q3 = 0.0
-    q4 = 0.0
-    if is_ppr:
-        p2, p4 = ppr_pressures(signal_0, h, state, par)
-        p3 = p2
-    else:
-        fill, vent = openings(signal_0, signal_1, time_s, h, state, par)
 
-    # Dry friction of this step: direction and level.
+    # Start of the step: dry friction and acceleration.
     level = 0.0
     dry = 0.0
-    stuck = False
-    a1 = 0.0
+    a0 = 0.0
+    moving = free
     if free:
-        level = apply_muscle_friction(0.0, p1, x0, v0, state, par) + apply_load_friction(
+        level = apply_muscle_friction(0.0, p0, x0, v0, state, par) + apply_load_friction(
             0.0, x0, v0, state, par)
         net = state[S_MUSCLE_FORCE] - load_force(x0, v0, 0.0, 0.0, external, state, par)
         if level > 0.0:
             if v0 != 0.0:
                 dry = math.copysign(level, v0)
             elif abs(net) <= level:
-                stuck = True
+                moving = False
             else:
                 dry = math.copysign(level, net)
-        if not stuck:
-            a1 = acceleration(net - dry, x0, v0, mass, top)
-        v_mean = v0
-    else:
-        v_mean = (x_target - x0) / h
-    moving = free and not stuck
-    drift = 0.0 if free else v_mean       # slope of a prescribed motion
+        if moving:
+            a0 = acceleration(net - dry, x0, v0, inverse_mass, top)
+    x_mid = x0
+    if moving:
+        x_mid = x0 + g * (v0 + 0.5 * g * a0)
+    elif not free:
+        x_mid = 0.5 * (x0 + x_target)
 
-    # Stage 1, 2, 3, 4 of Runge-Kutta: air mass m, contraction x, velocity v.
-    x2 = x0 + g * (v0 if moving else drift)
-    v2 = v0 + g * a1
-    if not is_ppr:
-        in1, out1 = valve_flows(fill, vent, p1, supply, par)
-        q1 = apply_mass_flow(in1 - out1, p1, x0, supply, state, par)
-        p2 = (m0 + g * q1) * rt / air_volume(p1, x2, state, par)
-        in2, out2 = valve_flows(fill, vent, p2, supply, par)
-        q2 = apply_mass_flow(in2 - out2, p2, x2, supply, state, par)
-    a2 = 0.0
-    a3 = 0.0
-    a4 = 0.0
-    x3 = x2
-    v3 = v2
+    # Middle of the step: pressure, then acceleration.
+    p_mid = p0
+    p_end = p0
+    fill = 0.0
+    vent = 0.0
+    mass0 = 0.0
+    q1 = 0.0
+    q2 = 0.0
+    q3 = 0.0
+    in1 = 0.0
+    in2 = 0.0
+    in3 = 0.0
+    out1 = 0.0
+    out2 = 0.0
+    out3 = 0.0
+    is_ppr = par[PAR_VALVE] == VALVE_PPR
+    if is_ppr:
+        p_mid, p_end = ppr_pressures(signal_0, h, state, par)
+    else:
+        fill, vent = openings(signal_0, signal_1, time_s, h, state, par)
+        mass0 = state[S_AIR_MASS]
+        in1, out1 = valve_flows(fill, vent, p0, supply, par)
+        q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
+        density = par[PAR_RT] / air_volume(p0, x_mid, state, par)      # Pa/kg
+        p_mid = (mass0 + g * q1) * density
+        in2, out2 = valve_flows(fill, vent, p_mid, supply, par)
+        q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
+        p_mid = (mass0 + g * q2) * density
+        in3, out3 = valve_flows(fill, vent, p_mid, supply, par)
+        q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
+    a_mid = 0.0
     if moving:
-        a2 = acceleration(
-            muscle_force(p2, x2, v2, x2 - x0, g, state, par)
-            - load_force(x2, v2, x2 - x0, g, external, state, par) - dry, x2, v2, mass, top)
-        x3 = x0 + g * v2
-        v3 = v0 + g * a2
-    if not is_ppr:
-        p3 = (m0 + g * q2) * rt / air_volume(p2, x3, state, par)
-        in3, out3 = valve_flows(fill, vent, p3, supply, par)
-        q3 = apply_mass_flow(in3 - out3, p3, x3, supply, state, par)
-    x4 = x0 + h * drift
-    v4 = v3
-    if moving:
-        a3 = acceleration(
-            muscle_force(p3, x3, v3, x3 - x0, g, state, par)
-            - load_force(x3, v3, x3 - x0, g, external, state, par) - dry, x3, v3, mass, top)
-        x4 = x0 + h * v3
-        v4 = v0 + h * a3
-    if not is_ppr:
-        p4 = (m0 + h * q3) * rt / air_volume(p3, x4, state, par)
-        in4, out4 = valve_flows(fill, vent, p4, supply, par)
-        q4 = apply_mass_flow(in4 - out4, p4, x4, supply, state, par)
-    x1 = x4
+        v_mid = v0 + g * a0
+        dx = x_mid - x0
+        force = muscle_force(
+            map_tension(p_mid, x_mid, state, par), p_mid, x_mid, v_mid, dx, g, state, par)
+        a_mid = acceleration(
+            force - load_force(x_mid, v_mid, dx, g, external, state, par) - dry,
+            x_mid, v_mid, inverse_mass, top)
+
+    # End of the step: contraction, pressure, velocity.
+    x1 = x0
     v1 = v0
     if moving:
-        a4 = acceleration(
-            muscle_force(p4, x4, v4, x4 - x0, h, state, par)
-            - load_force(x4, v4, x4 - x0, h, external, state, par) - dry, x4, v4, mass, top)
-        x1 = x0 + h / 6.0 * (v0 + 2.0 * (v2 + v3) + v4)
-        v1 = v0 + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+        x1 = x0 + h * v0 + h * sixth * (a0 + 2.0 * a_mid)
+        v1 = v0 + h * a_mid
     elif not free:
         x1 = x_target
-        v1 = v_mean
+        v1 = (x_target - x0) / h
         if v1 != 0.0:
             state[S_DIRECTION] = math.copysign(1.0, v1)
-
-    # Events: reversal under dry friction, then the end stops.
-    rest = 0.0
-    event = False
-    if dry != 0.0 and v1 * dry < 0.0:
-        share = v0 / (v0 - v1) if v0 != 0.0 else 0.0
-        x1 = x0 + 0.5 * v0 * share * h
-        v1 = 0.0
-        rest = (1.0 - share) * h
-        event = True
-    if moving and (x1 < 0.0 or x1 > top):
-        wall = 0.0 if x1 < 0.0 else top
-        rest = h * (x1 - wall) / (x1 - x0) if x0 != wall and x1 != x0 else 0.0
-        x1 = wall
-        v1 = 0.0
-        event = True
-    elif moving and ((x1 == 0.0 and v1 < 0.0) or (x1 == top and v1 > 0.0)):
-        v1 = 0.0
-    if event and rest > 0.0:
-        # From rest at the event: does the net force pull the mass on within the step?
-        net = muscle_force(p4, x1, 0.0, x1 - x0, h, state, par) - load_force(
-            x1, 0.0, x1 - x0, h, external, state, par)
-        if abs(net) > level:
-            a = acceleration(net - math.copysign(level, net), x1, 0.0, mass, top)
-            v1 = a * rest
-            x1 = x1 + 0.5 * a * rest * rest
-
-    # End of the step.
-    if is_ppr:
-        state[S_PRESSURE] = p4
-    else:
-        sixth = h / 6.0
-        m1 = m0 + sixth * (q1 + 2.0 * (q2 + q3) + q4)
-        state[S_AIR_MASS] = m1
-        state[S_PRESSURE] = m1 * rt / air_volume(p4, x1, state, par)
+    x_free = x1
+    if moving:
+        x1 = min(max(x1, 0.0), top)
+    if not is_ppr:
+        density = par[PAR_RT] / air_volume(p_mid, x1, state, par)
+        p_end = (mass0 + h * q3) * density
+        in4, out4 = valve_flows(fill, vent, p_end, supply, par)
+        q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
+        mass1 = mass0 + sixth * (q1 + 2.0 * (q2 + q3) + q4)
+        state[S_AIR_MASS] = mass1
         state[S_FILLED] += sixth * (in1 + 2.0 * (in2 + in3) + in4)
         state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
-    p = state[S_PRESSURE]
+        p_end = mass1 * density
+    tension = map_tension(p_end, x1, state, par)
+    if moving:
+        dx = x1 - x0
+        opposing = load_force(x1, v1, dx, h, external, state, par)
+        a1 = acceleration(
+            muscle_force(tension, p_end, x1, v1, dx, h, state, par) - opposing - dry,
+            x1, v1, inverse_mass, top)
+        v1 = v0 + sixth * (a0 + 4.0 * a_mid + a1)
+
+        # Events: an end stop, or a reversal under dry friction.
+        rest = -1.0
+        if x_free != x1:
+            rest = h * (x_free - x1) / (x_free - x0)
+        elif (x1 <= 0.0 and v1 < 0.0) or (x1 >= top and v1 > 0.0):
+            rest = 0.0
+        elif dry != 0.0 and v1 * dry < 0.0:
+            share = v0 / (v0 - v1)
+            rest = (1.0 - share) * h
+            x1 = min(max(x0 + 0.5 * v0 * share * h, 0.0), top)
+            tension = map_tension(p_end, x1, state, par)
+        if rest >= 0.0:
+            # At rest at the event; does the net force move the mass on within the step?
+            v1 = 0.0
+            net = muscle_force(tension, p_end, x1, 0.0, x1 - x0, h, state, par) - opposing
+            if abs(net) > level:
+                a1 = acceleration(
+                    net - math.copysign(level, net), x1, 0.0, inverse_mass, top)
+                v1 = a1 * rest
+                x1 = min(max(x1 + 0.5 * v1 * rest, 0.0), top)
+                tension = map_tension(p_end, x1, state, par)
+            if not is_ppr:
+                p_end = state[S_AIR_MASS] * par[PAR_RT] / air_volume(p_end, x1, state, par)
+    state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
     state[S_VELOCITY] = v1
-    state[S_MUSCLE_FORCE] = muscle_force(p, x1, v1, x1 - x0, h, state, par)
-    apply_commit(p, x1, v1, x1 - x0, h, state, par)
+    state[S_MUSCLE_FORCE] = muscle_force(tension, p_end, x1, v1, x1 - x0, h, state, par)
+    apply_commit(p_end, x1, v1, x1 - x0, h, state, par)
 
 
 @compiled
@@ -341,7 +337,7 @@ def cell_force(external, state, par):
             dry = math.copysign(level, v)
         else:
             dry = min(max(net, -level), level)
-    a = acceleration(net - dry, x, v, par[PAR_MASS], par[PAR_MAX_CONTRACTION])
+    a = acceleration(net - dry, x, v, par[PAR_INVERSE_MASS], par[PAR_MAX_CONTRACTION])
     cell = par[PAR_MASS] * a + against
     if guide > 0.0:
         cell += dry * guide / level
@@ -357,7 +353,7 @@ def observe(state, par, inp, out):
     out[OUT_TIME] = state[S_TIME]
     out[OUT_VELOCITY] = state[S_VELOCITY]
     if par[PAR_VALVE] == VALVE_PPR:
-        out[OUT_AIR_MASS] = p * air_volume(p, x, state, par) / par[PAR_RT]
+        out[OUT_AIR_MASS] = p * air_volume(p, x, state, par) * par[PAR_INVERSE_RT]
     else:
         out[OUT_AIR_MASS] = state[S_AIR_MASS]
     out[OUT_SUPPLY] = state[S_SUPPLY]

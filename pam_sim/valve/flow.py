@@ -65,5 +65,9 @@ def mass_flow_kg_per_s(upstream_pa, downstream_pa, conductance_kg_per_s_pa, crit
         b of ISO 6358.
 
     """
-    return conductance_kg_per_s_pa * upstream_pa * flow_function(
-        downstream_pa / upstream_pa, critical_ratio)
+    choked = conductance_kg_per_s_pa * upstream_pa
+    if downstream_pa <= critical_ratio * upstream_pa:
+        return choked
+    if downstream_pa >= upstream_pa:
+        return 0.0
+    return choked * flow_function(downstream_pa / upstream_pa, critical_ratio)
