@@ -26,10 +26,13 @@ from pathlib import Path
 import numpy as np
 
 from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.source import read_bag
 from pam_sim.errors import InputError
+
+__all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
 
 DIAGNOSTICS = 'diagnostics'
 PUBLISHED = 'published.'
@@ -100,13 +103,25 @@ class BagInfo:
         return sum(topic.dropped or 0 for topic in self.topics)
 
     @property
+    def missed_at_start(self):
+        """Return the number of messages sent before the recorder was connected."""
+        return sum(topic.missed_at_start or 0 for topic in self.topics)
+
+    @property
     def complete(self):
         """Return whether all published messages are in the bag, None if unknown."""
-        if self.recovered or self.lost or self.dropped:
+        if self.recovered or self.lost or self.dropped or self.missed_at_start:
             return False
-        rig = [t for t in self.topics if t.name.rsplit('/', 1)[-1] in codecs.TOPIC_TYPES]
-        known = [t.lost is not None or t.published is not None for t in rig]
-        return True if rig and all(known) else None
+        # Diagnostics come from every node there is, also from those not of the rig.
+        rig = [
+            topic for topic in self.topics if topic.name != '/diagnostics'
+            and topic.name.rsplit('/', 1)[-1] in codecs.TOPIC_TYPES]
+        return True if rig and all(topic.lost is not None for topic in rig) else None
+
+    @property
+    def has_findings(self):
+        """Return whether something is missing, odd or implausible."""
+        return self.complete is False or bool(self.remarks)
 
     def topic(self, full_name):
         """Return the TopicInfo of a full name; InputError if the bag has no such topic."""
@@ -119,7 +134,7 @@ class BagInfo:
         """Return everything as plain data for JSON."""
         return {
             **asdict(self), 'lost': self.lost, 'dropped': self.dropped,
-            'complete': self.complete}
+            'missed_at_start': self.missed_at_start, 'complete': self.complete}
 
 
 def bag_info(path, recover=False):
@@ -262,8 +277,8 @@ def _add_counts(info, topic, recording, published):
     by_then = info.count
     if topic.name != '/diagnostics' and topic.publish_time_ns != topic.log_time_ns:
         by_then = int((np.array(topic.publish_time_ns) <= sent_ns).sum())
-    missing = max(0, info.published - by_then - (info.dropped or 0))
-    info.lost = max(info.lost or 0, missing)
+    elsewhere = (info.dropped or 0) + (info.missed_at_start or 0)
+    info.lost = max(info.lost or 0, info.published - by_then - elsewhere)
 
 
 def _loss_remarks(info):
@@ -275,4 +290,8 @@ def _loss_remarks(info):
         remarks.append(
             f'{info.name}: {info.dropped} messages arrived but the recorder could not write '
             'them.')
+    if info.missed_at_start:
+        remarks.append(
+            f'{info.name}: {info.missed_at_start} messages were sent before the recorder was '
+            'connected.')
     return remarks

@@ -31,7 +31,7 @@ _TABLE = ('topic', 'messages', 'rate', 'longest gap', 'jitter', 'published', 'lo
 _SHORT_TEXTS = ('experiment_name', 'valve', 'seed', 'software_version')
 
 
-def render(info):
+def render_text(info):
     """Return the text of a BagInfo, lines of unlimited width, no trailing newline."""
     lines = [info.path, _headline(info)]
     lines += [
@@ -95,5 +95,7 @@ def _verdict(info):
     elif info.complete is None:
         text = 'Nothing is known to be missing; not every topic could be checked.'
     else:
-        text = f'Incomplete: {info.lost} messages lost, {info.dropped} dropped.'
+        text = (
+            f'Incomplete: {info.lost} messages lost, {info.dropped} dropped, '
+            f'{info.missed_at_start} sent before the recorder was connected.')
     return text + (' Remarks:' if info.remarks else '')

@@ -45,9 +45,10 @@ class BagWriter:
     ----------
     directory : path
         The bag; its parents are created. The data file carries its name.
-    metadata : dict of str to str
-        Content of the ``pam_experiment`` record (``bags/metadata.py``); also
-        kept as custom data in metadata.yaml, so that converted bags have it.
+    metadata : dict of str to str, or of str to dict
+        Content of the ``pam_experiment`` record (``bags/metadata.py``), or several
+        records by name. That of the experiment is also kept as custom data in
+        metadata.yaml, so that converted bags have it.
     overwrite : bool
         Replace an existing bag. Files that are no part of a bag are never touched.
 
@@ -62,7 +63,8 @@ class BagWriter:
 
     def __init__(self, directory, metadata=None, overwrite=False):
         self.directory = Path(directory).resolve()
-        self._experiment = {str(k): str(v) for k, v in (metadata or {}).items()}
+        records = _records(metadata or {})
+        self._experiment = records.get(EXPERIMENT_RECORD, {})
         self._topics = {}
         self._channels = {}
         self._schemas = {}
@@ -76,8 +78,8 @@ class BagWriter:
             self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._mcap.start(profile='ros2', library=LIBRARY)
         self._write_rosbag2_record()
-        if self._experiment:
-            self._mcap.add_metadata(EXPERIMENT_RECORD, self._experiment)
+        for name, texts in records.items():
+            self._mcap.add_metadata(name, texts)
         self._stream.flush()
 
     @property
@@ -132,7 +134,7 @@ class BagWriter:
 
     def add_metadata(self, name, values):
         """Append a named metadata record of texts."""
-        self._mcap.add_metadata(name, {str(k): str(v) for k, v in values.items()})
+        self._mcap.add_metadata(name, _texts(values))
 
     def flush(self):
         """Hand all finished chunks to the operating system."""
@@ -178,6 +180,20 @@ class BagWriter:
         # Written at open and at close, as rosbag2 does; readers take the last one.
         self._mcap.add_metadata(
             ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(self._bag_metadata())})
+
+
+def _texts(values):
+    return {str(key): str(value) for key, value in values.items()}
+
+
+def _records(metadata):
+    """Return record name to texts; texts without a record's name are the experiment's."""
+    records = {
+        name: _texts(values) for name, values in metadata.items() if isinstance(values, dict)}
+    loose = {key: value for key, value in metadata.items() if key not in records}
+    if loose:
+        records[EXPERIMENT_RECORD] = {**records.get(EXPERIMENT_RECORD, {}), **_texts(loose)}
+    return records
 
 
 def _make_room(directory, overwrite):

@@ -18,8 +18,7 @@ import json
 
 from pam_actuation import messages
 from pam_actuation.bags import codecs
-from pam_actuation.bags.info import bag_info
-from pam_actuation.bags.info_text import render
+from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.metadata import experiment_metadata, UNITS
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter
@@ -36,7 +35,7 @@ def said(info, *words):
 
 def test_good_bag(tmp_path):
     info = bag_info(write_bag(tmp_path / 'run', COUNT))
-    assert info.remarks == [] and info.notes == []
+    assert info.remarks == [] and info.notes == [] and not info.has_findings
     assert info.message_count == COUNT * len(codecs.TOPIC_TYPES)
     assert info.namespaces == ['/muscle'] and info.metadata == METADATA
     assert info.duration_s == pytest.approx((COUNT - 1) * 0.005)
@@ -58,7 +57,7 @@ def test_good_bag(tmp_path):
 
 
 def test_text_is_in_units_of_people(tmp_path):
-    text = render(bag_info(write_bag(tmp_path / 'run', COUNT)))
+    text = render_text(bag_info(write_bag(tmp_path / 'run', COUNT)))
     assert '/muscle/pressure: 187.7 to 189.7 kPa gauge' in text
     assert '/muscle/contraction: 13.00 to 15.00 mm' in text
     assert '200.0 Hz' in text and 'experiment_name: sine' in text
@@ -73,10 +72,10 @@ def test_gap_and_loss_against_published(tmp_path):
     signal = info.topic('/muscle/valve_signal')
     assert (signal.count, signal.published, signal.lost) == (COUNT - 10, COUNT, 10)
     assert signal.gaps == 1 and signal.max_gap_s == pytest.approx(0.055)
-    assert info.complete is False
+    assert info.complete is False and info.has_findings
     assert said(info, '/muscle/valve_signal', '10 messages of 400 published never arrived')
     assert said(info, '/muscle/valve_signal', '1 gaps, the longest 55 ms')
-    assert 'Incomplete: 10 messages lost' in render(info)
+    assert 'Incomplete: 10 messages lost' in render_text(info)
 
 
 def test_loss_of_a_node_that_died_before_its_last_report(tmp_path):
@@ -111,7 +110,25 @@ def test_recorder_counts_reach_the_info(tmp_path):
     assert info.complete is False
     # Without that loss every topic is accounted for.
     info.topic('/muscle/force').lost = 0
-    assert info.complete is True and 'Complete' in render(info)
+    assert info.complete is True and 'Complete' in render_text(info)
+
+
+def test_messages_before_the_recorder_are_told_from_losses(tmp_path):
+    core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
+    for short in ('valve_signal', 'diagnostics'):
+        core.add_topic(full_name(short), codecs.TOPIC_TYPES[short])
+    for i in range(6, 20):
+        for short in ('valve_signal', 'diagnostics'):
+            received_ns = START_NS + i * STEP_NS
+            core.receive(
+                full_name(short), codecs.encode(short, example_messages(i)[short]),
+                received_ns - 1000, received_ns, i + 1)
+    core.close()
+    info = bag_info(tmp_path / 'run')
+    signal = info.topic('/muscle/valve_signal')
+    assert (signal.published, signal.count, signal.missed_at_start) == (20, 14, 6)
+    assert signal.lost == 0 and info.complete is False
+    assert said(info, '6 messages were sent before the recorder was connected')
 
 
 @pytest.mark.parametrize('short, message, words', [
@@ -173,7 +190,7 @@ def test_foreign_topics_are_listed(tmp_path):
     info = bag_info(tmp_path / 'run')
     assert info.topic('/chatter').count == 5 and info.namespaces == []
     assert said(info, 'no messages on any topic of a muscle')
-    assert info.complete is None and '/chatter' in render(info)
+    assert info.complete is None and '/chatter' in render_text(info)
 
 
 def test_bag_that_ended_early(tmp_path):

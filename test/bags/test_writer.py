@@ -169,6 +169,17 @@ def test_topics_are_checked(tmp_path):
             writer.add_topic('/muscle/x', 'pam_msgs/msg/Muscle')
 
 
+def test_several_records(tmp_path):
+    records = {'pam_experiment': {'valve': 'hsv'}, 'calibration': {'gain': 2}}
+    BagWriter(tmp_path / 'run', records).close()
+    with open(tmp_path / 'run' / 'run_0.mcap', 'rb') as stream:
+        found = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
+    assert found['pam_experiment'] == {'valve': 'hsv'}
+    assert found['calibration'] == {'gain': '2'}
+    facts = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
+    assert facts[layout.METADATA_ROOT]['custom_data'] == {'valve': 'hsv'}
+
+
 def test_same_messages_give_the_same_bytes(tmp_path):
     for parent in ('a', 'b'):
         (tmp_path / parent).mkdir()
