@@ -159,6 +159,17 @@ class ClosedLoop:
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, max(1, round(driver_period * rate_hz)), latency)
 
+    @property
+    def reference_m(self):
+        """Wanted contraction [m] at every tick."""
+        return self._position[:self.ticks]
+
+    @property
+    def start_tick(self):
+        """First tick of the periodic part, of the whole where there is none."""
+        cycles = self.experiment.cycles
+        return 0 if cycles is None else int(cycles[0] * self.rate_hz)
+
     def _driver(self):
         """Return fresh state, par, out of the driver law."""
         if self.hsv:

@@ -1,0 +1,46 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What tuning minimises: tracking error in mm, late errors more than early ones."""
+
+import numpy as np
+
+LATE_SHARE = 0.3          # of the experiment, counted from its end
+_EARLY_WEIGHT = 0.25
+_WORST_WEIGHT = 0.1
+_LOST_MM = 1e3            # cost of a run that is not finite
+
+
+def tracking_cost_mm(error_m, start_tick=0):
+    """
+    Return the cost [mm] of one run.
+
+    Root mean square error of the last part of the run, plus a quarter of that of the whole
+    run (learning fast counts), plus a tenth of the worst late error.
+
+    Parameters
+    ----------
+    error_m : numpy.ndarray
+        Reference minus contraction [m] at every tick.
+    start_tick : int
+        First tick that counts: the start from rest is the same for all controllers.
+
+    """
+    error_mm = np.asarray(error_m)[start_tick:] * 1e3
+    if not np.all(np.isfinite(error_mm)):
+        return _LOST_MM
+    late = error_mm[-max(1, int(len(error_mm) * LATE_SHARE)):]
+    return float(
+        np.sqrt(np.mean(late ** 2)) + _EARLY_WEIGHT * np.sqrt(np.mean(error_mm ** 2))
+        + _WORST_WEIGHT * np.max(np.abs(late)))

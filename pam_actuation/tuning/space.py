@@ -1,0 +1,106 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What may be tuned and between which bounds: a named box, logarithmic where apt."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from pam_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One tuned setting; ``log``: searched on a logarithmic scale; ``whole``: an integer."""
+
+    name: str
+    lower: float
+    upper: float
+    log: bool = True
+    whole: bool = False
+
+
+SOFC_AXES = (
+    Axis('lead_s', 0.02, 0.2, log=False),
+    Axis('credit_delay_s', 0.02, 0.2, log=False),
+    Axis('credit_spread_s', 0.0, 0.04, log=False),
+    Axis('learning_rate', 0.2, 8.0),
+    Axis('feedback_learning_per_m_s', 50.0, 6e3),
+    Axis('feedforward_leak_per_m_s', 1.0, 200.0),
+    Axis('proportional_pa_per_m', 1e5, 3e6),
+    Axis('integral_pa_per_m_s', 1e6, 4e7),
+    Axis('derivative_pa_s_per_m', 5e3, 5e5),
+    Axis('change_filter_s', 0.005, 0.06),
+    Axis('direction_blend_m_per_s', 2e-4, 1e-2),
+    Axis('index_tau_s', 0.01, 0.3),
+    Axis('feedback_gain_pa', 5e2, 2e4),
+    Axis('reference_knots', 13, 61, log=False, whole=True),
+)
+PID_AXES = (
+    Axis('proportional_pa_per_m', 1e5, 1e7),
+    Axis('integral_pa_per_m_s', 1e6, 1e8),
+    Axis('derivative_pa_s_per_m', 5e3, 1e6),
+    Axis('change_filter_s', 0.005, 0.06),
+)
+PID_INVERSE_AXES = PID_AXES + (Axis('lead_s', 0.0, 0.2, log=False),)
+
+
+def default_axes(controller):
+    """
+    Return the axes for a controller.
+
+    Settings that give learned rules their meaning stay fixed once rules have been learned.
+    """
+    if controller.kind == 'pid':
+        return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
+    from pam_actuation.control.sofc.settings import SCALING
+    rules = controller.rules
+    learned = rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any()
+    return tuple(axis for axis in SOFC_AXES if not (learned and axis.name in SCALING))
+
+
+def to_unit(axes, settings):
+    """Return settings as a point of the unit cube, clipped into it."""
+    point = []
+    for axis in axes:
+        value = min(max(settings[axis.name], axis.lower), axis.upper)
+        if axis.log:
+            point.append(math.log(value / axis.lower) / math.log(axis.upper / axis.lower))
+        else:
+            point.append((value - axis.lower) / (axis.upper - axis.lower))
+    return np.array(point)
+
+
+def from_unit(axes, point):
+    """Return the settings of a point of the unit cube, four significant digits."""
+    settings = {}
+    for axis, part in zip(axes, point):
+        part = min(max(float(part), 0.0), 1.0)
+        if axis.log:
+            value = axis.lower * (axis.upper / axis.lower) ** part
+        else:
+            value = axis.lower + part * (axis.upper - axis.lower)
+        settings[axis.name] = float(round(value)) if axis.whole else float(f'{value:.4g}')
+    return settings
+
+
+def check_axes(axes, settings):
+    """Raise InputError for an axis that is no setting of the controller or is empty."""
+    for axis in axes:
+        if axis.name not in settings:
+            raise InputError(f'cannot tune {axis.name}: the controller has no such setting')
+        if not axis.lower < axis.upper or (axis.log and axis.lower <= 0.0):
+            raise InputError(
+                f'cannot tune {axis.name} between {axis.lower:g} and {axis.upper:g}')

@@ -1,0 +1,87 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Controllers from YAML: presets, exact round trip, mistakes with file and line."""
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_sim.errors import InputError
+import pytest
+from straight_rig import StraightRig
+
+
+@pytest.mark.parametrize('name, kind', [
+    ('sofc_ppr', 'sofc'), ('sofc_hsv', 'sofc'), ('pid', 'pid')])
+def test_presets_load(name, kind):
+    controller = load_controller(name, StraightRig())
+    assert controller.kind == kind
+    assert controller.rate_hz == 200.0
+
+
+@pytest.mark.parametrize('name', ['sofc_ppr', 'pid'])
+def test_text_of_a_controller_rebuilds_it_to_the_bit(name):
+    first = load_controller(name, StraightRig())
+    random = np.random.default_rng(5)
+    moves = [(random.uniform(0.0, 0.02), random.uniform(0.0, 0.02)) for _ in range(300)]
+    for x, r in moves:
+        first.step(x, r, 0.013, r, 0.013)
+    text = first.to_yaml()
+    second = load_controller(text)
+    assert second.to_yaml() == text
+    first.pause()
+    for x, r in moves:
+        assert first.step(x, r, -0.01, r, -0.01) == second.step(x, r, -0.01, r, -0.01)
+    assert first.state_values() == second.state_values()
+
+
+@pytest.mark.parametrize('text, line, words', [
+    ('controller: sofc\nsettings:\n  lead_sec: 0.1\n', 3, 'lead_s'),
+    ('controller: sofc\nsettings:\n  lead_s: 7.0\n', 3, '0...0.5'),
+    ('controller: sofc\nsettings:\n  lead_s: soon\n', 3, 'number'),
+    ('controller: sofc\nsettings:\n  index_form: round\n', 3, 'linear'),
+    ('controller: fuzzy\nsettings: {}\n', 1, 'sofc'),
+    ('controller: sofc\n\ngains: {}\n', 3, 'gains'),
+    ('controller: pid\nrules: a.json\n', 2, 'rules'),
+    ('controller: sofc\nstatic_inverse:\n  lower_m: 0\n  step_m: 0\n  pressure_pa: [1, 2]\n', 4,
+     'step_m')])
+def test_mistakes_name_file_line_and_what_is_allowed(text, line, words, tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_controller(str(path), StraightRig())
+    assert caught.value.where == f'{path}:{line}'
+    assert words in str(caught.value)
+
+
+def test_unknown_preset_lists_the_known_ones():
+    with pytest.raises(InputError, match='sofc_hsv'):
+        load_controller('sofc_xyz', StraightRig())
+
+
+def test_without_a_rig_the_text_must_bring_its_inverse():
+    with pytest.raises(InputError, match='static_inverse'):
+        load_controller('controller: sofc\nsettings: {}\n')
+
+
+def test_rules_file_beside_the_controller_file_is_loaded(tmp_path):
+    first = load_controller('sofc_ppr', StraightRig())
+    first.rules.feedforward[0, 4] = 1234.5
+    first.rules.save(tmp_path / 'learned.json')
+    preset = first.to_yaml().split('static_inverse:')[0]
+    (tmp_path / 'mine.yaml').write_text(preset + 'rules: learned.json\n')
+    second = load_controller(tmp_path / 'mine.yaml', StraightRig())
+    assert second.rules.feedforward[0, 4] == 1234.5
+    (tmp_path / 'learned.json').write_text('{}')
+    with pytest.raises(InputError, match='learned.json'):
+        load_controller(tmp_path / 'mine.yaml', StraightRig())

@@ -1,0 +1,169 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The controller loop: validity of inputs, reference ahead, faults, state record."""
+
+import math
+
+from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.tick import join_stamp
+from pam_actuation.messages import Contraction, Pressure, Reference, ReferenceTrajectory
+from pam_sim.units import P_ATM_PA
+import pytest
+from straight_rig import sofc
+
+MS = 1_000_000
+START = 1_700_000_000_000_000_123
+
+
+def ready(contraction=0.01):
+    loop = ControllerLoop(sofc())
+    loop.on_contraction(Contraction(START, contraction))
+    loop.on_reference(Reference(START, 0.01, 0.0))
+    return loop
+
+
+def by_name(state):
+    return dict(zip(state.names, state.values))
+
+
+def test_vented_and_says_why_until_there_are_contraction_and_reference():
+    loop = ControllerLoop(sofc())
+    command, _ = loop.tick(START)
+    assert command.pressure_pa == P_ATM_PA
+    assert not loop.valid and 'no contraction' in loop.reason
+    loop.on_contraction(Contraction(START, 0.01))
+    assert loop.tick(START + MS)[0].pressure_pa == P_ATM_PA
+    assert 'no reference' in loop.reason
+    loop.on_reference(Reference(START, 0.01, 0.0))
+    assert loop.tick(START + 2 * MS)[0].pressure_pa > P_ATM_PA
+    assert loop.valid and loop.reason == 'ok'
+
+
+@pytest.mark.parametrize('message, words', [
+    (Contraction(START - 101 * MS, 0.01), 'older'), (Contraction(START + 21 * MS, 0.01), 'ahead'),
+    (Contraction(START, math.nan), 'finite'), (Contraction(START, math.inf), 'finite'),
+    (Contraction(START, 0.3), 'outside')])
+def test_unusable_contraction_vents_and_recovers(message, words):
+    loop = ready()
+    loop.tick(START)
+    loop.on_contraction(message)
+    command, state = loop.tick(START)
+    assert command.pressure_pa == P_ATM_PA
+    assert words in loop.reason
+    assert by_name(state)['contraction_stamp_sec'] == -1.0
+    loop.on_contraction(Contraction(START, 0.01))
+    assert loop.tick(START)[0].pressure_pa > P_ATM_PA
+
+
+def test_stale_pressure_is_not_used_but_does_not_stop_the_loop():
+    loop = ready()
+    loop.on_pressure(Pressure(START - 200 * MS, 3e5))
+    _, state = loop.tick(START)
+    assert loop.valid and math.isnan(by_name(state)['pressure_pa'])
+    loop.on_pressure(Pressure(START, 3e5))
+    assert by_name(loop.tick(START + MS)[1])['pressure_pa'] == 3e5
+
+
+def test_silent_reference_is_held_then_vented_then_resumed():
+    loop = ready()
+    reasons = {}
+    for k in range(0, 600):
+        now = START + k * 5 * MS
+        loop.on_contraction(Contraction(now, 0.01))
+        _, state = loop.tick(now)
+        reasons.setdefault(loop.reason, (k * 0.005, by_name(state)['learning'], loop.valid))
+    assert reasons['ok'] == (0.0, 1.0, True)
+    at, learning, valid = reasons['reference lost, holding its last position']
+    assert at == pytest.approx(0.505) and learning == 0.0 and valid
+    at, _, valid = reasons['reference lost, muscle vented']
+    assert at == pytest.approx(2.005) and not valid
+    loop.on_reference(Reference(now, 0.01, 0.0))
+    loop.tick(now)
+    assert loop.reason == 'ok'
+
+
+def test_reference_that_is_not_finite_is_ignored_and_counted():
+    loop = ready()
+    loop.on_reference(Reference(START + MS, math.nan, 0.0))
+    loop.on_reference_trajectory(ReferenceTrajectory(START, (0, 0), (0.1, 0.2), (0.0, 0.0)))
+    _, state = loop.tick(START + MS)
+    assert loop.rejected_references == 2
+    assert by_name(state)['reference_m'] == 0.01
+
+
+def test_error_belongs_to_the_measurement_and_preview_to_now():
+    loop = ControllerLoop(sofc({'lead_s': 0.1}))
+    loop.on_contraction(Contraction(START - 4 * MS, 0.01))
+    loop.on_reference(Reference(START, 0.01, 0.05))
+    values = by_name(loop.tick(START + MS)[1])
+    assert values['reference_m'] == pytest.approx(0.01 - 0.05 * 0.004)
+    assert values['lead_reference_m'] == pytest.approx(0.01 + 0.05 * 0.101)
+
+
+def sine_trajectory(stamp_ns, horizon=31):
+    def at(t):
+        return 0.014 + 0.01 * math.sin(6.3 * t), 0.063 * math.cos(6.3 * t)
+    offsets = tuple(k * 20 * MS for k in range(horizon))
+    points = [at((stamp_ns + o - START) * 1e-9) for o in offsets]
+    return ReferenceTrajectory(
+        stamp_ns, offsets, tuple(x for x, _ in points), tuple(v for _, v in points)), at
+
+
+def test_trajectory_is_interpolated_in_absolute_time():
+    buffer = ReferenceBuffer()
+    message, at = sine_trajectory(START)
+    buffer.set_trajectory(message)
+    for k in range(0, 480, 7):
+        t = START + k * MS
+        position, rate = buffer.at(START, t)
+        expected = at(k * 1e-3)
+        assert position == pytest.approx(expected[0], abs=2e-8)
+        assert rate == pytest.approx(expected[1], abs=2e-5)
+
+
+def test_newest_trajectory_replaces_and_beyond_its_end_the_reference_counts():
+    buffer = ReferenceBuffer()
+    buffer.set_reference(Reference(START + 700 * MS, 0.02, 0.0))
+    buffer.set_trajectory(ReferenceTrajectory(START, (0, 20 * MS), (0.01, 0.011), (0.0, 0.0)))
+    second = ReferenceTrajectory(START, (0, 600 * MS), (0.012, 0.012), (0.0, 0.0))
+    buffer.set_trajectory(second)
+    assert buffer.at(START, START + 10 * MS)[0] == 0.012
+    assert buffer.uses_trajectory(START + 600 * MS)
+    assert not buffer.uses_trajectory(START + 601 * MS)
+    assert buffer.at(START + 700 * MS, START + 700 * MS)[0] == 0.02
+
+
+def test_state_holds_stamps_exactly_and_counts_ticks():
+    loop = ready()
+    for tick in range(3):
+        values = by_name(loop.tick(START + tick)[1])
+        assert values['tick'] == tick
+    stamp = join_stamp(values['contraction_stamp_sec'], values['contraction_stamp_nanosec'])
+    assert stamp == START
+    assert values['command_pa'] >= P_ATM_PA
+    assert all(isinstance(value, float) for value in values.values())
+
+
+def test_a_loop_that_stood_still_starts_bumplessly():
+    loop = ready()
+    loop.tick(START)
+    later = START + 900 * MS
+    loop.on_contraction(Contraction(later, 0.004))
+    loop.on_pressure(Pressure(later, 3e5))
+    loop.on_reference(Reference(later, 0.02, 0.0))
+    command, state = loop.tick(later)
+    assert by_name(state)['restarted'] == 1.0
+    assert abs(command.pressure_pa - 3e5) < 2e4
