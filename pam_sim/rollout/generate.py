@@ -41,6 +41,7 @@ _HEAD = '''"""Generated from the effect registry; do not edit."""
 import math
 
 from numba import njit
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.registry import effects
 from pam_sim.load.hanging_mass import acceleration
@@ -82,11 +83,19 @@ def settle(state, par):
 @njit(cache=True, error_model='numpy', nogil=True)
 def rollout(state, par, inputs, outputs):
     """Step through ``inputs`` (N, INP_SIZE); ``outputs`` is (N + 1, OUT_SIZE), row 0 the start."""
-    if inputs.shape[0] == 0:
-        return
-    observe(state, par, inputs[0], outputs[0])
-    for i in range(inputs.shape[0]):
-        step_body(state, par, inputs[i], outputs[i + 1])
+    # One working row of each: slices would be reference counted in every step.
+    inp = np.empty(INP_SIZE)
+    out = np.empty(OUT_SIZE)
+    for i in range(inputs.shape[0] + 1):
+        if i == 0:
+            inp[:] = inputs[0]
+            observe(state, par, inp, out)
+        else:
+            for j in range(INP_SIZE):
+                inp[j] = inputs[i - 1, j]
+            step_body(state, par, inp, out)
+        for j in range(OUT_SIZE):
+            outputs[i, j] = out[j]
 '''
 
 
