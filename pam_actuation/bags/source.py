@@ -208,17 +208,23 @@ def _damage_sentence(content, size, readable):
 def _add_content(bag, content, file):
     bag.records.update(content.metadata)
     for channel in content.channels.values():
+        type_name = _full_type_name(channel.type_name)
         topic = bag.topics.setdefault(
-            channel.topic, TopicData(
-                channel.topic, channel.type_name, channel.message_encoding))
-        if (channel.type_name, channel.message_encoding) != (topic.type_name, topic.encoding):
+            channel.topic, TopicData(channel.topic, type_name, channel.message_encoding))
+        if (type_name, channel.message_encoding) != (topic.type_name, topic.encoding):
             bag.remarks.append(
                 f'{channel.topic} has several message types ({topic.type_name}, '
-                f'{channel.type_name}); only the first is read.')
+                f'{type_name}); only the first is read.')
             continue
         topic.payloads += channel.payloads
         topic.log_time_ns += channel.log_time_ns
         topic.publish_time_ns += channel.publish_time_ns
+
+
+def _full_type_name(name):
+    """Return package/msg/Name also for the short package/Name that some writers use."""
+    package, _, rest = name.partition('/')
+    return f'{package}/msg/{rest}' if rest and '/' not in rest else name
 
 
 def _read_with_rosbags(path, opened):

@@ -18,6 +18,7 @@ from pathlib import Path
 import shutil
 
 from mcap.writer import CompressionType, Writer
+import mcap_ros2.writer
 import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags import codecs, layout
@@ -152,6 +153,25 @@ def test_other_ways_to_write_mcap(tmp_path, options):
     run = load_run(path)
     assert_same_run(run)
     assert run.namespace == ''
+
+
+@pytest.mark.parametrize('type_name', ['sensor_msgs/msg/JointState', 'sensor_msgs/JointState'])
+def test_bags_of_the_mcap_library(tmp_path, type_name):
+    path = tmp_path / 'by_library.mcap'
+    with open(path, 'wb') as stream:
+        writer = mcap_ros2.writer.Writer(stream)
+        schema = writer.register_msgdef(
+            type_name, layout.schema_text('sensor_msgs/msg/JointState'))
+        for i in range(COUNT):
+            writer.write_message('/contraction', schema, {
+                'header': {'stamp': {'sec': i, 'nanosec': 5}, 'frame_id': 'rig'},
+                'name': ['m'], 'position': [0.001 * i], 'velocity': [], 'effort': []}, i, i)
+        writer.finish()
+    one = load_run(path).topics['contraction']
+    np.testing.assert_array_equal(one.stamp_ns, [i * 10**9 + 5 for i in range(COUNT)])
+    np.testing.assert_array_equal(
+        one.values['contraction_m'], [0.001 * i for i in range(COUNT)])
+    assert np.isnan(one.values['velocity_m_per_s']).all()
 
 
 def test_split_bag_is_read_in_order(tmp_path, bag):
