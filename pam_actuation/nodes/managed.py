@@ -100,6 +100,10 @@ class ManagedNode(LifecycleNode):
     def tick(self):
         """Run once per period of the loop."""
 
+    def due(self, since_last_s):
+        """Tell whether to tick now; asked only by a loop with ``poll_s``."""
+        return True
+
     def safe_stop(self, why):
         """Make the output safe; called on every way out, perhaps more than once."""
 
@@ -140,19 +144,35 @@ class ManagedNode(LifecycleNode):
         self.subscriptions_polled.append(subscription)
         return subscription
 
-    def add_loop(self, period_s):
-        """Run ``tick`` every ``period_s`` on the steady clock while active."""
+    def add_loop(self, period_s, poll_s=None):
+        """
+        Run ``tick`` every ``period_s`` on the steady clock while active.
+
+        With ``poll_s`` the node asks itself that often, by ``due``, whether to tick.
+        """
         self.timing = LoopTiming(period_s)
-        self.loops.add(period_s, self._timed_tick)
+        if poll_s is None:
+            self.loops.add(period_s, self._timed_tick)
+        else:
+            self.loops.add(poll_s, self._polled_tick)
+
+    def _polled_tick(self):
+        since_last_s = self.timing.since_last_s(time.monotonic_ns())
+        if self._guarded(lambda: self.due(since_last_s)):
+            self._timed_tick()
 
     def _timed_tick(self):
         self.timing.begin(time.monotonic_ns())
+        self._guarded(self.tick)
+        self.timing.end(time.monotonic_ns())
+
+    def _guarded(self, action):
+        """Return what a part of the loop returns; if it fails, the node fails safely."""
         try:
-            self.tick()
+            return action()
         except Exception as error:
             self.fail(f'the loop of this node failed: {error}', traceback.format_exc())
-            return
-        self.timing.end(time.monotonic_ns())
+            return None
 
     def fail(self, why, details=''):
         """Make the output safe, say why and end the process with exit code 1."""
@@ -185,7 +205,8 @@ class ManagedNode(LifecycleNode):
                 self.get_logger().info(why)
 
     def _end_work(self, why):
-        self.diagnostics.update(self.diagnostics.level, why)
+        level = ERROR if self.exit_code else OK
+        self.diagnostics.update(level, why, self.diagnostics.values)
         self.diagnostics.send()
         for publisher in (*self.publishers_counted, self.diagnostics.publisher):
             publisher.wait_for_all_acked(0.5)

@@ -21,7 +21,6 @@ from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 
-SENSORS = ('pressure', 'contraction', 'force', 'supply_pressure')
 MAX_SEED = 2**31 - 1
 
 
@@ -42,14 +41,19 @@ class PlantSimulator(ManagedNode):
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
     )
 
+    plant = None
+
     def setup(self):
         """Load the rig, create the sensors' publishers."""
         from pam_actuation.plant_loop import PlantLoop
         from pam_sim import load_rig
         rig = load_rig(self.value('rig'), valve=self.value('valve_type'))
+        rig.plant().step((0.0,) * len(rig.signal_names))     # compiled before time counts
         self.plant = PlantLoop(rig, seed=self.value('seed'))
-        for topic in self.plant.topics:
+        for topic in ('pressure', 'contraction', 'force'):
             self.add_publisher(topic)
+        if rig.valve == 'hsv':
+            self.add_publisher('supply_pressure')
         self.signals = self.add_subscription('valve_signal')
         self.disturbances = self.add_subscription('external_force')
 
@@ -57,6 +61,14 @@ class PlantSimulator(ManagedNode):
         """Begin with the clock at the present."""
         self.plant.advance_to(self.now_ns())
         self.add_loop(1.0 / self.value('publish_rate_hz'))
+
+    def diagnostic_values(self):
+        """Add how the physics keeps up with the clock."""
+        values = super().diagnostic_values()
+        if self.plant is None:
+            return values
+        return (*values, ('physics.steps', self.plant.steps),
+                ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""

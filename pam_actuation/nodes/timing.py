@@ -14,6 +14,8 @@
 
 """How regularly a loop runs: period, jitter, overruns, time spent; no ROS here."""
 
+import math
+
 
 class LoopTiming:
     """
@@ -50,8 +52,14 @@ class LoopTiming:
         self._last_ns = now_ns
         self.ticks += 1
 
+    def since_last_s(self, now_ns):
+        """Return the time since the last tick began [s], infinite before the first."""
+        return math.inf if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
+
     def end(self, now_ns):
         """Note the end of the tick begun last."""
+        if self._last_ns is None:
+            return                  # paused by the tick itself
         busy = now_ns - self._last_ns
         self._busy_ns += busy
         if busy > self.max_busy_ns:

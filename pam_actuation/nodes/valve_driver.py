@@ -1,0 +1,131 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The valve driver on ROS: pressure command in, valve signal out, safe on every way out."""
+
+import sys
+
+from pam_actuation.drivers.config import DRIVER_PARAMETERS
+from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.runner import run
+from std_srvs.srv import Trigger
+
+COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
+EARLY_SHARE = 0.9           # of a period: a tick by the clock is left out this soon after another
+GRAPH_PERIOD_S = 0.5
+
+
+class ValveDriver(ManagedNode):
+    """
+    Turn pressure commands into valve signals, supervised.
+
+    PPR: a command is passed on within 1 ms, and without commands a signal goes out
+    at the rate of the law. HSV: one signal per PWM period. The signal that
+    vents is the last one on every way out.
+    """
+
+    NAME = 'valve_driver'
+    PARAMETERS = (
+        NodeParameter(
+            'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
+            'high-speed valves.', choices=('ppr', 'hsv')),
+        *(NodeParameter(p.name, p.default, p.description, p.lower, p.upper)
+          for p in DRIVER_PARAMETERS),
+    )
+
+    loop = None
+
+    def setup(self):
+        """Build the driver, its topics and services."""
+        from pam_actuation.drivers.loop import DriverLoop
+        self.loop = DriverLoop(
+            self.value('valve_type'), {p.name: self.value(p.name) for p in DRIVER_PARAMETERS})
+        self.add_publisher('valve_signal')
+        self.commands = self.add_subscription('pressure_command')
+        self.pressures = self.add_subscription('pressure')
+        self.supplies = self.add_subscription('supply_pressure')
+        self._safety_services = [
+            self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
+            self.create_service(Trigger, '~/reset', self._on_reset),
+        ]
+
+    def teardown(self):
+        """Take the services back."""
+        for service in self._safety_services:
+            self.destroy_service(service)
+        self.loop = None
+
+    def start(self):
+        """Tick by the clock, and for the PPR also by the command."""
+        if self.loop.is_hsv:
+            self.add_loop(self.loop.period_s)
+        else:
+            self.add_loop(self.loop.period_s, poll_s=COMMAND_POLL_S)
+        self.loops.add(GRAPH_PERIOD_S, self._look_at_graph)
+
+    def due(self, since_last_s):
+        """Tell whether a command or the clock asks for a tick (PPR, polled)."""
+        self._take_commands()
+        return self._commanded or since_last_s >= EARLY_SHARE * self.loop.period_s
+
+    def _take_commands(self):
+        taken = self.commands.take()
+        for message, info in taken:
+            self.loop.on_command(
+                from_ros('pressure_command', message), info['publication_sequence_number'])
+        self._commanded = bool(taken)
+
+    def tick(self):
+        """Take what arrived, decide, send."""
+        self._take_commands()
+        for message, _ in self.pressures.take():
+            self.loop.on_pressure(from_ros('pressure', message))
+        for message, _ in self.supplies.take():
+            self.loop.on_supply(from_ros('supply_pressure', message))
+        signal, status = self.loop.tick(self.now_ns())
+        self.send('valve_signal', signal)
+        self.diagnostics.update(status.level, status.message, status.values)
+
+    def safe_stop(self, why):
+        """Send the signal that vents."""
+        if self.loop is not None:
+            self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
+
+    def _look_at_graph(self):
+        self.loop.set_command_publishers(self.count_publishers(self.commands.topic))
+
+    def _on_emergency_stop(self, request, response):
+        with self.loops.lock:
+            response.success, response.message = self.loop.emergency_stop('service call')
+            if self.loops:
+                self.tick()         # not a moment later
+            else:
+                self.safe_stop('emergency stop')
+        return response
+
+    def _on_reset(self, request, response):
+        with self.loops.lock:
+            response.success, response.message = self.loop.reset()
+        return response
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(ValveDriver, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

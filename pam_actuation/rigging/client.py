@@ -1,0 +1,139 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The session's own ROS node: lifecycle requests out, diagnostics in."""
+
+import os
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from pam_actuation.nodes import qos
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+TRANSITIONS = {
+    'configure': Transition.TRANSITION_CONFIGURE,
+    'activate': Transition.TRANSITION_ACTIVATE,
+    'deactivate': Transition.TRANSITION_DEACTIVATE,
+}
+
+
+class RigClient:
+    """
+    Steer managed nodes and listen to their health.
+
+    Parameters
+    ----------
+    domain_id : int
+        ROS domain; only this machine is looked at.
+
+    Attributes
+    ----------
+    statuses : dict
+        Full node name to (level, message, values) of its last diagnostic status.
+    changes : list of (float, str, int, str)
+        Steady time [s], full node name, level, message of every change.
+
+    """
+
+    def __init__(self, domain_id):
+        self._context = rclpy.Context()
+        before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        try:
+            rclpy.init(
+                context=self._context, domain_id=domain_id, args=[],
+                signal_handler_options=SignalHandlerOptions.NO)
+        finally:
+            if before is None:
+                del os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE']
+            else:
+                os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
+        self.node = Node(
+            'rig_session', context=self._context, use_global_arguments=False,
+            enable_rosout=False, start_parameter_services=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._clients = {}
+        self.statuses = {}
+        self.changes = []
+        self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.reliable(1000))
+
+    def _on_diagnostics(self, message):
+        for status in message.status:
+            level = status.level[0]
+            values = {item.key: item.value for item in status.values}
+            known = self.statuses.get(status.name)
+            if known is None or known[:2] != (level, status.message):
+                self.changes.append((time.monotonic(), status.name, level, status.message))
+            self.statuses[status.name] = (level, status.message, values)
+
+    def spin(self, duration_s):
+        """Handle messages for a while."""
+        deadline = time.monotonic() + duration_s
+        while True:
+            left_s = deadline - time.monotonic()
+            if left_s <= 0.0:
+                return
+            self._executor.spin_once(timeout_sec=left_s)
+
+    def change_state(self, full_name, transition, timeout_s, alive=lambda: True):
+        """
+        Ask a node for a transition and wait for the answer.
+
+        Returns
+        -------
+        bool
+            Whether it was made; False also if ``alive()`` turned false or time ran out.
+
+        """
+        client = self._clients.get(full_name)
+        if client is None:
+            client = self._clients[full_name] = self.node.create_client(
+                ChangeState, f'{full_name}/change_state')
+        deadline = time.monotonic() + timeout_s
+        while not client.service_is_ready():
+            if time.monotonic() > deadline or not alive():
+                return False
+            self.spin(0.02)
+        request = ChangeState.Request()
+        request.transition.id = TRANSITIONS[transition]
+        future = client.call_async(request)
+        while not future.done():
+            if time.monotonic() > deadline or not alive():
+                future.cancel()
+                return False
+            self._executor.spin_once(timeout_sec=0.05)
+        return bool(future.result().success)
+
+    def published(self):
+        """Return full topic name to messages published, by the last status of every node."""
+        counts = {}
+        for _, _, values in self.statuses.values():
+            for key, value in values.items():
+                if key.startswith('published.'):
+                    topic = key.removeprefix('published.')
+                    counts[topic] = counts.get(topic, 0) + int(value)
+        return counts
+
+    def close(self):
+        """Leave the graph."""
+        self._executor.shutdown(timeout_sec=1.0)
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)

@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A ROS domain of one's own, so that two sessions on a machine do not mix."""
+
+import fcntl
+import os
+import socket
+import tempfile
+
+from pam_sim.errors import InputError
+
+LOWEST, HIGHEST = 1, 100       # higher ones collide with the ports Linux hands out itself
+PORT_BASE, PORTS_PER_DOMAIN, FIRST_PARTICIPANT = 7400, 250, 10
+
+
+class DomainLock:
+    """
+    Hold a ROS domain id: no other session on this machine gets the same.
+
+    Parameters
+    ----------
+    domain_id : int, optional
+        Use this one, whoever else does; default: a free one.
+
+    Raises
+    ------
+    InputError
+        No free domain, or an id outside 0 to 232.
+
+    """
+
+    def __init__(self, domain_id=None):
+        self._file = None
+        if domain_id is not None:
+            if not 0 <= domain_id <= 232:
+                raise InputError(f'{domain_id} is not allowed, give 0 to 232', 'domain id')
+            self.domain_id = domain_id
+            return
+        span = HIGHEST - LOWEST + 1
+        for k in range(span):
+            candidate = LOWEST + (os.getpid() + k) % span
+            if self._take(candidate):
+                self.domain_id = candidate
+                return
+        raise InputError(f'all ROS domains from {LOWEST} to {HIGHEST} are in use', 'domain id')
+
+    def _take(self, candidate):
+        path = os.path.join(tempfile.gettempdir(), f'pam_actuation_domain_{candidate}.lock')
+        try:
+            handle = open(path, 'a')
+        except OSError:
+            return False        # the lock of another user
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            handle.close()
+            return False
+        if not _silent(candidate):
+            handle.close()
+            return False
+        self._file = handle
+        return True
+
+    def release(self):
+        """Give the domain back."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+def _silent(domain_id):
+    """Tell whether the port that the first participant of a domain listens on is free."""
+    port = PORT_BASE + PORTS_PER_DOMAIN * domain_id + FIRST_PARTICIPANT
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(('', port))
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,156 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a session starts: experiment, rig and controller as files the nodes can read."""
+
+from dataclasses import dataclass
+import json
+import os
+from pathlib import Path
+import shutil
+import tempfile
+
+from pam_actuation.bags.metadata import experiment_metadata
+from pam_sim.errors import InputError
+
+RECORDER, PLANT, DRIVER, REFERENCE = (
+    'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
+
+
+@dataclass
+class RigPlan:
+    """
+    The nodes of one session.
+
+    ``parameters`` maps node name to ROS parameters, in the order in which the nodes
+    become active; ``controller_node`` is '' for an experiment in the pressure domain.
+    """
+
+    experiment: object
+    rig: object
+    controller: object
+    controller_node: str
+    parameters: dict
+    folder: Path
+
+    def remove(self):
+        """Delete the files made for the nodes."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learning=True, seed=0,
+              namespace='/muscle', overwrite=False):
+    """
+    Load experiment, rig and controller and write them down for the nodes.
+
+    Loading here tells of the user's mistakes before anything is started, and compiles
+    what the nodes would otherwise all compile at once.
+
+    Parameters
+    ----------
+    experiment, rig, controller : str, path or object
+        Name, path, or what ``load_experiment``, ``load_rig``, ``load_controller`` return.
+        Without controller: the preset ``sofc_<valve>``.
+    valve : str, optional
+        'ppr' or 'hsv'; default: that of the rig.
+    bag : path, optional
+        Folder to record to; None: no recorder.
+    learning : bool
+        Whether the rules of the controller may change.
+    seed : int
+        Seed of the simulated sensors.
+    namespace : str
+        Namespace of the rig.
+    overwrite : bool
+        Replace an existing bag.
+
+    Raises
+    ------
+    InputError
+        In any of the three, or the bag exists already.
+
+    """
+    from pam_actuation.control.config import load_controller
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    if not hasattr(experiment, 'to_yaml'):
+        experiment = load_experiment(experiment)
+    if not hasattr(rig, 'to_yaml'):
+        rig = load_rig(rig, valve=valve)
+    elif valve and valve != rig.valve:
+        rig = rig.with_(valve=valve)
+    experiment.check_reachable(rig)
+    if experiment.domain == 'pressure':
+        controller = None
+    elif not hasattr(controller, 'to_yaml'):
+        controller = load_controller(controller or f'sofc_{rig.valve}', rig)
+    if bag is not None and os.path.exists(bag) and not overwrite:
+        raise InputError('exists already; choose another folder or allow to replace it', str(bag))
+    _compile(rig, controller)
+    folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
+    plan = RigPlan(experiment, rig, controller, '', {}, folder)
+    if controller is not None:
+        plan.controller_node = f'{controller.kind}_controller'
+    plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
+    return plan
+
+
+def _compile(rig, controller):
+    """Run every compiled function once, so that its machine code is in the cache."""
+    from pam_actuation.drivers.loop import DriverLoop
+    rig.plant().step((0.0,) * len(rig.signal_names))
+    DriverLoop(rig.valve)
+    if controller is not None:
+        from pam_actuation.control.config import load_controller
+        spare = load_controller(controller.to_yaml(), rig)
+        spare.step(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _parameters(plan, bag, learning, seed, namespace, overwrite):
+    """Return node name to parameters and write the files they name."""
+    rig, controller = plan.rig, plan.controller
+    rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
+    nodes = {}
+    if bag is not None:
+        metadata = experiment_metadata(
+            plan.experiment, rig, controller, rig.valve, seed, origin='live',
+            learning=str(bool(learning)).lower())
+        topics = ['pressure', 'contraction', 'force', 'valve_signal', 'pressure_command']
+        if rig.valve == 'hsv':
+            topics.append('supply_pressure')
+        if controller is not None:
+            topics += ['controller_state', 'reference', 'reference_trajectory']
+        nodes[RECORDER] = {
+            'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
+            'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
+    nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
+    nodes[DRIVER] = {'valve_type': rig.valve}
+    if controller is not None:
+        nodes[plan.controller_node] = {
+            'rig': rig_file, 'valve_type': rig.valve,
+            'controller': _write(plan.folder / 'controller.yaml', controller.to_yaml())}
+        if controller.kind == 'sofc':
+            nodes[plan.controller_node]['learning'] = learning
+    nodes[REFERENCE] = {
+        'experiment': _write(plan.folder / 'experiment.yaml', plan.experiment.to_yaml())}
+    for parameters in nodes.values():
+        parameters['autostart'] = False
+        if bag is not None:
+            parameters['await_subscriber'] = f'{namespace.rstrip("/")}/{RECORDER}'
+    return nodes
+
+
+def _write(path, text):
+    path.write_text(text, encoding='utf-8')
+    return str(path)

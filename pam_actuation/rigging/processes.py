@@ -1,0 +1,164 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nodes as processes of the operating system, started and ended by their parent only."""
+
+import ctypes
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+PR_SET_PDEATHSIG = 1
+TICKS_PER_S = os.sysconf('SC_CLK_TCK')
+
+
+def node_environment(domain_id, log_dir):
+    """
+    Return the environment of the nodes: one domain, this machine only, one thread each.
+
+    Parameters
+    ----------
+    domain_id : int
+        ROS domain.
+    log_dir : path
+        Where rclpy writes its log files.
+
+    """
+    environment = dict(os.environ)
+    search = [str(PACKAGE_ROOT), *filter(None, [environment.get('PYTHONPATH')])]
+    environment.update(
+        ROS_DOMAIN_ID=str(domain_id), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
+        ROS_LOG_DIR=str(log_dir), PYTHONPATH=os.pathsep.join(search),
+        OPENBLAS_NUM_THREADS='1', OMP_NUM_THREADS='1', NUMBA_NUM_THREADS='1')
+    return environment
+
+
+def parameter_arguments(parameters):
+    """Return the ROS arguments ``-p name:=value`` of a dict of parameters."""
+    arguments = []
+    for name, value in parameters.items():
+        if isinstance(value, bool):
+            text = 'true' if value else 'false'
+        elif isinstance(value, str):
+            text = "'" + value.replace("'", "''") + "'"
+        elif isinstance(value, (list, tuple)):
+            text = '[' + ', '.join(str(item) for item in value) + ']'
+        else:
+            text = repr(value)
+        arguments += ['-p', f'{name}:={text}']
+    return arguments
+
+
+class NodeProcess:
+    """
+    One node of the rig as a child process.
+
+    It gets no Ctrl-C from the terminal (its parent decides the order of the end), and a
+    SIGTERM if the parent dies, so that it vents in either case.
+
+    Parameters
+    ----------
+    name : str
+        Executable and node name.
+    namespace : str
+        Namespace of the rig, such as ``/muscle``.
+    parameters : dict
+        ROS parameters.
+    environment : dict
+        From ``node_environment``.
+    log_dir : path
+        Folder for what the node prints.
+
+    """
+
+    def __init__(self, name, namespace, parameters, environment, log_dir):
+        self.name = name
+        self.full_name = f'{namespace.rstrip("/")}/{name}'
+        self.log_file = Path(log_dir) / f'{name}.log'
+        command = [
+            sys.executable, '-m', f'pam_actuation.nodes.{name}', '--ros-args',
+            '-r', f'__ns:={namespace}', *parameter_arguments(parameters)]
+        with open(self.log_file, 'wb') as log:
+            self._process = subprocess.Popen(
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                start_new_session=True, preexec_fn=_end_with_parent)
+        self.pid = self._process.pid
+
+    @property
+    def exit_code(self):
+        """Return the exit code, negative for a signal, None while the process runs."""
+        return self._process.poll()
+
+    @property
+    def running(self):
+        """Tell whether the process runs."""
+        return self.exit_code is None
+
+    def how_it_ended(self):
+        """Return a phrase on how the process ended, with the last line it printed."""
+        code = self.exit_code
+        if code is None:
+            return f'{self.name} runs'
+        if code < 0:
+            return f'{self.name} was ended by {signal.Signals(-code).name}'
+        last = self.last_line()
+        return f'{self.name} ended with exit code {code}' + (f' ({last})' if last else '')
+
+    def last_line(self):
+        """Return the last line the node printed, without the time."""
+        try:
+            lines = self.log_file.read_text(errors='replace').strip().splitlines()
+        except OSError:
+            return ''
+        return lines[-1].rsplit(']: ', 1)[-1] if lines else ''
+
+    def cpu_s(self):
+        """Return the processor time used so far [s]; None once the process is gone."""
+        try:
+            fields = Path(f'/proc/{self.pid}/stat').read_text().rsplit(')', 1)[1].split()
+        except OSError:
+            return None
+        return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+
+    def send_signal(self, number):
+        """Send a signal, if the process still runs."""
+        if self.running:
+            self._process.send_signal(number)
+
+    def wait(self, timeout_s):
+        """Wait for the end; return whether it came in time."""
+        try:
+            self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+
+def end_all(processes, timeout_s=5.0):
+    """End processes: SIGTERM to all, and SIGKILL to one that has not ended in time."""
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    for process in processes:
+        if not process.wait(timeout_s):
+            process.send_signal(signal.SIGKILL)
+            process.wait(timeout_s)
+
+
+def _end_with_parent():
+    """Ask Linux for a SIGTERM to this process when its parent dies."""
+    if sys.platform == 'linux':
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

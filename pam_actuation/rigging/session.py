@@ -1,0 +1,358 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One experiment on live nodes, from the first process to the closed bag.
+
+Order of the start: all nodes are configured, the recorder is active first and connected
+to every publisher, then plant, driver, controller and reference. Order of the end:
+reference and controller stop (which commands atmospheric pressure), the driver stops with
+the signal that vents, the plant a little later, the recorder last. The same order on Ctrl-C and when a node dies.
+"""
+
+from dataclasses import dataclass, field
+import os
+from pathlib import Path
+import signal
+import threading
+import time
+
+from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
+from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_sim.errors import InputError
+import yaml
+
+START_TIMEOUT_S = 60.0        # a busy machine compiles for long
+TRANSITION_TIMEOUT_S = 15.0
+CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
+VENT_S = 0.6                  # after the end, so that the recording shows the vent
+OVERDUE_S = 5.0               # the reference may finish this much late
+FINISHED = 'finished'
+LEVEL_ERROR = 2
+
+
+class SessionFailed(Exception):
+    """The rig could not be brought up or did not stay up; the text says why."""
+
+
+@dataclass
+class Result:
+    """
+    What came out of a session.
+
+    Attributes
+    ----------
+    bag : str
+        Folder of the recording, '' without recorder.
+    duration_s : float
+        Time from the activation of the reference to the end of the experiment [s].
+    failure : str
+        Why the experiment did not come to its end, '' if it did.
+    findings : list of str
+        Errors the nodes reported on the way.
+    published, recorded : dict
+        Full topic name to number of messages.
+    exit_codes : dict
+        Node name to exit code (negative: ended by that signal).
+    cpu_share : dict
+        Node name to processor time over run time [cores].
+
+    """
+
+    bag: str
+    duration_s: float = 0.0
+    failure: str = ''
+    findings: list = field(default_factory=list)
+    published: dict = field(default_factory=dict)
+    recorded: dict = field(default_factory=dict)
+    exit_codes: dict = field(default_factory=dict)
+    cpu_share: dict = field(default_factory=dict)
+
+    @property
+    def complete(self):
+        """Tell whether the experiment ended as planned and every message was recorded."""
+        return not self.failure and (not self.bag or self.published == self.recorded)
+
+
+class RigSession:
+    """
+    The processes of one rig; a context manager that always ends them.
+
+    Parameters
+    ----------
+    plan : RigPlan
+        From ``plan.make_plan``.
+    namespace : str
+        Namespace of the rig.
+    domain_id : int, optional
+        ROS domain; default: a free one.
+
+    """
+
+    def __init__(self, plan, namespace='/muscle', domain_id=None):
+        try:
+            from pam_actuation.rigging.client import RigClient
+        except ImportError as error:
+            raise InputError(
+                f'live nodes need ROS 2 ({error.name} is missing): source its setup file or '
+                'install the extra ros, pip install "pam_actuation[ros]"') from None
+        self.plan = plan
+        self.namespace = namespace
+        self.processes = {}
+        self._lock = DomainLock(domain_id)
+        self.domain_id = self._lock.domain_id
+        self.client = RigClient(self.domain_id)
+        self._cpu = {}
+        self._active_since = None
+        self.ended_at = None
+
+    def __enter__(self):
+        """Return the session."""
+        return self
+
+    def __exit__(self, *_):
+        """End all processes of this session."""
+        end_all(self.processes.values())
+        self.client.close()
+        self._lock.release()
+
+    def start(self):
+        """
+        Start all processes and bring them up, the reference last.
+
+        Raises
+        ------
+        SessionFailed
+            A node ended or refused.
+
+        """
+        environment = node_environment(self.domain_id, self.plan.folder)
+        for name, parameters in self.plan.parameters.items():
+            self.processes[name] = NodeProcess(
+                name, self.namespace, parameters, environment, self.plan.folder)
+        for name in self.processes:
+            self.change(name, 'configure', START_TIMEOUT_S)
+        for name in self.processes:
+            self.change(name, 'activate', TRANSITION_TIMEOUT_S)
+        self._active_since = time.monotonic()
+        self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
+
+    def change(self, name, transition, timeout_s=TRANSITION_TIMEOUT_S):
+        """Ask a node for a transition; SessionFailed if it is not made."""
+        process = self.processes[name]
+        if self.client.change_state(
+                process.full_name, transition, timeout_s, lambda: process.running):
+            return
+        if not process.running:
+            raise SessionFailed(process.how_it_ended())
+        last = process.last_line()
+        raise SessionFailed(f'{name} did not {transition}' + (f': {last}' if last else ''))
+
+    def run(self, progress=None):
+        """
+        Wait for the end of the experiment.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with (seconds done, seconds in all).
+
+        Raises
+        ------
+        SessionFailed
+            A node ended, or the reference did not finish in time.
+
+        """
+        total_s = self.plan.experiment.duration_s
+        reference = self.processes[REFERENCE].full_name
+        begin = time.monotonic()
+        while True:
+            self.client.spin(0.05)
+            done_s = time.monotonic() - begin
+            if progress is not None:
+                progress(min(done_s, total_s), total_s)
+            for process in self.processes.values():
+                if not process.running:
+                    raise SessionFailed(self._describe_loss(process, done_s))
+            if self.client.statuses.get(reference, (0, ''))[1].startswith(FINISHED):
+                return
+            if done_s > total_s + OVERDUE_S:
+                raise SessionFailed(
+                    f'the reference did not finish within {total_s + OVERDUE_S:.0f} s')
+
+    def _describe_loss(self, process, done_s):
+        """Return a sentence on a node that ended, and on what the driver made of it."""
+        sentence = f'{process.how_it_ended()} {done_s:.1f} s into the experiment'
+        driver = self.processes[DRIVER]
+        if process is driver:
+            return f'{sentence}; nobody drives the valve'
+        self.client.spin(0.4)
+        level, message, _ = self.client.statuses.get(driver.full_name, (0, '', {}))
+        return f'{sentence}; valve_driver: {message}' if level else sentence
+
+    def finish(self):
+        """
+        Stop the nodes in order; what cannot be stopped is left to the end of the processes.
+
+        Returns
+        -------
+        list of str
+            What did not go as it should.
+
+        """
+        self._note_cpu()
+        self.ended_at = time.monotonic()
+        problems = []
+        problems += self._deactivate([REFERENCE, self.plan.controller_node, DRIVER])
+        self.client.spin(VENT_S)
+        problems += self._deactivate([PLANT])
+        problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
+        self.client.spin(0.1)
+        end_all(self.processes.values())
+        return problems
+
+    def _deactivate(self, names, timeout_s=TRANSITION_TIMEOUT_S):
+        problems = []
+        for name in names:
+            if name in self.processes and self.processes[name].running:
+                try:
+                    self.change(name, 'deactivate', timeout_s)
+                except SessionFailed as error:
+                    problems.append(str(error))
+        return problems
+
+    def _note_cpu(self):
+        if self._active_since is None:
+            return
+        span_s = time.monotonic() - self._active_since
+        for name, process in self.processes.items():
+            now = process.cpu_s()
+            if process.running and now is not None and self._cpu.get(name) is not None:
+                self._cpu[name] = (now - self._cpu[name]) / span_s
+            else:
+                self._cpu.pop(name, None)
+
+    def fill(self, result):
+        """Enter counts, exit codes and findings into a Result."""
+        result.published = self.client.published()
+        result.recorded = recorded_counts(result.bag) if result.bag else {}
+        result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
+        result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()}
+        result.findings += [
+            f'{name}: {message}' for when, name, level, message in self.client.changes
+            if level >= LEVEL_ERROR and when < self.ended_at]
+
+
+def recorded_counts(bag):
+    """Return full topic name to number of messages of a bag, {} if it was not finished."""
+    path = Path(bag) / 'metadata.yaml'
+    if not path.is_file():
+        return {}
+    information = yaml.safe_load(path.read_text())['rosbag2_bagfile_information']
+    return {topic['topic_metadata']['name']: topic['message_count']
+            for topic in information['topics_with_message_count']}
+
+
+def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valve=None,
+                   out_dir=None, *, learning=True, seed=0, domain_id=None, progress=None,
+                   with_recorder=True, namespace='/muscle', overwrite=False):
+    """
+    Run one experiment on live nodes and record it.
+
+    Parameters
+    ----------
+    experiment, rig, controller : str, path or object
+        As for ``plan.make_plan``.
+    valve : str, optional
+        'ppr' or 'hsv'; default: that of the rig.
+    out_dir : path
+        Folder of the bag, must not exist.
+    learning : bool
+        False freezes the rules of the controller.
+    seed : int
+        Seed of the simulated sensors.
+    domain_id : int, optional
+        ROS domain; default: a free one, and this machine only in any case.
+    progress : callable, optional
+        Called with (seconds done, seconds in all).
+    with_recorder : bool
+        False: run without recording.
+    namespace : str
+        Namespace of the rig.
+    overwrite : bool
+        Replace an existing bag.
+
+    Returns
+    -------
+    Result
+        ``failure`` tells of Ctrl-C or a node that died; the bag is kept and closed.
+
+    Raises
+    ------
+    InputError
+        A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
+
+    """
+    bag = None
+    if with_recorder:
+        if out_dir is None:
+            raise InputError('is needed for a recording', 'out_dir')
+        bag = os.path.abspath(out_dir)
+        os.makedirs(os.path.dirname(bag), exist_ok=True)
+    plan = make_plan(
+        experiment, rig, controller, valve, bag, learning=learning, seed=seed,
+        namespace=namespace, overwrite=overwrite)
+    result = Result(bag or '')
+    try:
+        with _termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:
+            _run_guarded(session, result, progress)
+    finally:
+        plan.remove()
+    return result
+
+
+def _run_guarded(session, result, progress):
+    """Start, run and stop; a failure or Ctrl-C goes into the result."""
+    begin = None
+    try:
+        session.start()
+        begin = time.monotonic()
+        session.run(progress)
+    except SessionFailed as error:
+        result.failure = str(error)
+    except KeyboardInterrupt:
+        result.failure = 'stopped by the user'
+    if begin is not None:
+        result.duration_s = time.monotonic() - begin
+    problems = session.finish()
+    session.fill(result)
+    result.findings += problems
+
+
+class _termination_as_interrupt:
+    """Turn SIGTERM into KeyboardInterrupt while the rig runs, so that it ends in order."""
+
+    def __enter__(self):
+        self._before = None
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGTERM, _interrupt)
+
+    def __exit__(self, *_):
+        if self._before is not None:
+            signal.signal(signal.SIGTERM, self._before)
+
+
+def _interrupt(number, frame):
+    raise KeyboardInterrupt
