@@ -20,6 +20,8 @@ from pam_actuation.bags import codecs
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 MIN_RATE_HZ = 100.0
+RATE_TOLERANCE = 0.98
+GAP_LIMIT_S = 0.05                     # half of what makes a measurement invalid
 RATE_TOPICS = ('pressure', 'contraction', 'force', 'valve_signal', 'pressure_command')
 NEEDED_TOPICS = ('pressure', 'contraction', 'valve_signal')
 OPTIONAL_TOPICS = ('force', 'supply_pressure', 'reference', 'pressure_command')
@@ -52,6 +54,9 @@ def topic_remarks(topic, info, stamp_ns, values):
     if not values and info.type_name != codecs.TOPIC_TYPES['reference_trajectory']:
         return []
     remarks = _time_remarks(topic, info, stamp_ns)
+    if topic.name.endswith('/controller_state'):
+        # Internals may be undefined, such as the time since the tick before the first.
+        return remarks
     for name, column in values.items():
         if len(column):
             remarks += _value_remarks(topic.name, name, column)
@@ -87,10 +92,11 @@ def _time_remarks(topic, info, stamp_ns):
         remarks.append(f'{name}: the header stamp goes back {info.stamps_backward} times.')
     if info.stamps_repeated:
         remarks.append(f'{name}: {info.stamps_repeated} messages repeat a header stamp.')
-    if short in RATE_TOPICS and info.rate_hz is not None and info.rate_hz < MIN_RATE_HZ * 0.99:
+    if short in RATE_TOPICS and info.rate_hz is not None and info.rate_hz < (
+            RATE_TOLERANCE * MIN_RATE_HZ):
         remarks.append(
             f'{name}: {info.rate_hz:.1f} Hz is below {MIN_RATE_HZ:.0f} Hz.')
-    if info.gaps and short in RATE_TOPICS:
+    if info.gaps and short in RATE_TOPICS and info.max_gap_s > GAP_LIMIT_S:
         remarks.append(
             f'{name}: {info.gaps} gaps, the longest {1e3 * info.max_gap_s:.0f} ms at '
             f'{info.rate_hz:.0f} Hz.')

@@ -151,6 +151,16 @@ def test_values_that_cannot_be_true(tmp_path, short, message, words):
     assert said(info, f'/muscle/{short}', *words)
 
 
+def test_undefined_internals_and_short_pauses_are_no_findings(tmp_path):
+    def change(short, i, message):
+        if short == 'controller_state':
+            return messages.ControllerState(message.stamp_ns, ('a',), (float('nan'),))
+        return None if short == 'force' and 10 <= i < 15 else message
+
+    info = bag_info(write_bag(tmp_path / 'run', 100, change=change))
+    assert info.topic('/muscle/force').gaps == 1 and not info.has_findings
+
+
 def restamped(move):
     def change(short, i, message):
         if short != 'pressure':
