@@ -56,6 +56,10 @@ TEST_REQUIRES = [
     'mcap-ros2-support>=0.5',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
+    'flake8>=7.0',
+    'flake8-import-order>=0.18.2',
+    'flake8-quotes>=3.4',
+    'pydocstyle>=6.3',
     'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
 ]
 
