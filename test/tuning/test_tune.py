@@ -1,0 +1,95 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Offline tuning: improves on runs it did not see, same seed same result."""
+
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.tuning.cost import tracking_cost_mm
+from pam_actuation.tuning.space import (
+    Axis, default_axes, from_unit, PID_INVERSE_AXES, SOFC_AXES, to_unit)
+from pam_actuation.tuning.tune import tune
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+import numpy as np
+import pytest
+
+SHORT_SINE = """
+name: short_sine
+segments:
+  - ramp: {to_m: 0.006, duration_s: 1.0}
+  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.5, cycles: 3}
+"""
+AXES = (Axis('lead_s', 0.02, 0.2, log=False), Axis('proportional_pa_per_m', 1e5, 3e6))
+
+
+@pytest.fixture(scope='module')
+def rig():
+    return load_rig('dmsp_5_300_realistic')
+
+
+def untuned(rig):
+    return load_controller(
+        'controller: sofc\nsettings: {lead_s: 0.0, learning_rate: 0.5}\n', rig)
+
+
+def test_tuning_improves_held_out_runs_and_reports(rig):
+    calls = []
+    result = tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=60, seed=3, axes=AXES,
+                  progress=lambda *call: calls.append(call))
+    assert result.improved
+    assert result.cost_after < result.cost_before
+    assert result.held_out_after < 0.9 * result.held_out_before
+    assert result.controller.settings['lead_s'] > 0.02
+    assert set(result.changed) <= {'lead_s', 'proportional_pa_per_m'}
+    assert calls[-1][0] <= 60 and calls[-1][2] == result.cost_after
+    best = [cost for _, cost in result.history]
+    assert best == sorted(best, reverse=True)
+    assert load_controller(result.to_yaml()).settings == result.controller.settings
+
+
+def test_same_seed_same_result_with_any_number_of_jobs(rig):
+    one, two = (
+        tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=30, seed=9, axes=AXES,
+             jobs=jobs) for jobs in (1, 2))
+    assert one.to_yaml() == two.to_yaml()
+    assert one.history == two.history
+
+
+def test_axes_are_clipped_scaled_and_checked(rig):
+    settings = {axis.name: axis.upper * 10 for axis in SOFC_AXES}
+    point = to_unit(SOFC_AXES, settings)
+    assert np.allclose(point, 1.0)
+    assert from_unit(SOFC_AXES, point)['reference_knots'] == 61
+    middle = from_unit(PID_INVERSE_AXES, [0.5] * len(PID_INVERSE_AXES))
+    assert middle['proportional_pa_per_m'] == pytest.approx(1e6)
+    with pytest.raises(InputError, match='no such setting'):
+        tune(rig, untuned(rig), load_experiment(SHORT_SINE), axes=(Axis('speed', 1.0, 2.0),))
+    with pytest.raises(InputError, match='too small'):
+        tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=3)
+
+
+def test_scaling_stays_once_rules_are_learned(rig):
+    controller = untuned(rig)
+    names = {axis.name for axis in default_axes(controller)}
+    assert 'feedback_gain_pa' in names
+    controller.rules.feedforward[0, 3] = 100.0
+    assert 'feedback_gain_pa' not in {axis.name for axis in default_axes(controller)}
+
+
+def test_cost_weighs_late_errors_and_refuses_runaways():
+    early = np.r_[np.full(70, 1e-3), np.zeros(30)]
+    late = early[::-1]
+    assert tracking_cost_mm(late) > 2.0 * tracking_cost_mm(early)
+    assert tracking_cost_mm(np.r_[early, np.nan]) == 1e3
