@@ -12,10 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How every small numerical function of the package is compiled."""
+"""
+How the small numerical functions of the package are compiled.
+
+numpy error model: a division by zero gives inf as in NumPy instead of a check
+on every division. No fastmath: compiled and interpreted results stay equal.
+"""
 
 from numba import njit
 
-# numpy error model: a division by zero gives inf as in NumPy instead of a check
-# on every division. No fastmath: compiled and interpreted results stay equal.
-compiled = njit(error_model='numpy', nogil=True, forceinline=True)
+compiled = njit(error_model='numpy', nogil=True)
+# For the few functions on the path of every step: no call is left of them.
+inlined = njit(error_model='numpy', nogil=True, forceinline=True)

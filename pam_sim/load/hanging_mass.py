@@ -18,7 +18,7 @@ A mass hanging on a vertical guide rail, with inelastic end stops.
     m dv/dt = F(p, eps) - c v - m g - F_ext        for 0 < x < 0.25 L0
 """
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'hanging_mass'
@@ -30,7 +30,7 @@ PARAMETERS = (
 )
 
 
-@compiled
+@inlined
 def acceleration(net_n, contraction_m, velocity_m_per_s, inverse_mass_per_kg, max_contraction_m):
     """
     Return the acceleration [m/s^2], zero where an end stop holds the mass.

@@ -21,7 +21,7 @@ Automation 12(1), eq. 4: V = L (Lf^2 - L^2) / (4 pi n^2).
 
 import math
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 
 LENGTH_M = 0.300
 BORE_M = 0.005
@@ -35,7 +35,7 @@ def braid(length_m=LENGTH_M, bore_m=BORE_M, angle_rad=BRAID_ANGLE_RAD):
             length_m * math.tan(angle_rad) / (math.pi * bore_m))
 
 
-@compiled
+@inlined
 def volume_m3(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
     """
     Return the inner volume [m^3] without dead volume.

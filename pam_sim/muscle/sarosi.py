@@ -24,7 +24,7 @@ exist: treat the map as good to 15 %.
 import math
 
 import numpy as np
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 
 # F = (A1 P + A2) exp(A3 E) + A4 E P + A5 P + A6;  P gauge kPa, E contraction %, F newton.
 A1 = -0.00680486
@@ -35,7 +35,7 @@ A5 = 0.256907
 A6 = -56.3953
 
 
-@compiled
+@inlined
 def tension_n(pressure_gauge_pa, strain):
     """
     Return the static muscle tension [N], never negative.

@@ -42,7 +42,7 @@ import math
 
 from numba import njit
 import numpy as np
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, inlined
 from pam_sim.effects.registry import effects
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
@@ -99,9 +99,14 @@ def rollout(state, par, inputs, outputs):
 '''
 
 
+def hook_flag(hook):
+    """Return the place in ``par`` that is 1 when any active effect uses a hook."""
+    return layout.PAR_BASE + list(HOOKS).index(hook)
+
+
 def effect_layout():
     """Return ({name: (k, i)}, par size, state size): where each effect's numbers stand."""
-    k, i = layout.PAR_BASE, layout.STATE_BASE
+    k, i = layout.PAR_BASE + len(HOOKS), layout.STATE_BASE
     places = {}
     for name, effect in registry.effects().items():
         places[name] = (k + 1, i)
@@ -120,22 +125,28 @@ def _dispatchers():
         arguments = list(inspect.signature(
             getattr(hook_functions, f'apply_{hook}')).parameters)
         result = ', '.join(arguments[:returned])
-        lines += ['', '', '@compiled', f'def apply_{hook}({", ".join(arguments)}):']
-        body = []
-        for name, effect in registry.effects().items():
-            if hook in effect.hooks:
-                k, i = places[name]
+        given = ', '.join(arguments)
+        users = [(name, places[name]) for name, effect in registry.effects().items()
+                 if hook in effect.hooks]
+        if users:
+            lines += ['', '', '@compiled', f'def _run_{hook}({given}):']
+            for name, (k, i) in users:
                 own = ', '.join(arguments[:-2] + ['state', str(i), 'par', str(k)])
-                body.append(f'    if par[{k - 1}] != 0.0:')
-                call = f'_{name}_{hook}({own})'
-                body.append(f'        {result} = {call}' if returned else f'        {call}')
-        if returned:
-            body.append(f'    return {result}')
-        lines += body or ['    pass']
-    flags = [f'par[{places[name][0] - 1}] != 0.0' for name, effect in registry.effects().items()
-             if 'pressure_rate' in effect.hooks]
-    lines += ['', '', '@compiled', 'def pressure_rate_active(par):',
-              f'    return {" or ".join(flags) or "False"}']
+                assign = f'{result} = ' if returned else ''
+                lines += [f'    if par[{k - 1}] != 0.0:',
+                          f'        {assign}_{name}_{hook}({own})']
+            if returned:
+                lines.append(f'    return {result}')
+        # One flag for the whole hook: a rig without its effects pays one comparison.
+        lines += ['', '', '@inlined', f'def apply_{hook}({given}):']
+        if users:
+            give_back = 'return ' if returned else ''
+            lines += [f'    if par[{hook_flag(hook)}] != 0.0:',
+                      f'        {give_back}_run_{hook}({given})']
+        if returned or not users:
+            lines.append(f'    return {result}' if returned else '    pass')
+    lines += ['', '', '@inlined', 'def pressure_rate_active(par):',
+              f"    return par[{hook_flag('pressure_rate')}] != 0.0"]
     return '\n'.join(lines) + '\n'
 
 

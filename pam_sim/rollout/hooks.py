@@ -26,7 +26,7 @@ start of the physics step and ``elapsed_s`` the time since then, so that a
 memory can be evaluated inside a step and advanced once, in ``commit``.
 """
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 
 # Hook name -> how many leading arguments it returns, changed or not.
 HOOKS = {
@@ -37,108 +37,108 @@ HOOKS = {
 }
 
 
-@compiled
+@inlined
 def apply_command(signal_0, signal_1, dt_s, state, par):
     """Return the valve signal that arrives in this step; called once a step, may advance state."""
     return signal_0, signal_1
 
 
-@compiled
+@inlined
 def apply_clock_shift(shift_s, state, par):
     """Return by how much [s] the PWM clock of the switching valves is late."""
     return shift_s
 
 
-@compiled
+@inlined
 def apply_set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, par):
     """Return (set point [Pa], time constant [s]) of the PPR for this physics step."""
     return set_point_pa, time_constant_s
 
 
-@compiled
+@inlined
 def apply_pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, par):
     """Return the pressure rate [Pa/s] behind the PPR."""
     return rate_pa_per_s
 
 
-@compiled
+@inlined
 def pressure_rate_active(par):
     """Return whether any effect changes the PPR pressure rate (else the lag is exact)."""
     return False
 
 
-@compiled
+@inlined
 def apply_opening(fill, vent, period_s, state, par):
     """Return mean openings of the averaged HSV pair from its duties."""
     return fill, vent
 
 
-@compiled
+@inlined
 def apply_switch_times(open_s, close_s, state, par):
     """Return opening and closing delay [s] of the switching HSV pair."""
     return open_s, close_s
 
 
-@compiled
+@inlined
 def apply_supply(supply_pa, state, par):
     """Return the supply pressure [Pa absolute]."""
     return supply_pa
 
 
-@compiled
+@inlined
 def apply_mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, par):
     """Return the net air flow into the muscle [kg/s], HSV."""
     return flow_kg_per_s
 
 
-@compiled
+@inlined
 def apply_volume(volume_m3, pressure_pa, contraction_m, state, par):
     """Return the air volume [m^3]."""
     return volume_m3
 
 
-@compiled
+@inlined
 def apply_map_input(gauge_pa, strain, state, par):
     """Return gauge pressure [Pa] and strain [-] at which the force map is read."""
     return gauge_pa, strain
 
 
-@compiled
+@inlined
 def apply_muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
                        state, par):
     """Return the force the muscle transmits [N], dry friction excepted."""
     return force_n
 
 
-@compiled
+@inlined
 def apply_muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, par):
     """Return the dry friction level inside the muscle [N], not negative."""
     return level_n
 
 
-@compiled
+@inlined
 def apply_load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Return the force of the load side against contraction [N], weight and F_ext excepted."""
     return force_n
 
 
-@compiled
+@inlined
 def apply_load_friction(level_n, contraction_m, velocity_m_per_s, state, par):
     """Return the dry friction level of the guide [N], not negative."""
     return level_n
 
 
-@compiled
+@inlined
 def apply_commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Advance the states of effects at the end of a physics step; arguments as of its end."""
 
 
-@compiled
+@inlined
 def apply_sensor_commit(pressure_pa, contraction_m, force_n, dt_s, state, par):
     """Advance the states of sensor effects at the end of a step."""
 
 
-@compiled
+@inlined
 def apply_sensor(pressure_pa, contraction_m, force_n, state, par):
     """Return what the sensors read: pressure [Pa absolute], contraction [m], force [N]."""
     return pressure_pa, contraction_m, force_n

@@ -23,7 +23,7 @@ from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle import geometry
 from pam_sim.rollout import kernel, layout
-from pam_sim.rollout.generate import effect_layout
+from pam_sim.rollout.generate import effect_layout, hook_flag
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
@@ -40,7 +40,11 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
     _pack_base(rig, numbers, state, par)
     for setting in rig.effects:
         k, i = _PLACES[setting.name]
-        get_effect(setting.name).pack_into(setting.parameters, numbers, par, k, state, i)
+        effect = get_effect(setting.name)
+        effect.pack_into(setting.parameters, numbers, par, k, state, i)
+        if par[k - 1] != 0.0:
+            for hook in effect.hooks:
+                par[hook_flag(hook)] = 1.0
     kernel.settle(state, par)
     return state, par
 

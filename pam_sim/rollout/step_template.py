@@ -29,7 +29,7 @@ depends on velocity, fourth elsewhere. Contraction and velocity end at events
 
 import math
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.sarosi import tension_n
@@ -56,7 +56,7 @@ from pam_sim.valve.ppr import set_point_pa
 # --- kernel: everything below is copied into the generated module -------------------------
 
 
-@compiled
+@inlined
 def air_volume(p, x, state, par):
     """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
     volume = par[PAR_DEAD_VOLUME] + volume_m3(
@@ -64,7 +64,7 @@ def air_volume(p, x, state, par):
     return apply_volume(volume, p, x, state, par)
 
 
-@compiled
+@inlined
 def map_tension(p, x, state, par):
     """Return the static tension [N] at pressure p [Pa] and contraction x [m]."""
     gauge, strain = apply_map_input(
@@ -72,21 +72,21 @@ def map_tension(p, x, state, par):
     return par[PAR_FORCE_GAIN] * tension_n(gauge, strain)
 
 
-@compiled
+@inlined
 def muscle_force(tension, p, x, v, dx, elapsed, state, par):
     """Return the force the muscle transmits [N], its dry friction excepted."""
     return apply_muscle_force(
         tension - par[PAR_DAMPING] * v, p, x, v, dx, elapsed, state, par)
 
 
-@compiled
+@inlined
 def load_force(x, v, dx, elapsed, external, state, par):
     """Return the force of weight, external load and load effects against contraction [N]."""
     return apply_load_force(
         par[PAR_WEIGHT] + external, x, v, dx, elapsed, state, par)
 
 
-@compiled
+@inlined
 def valve_flows(fill, vent, p, supply, par):
     """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
     flow_in = 0.0
@@ -100,7 +100,7 @@ def valve_flows(fill, vent, p, supply, par):
     return flow_in, flow_out
 
 
-@compiled
+@inlined
 def ppr_pressures(voltage, h, state, par):
     """Return the PPR pressure [Pa] at the middle and the end of a physics step."""
     p = state[S_PRESSURE]
@@ -132,7 +132,7 @@ def ppr_pressures(voltage, h, state, par):
     return middle, p
 
 
-@compiled
+@inlined
 def latch_pulses(fill, vent, state, par):
     """Fix both valves' edges for the PWM period that begins now."""
     period = par[PAR_PWM_PERIOD]
@@ -145,7 +145,7 @@ def latch_pulses(fill, vent, state, par):
     state[S_VENT_OFF] = off
 
 
-@compiled
+@inlined
 def openings(fill, vent, time_s, h, state, par):
     """Return the mean openings of both valves over one physics step."""
     period = par[PAR_PWM_PERIOD]
@@ -169,7 +169,7 @@ def openings(fill, vent, time_s, h, state, par):
     return fill_s / h, vent_s / h
 
 
-@compiled
+@inlined
 def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     """
     Advance valve, muscle and load by one physics step.
@@ -317,7 +317,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     apply_commit(p_end, x1, v1, x1 - x0, h, state, par)
 
 
-@compiled
+@inlined
 def cell_force(external, state, par):
     """Return (load cell force [N], acceleration [m/s^2]) of the present state."""
     p = state[S_PRESSURE]
@@ -344,7 +344,7 @@ def cell_force(external, state, par):
     return cell, a
 
 
-@compiled
+@inlined
 def observe(state, par, inp, out):
     """Fill ``out`` from ``state`` without advancing anything."""
     p = state[S_PRESSURE]
@@ -369,7 +369,7 @@ def observe(state, par, inp, out):
     out[OUT_FORCE] = read_f
 
 
-@compiled
+@inlined
 def step_body(state, par, inp, out):
     """Advance ``state`` by one step of ``par[PAR_DT]`` and fill ``out``."""
     dt = par[PAR_DT]

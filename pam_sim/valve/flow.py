@@ -21,12 +21,12 @@ so that the slope stays finite at equal pressures.
 
 import math
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 
 RATIO_LINEAR = 0.999
 
 
-@compiled
+@inlined
 def flow_function(ratio, critical_ratio):
     """
     Return psi(r), dimensionless: 1 when choked, 0 at or above equal pressures.
@@ -50,7 +50,7 @@ def flow_function(ratio, critical_ratio):
     return math.sqrt(1.0 - part * part) * (1.0 - ratio) / (1.0 - RATIO_LINEAR)
 
 
-@compiled
+@inlined
 def mass_flow_kg_per_s(upstream_pa, downstream_pa, conductance_kg_per_s_pa, critical_ratio):
     """
     Return the mass flow [kg/s], never negative (no back flow).

@@ -20,7 +20,7 @@ valve is open or shut; a PWM period latches the duty at its start, and the
 share of a 0.1 ms step in which a valve is open is exact.
 """
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'hsv'
@@ -42,20 +42,20 @@ PARAMETERS = (
 )
 
 
-@compiled
+@inlined
 def clip_duty(duty):
     """Return a duty limited to 0 … 1."""
     return min(max(duty, 0.0), 1.0)
 
 
-@compiled
+@inlined
 def open_time_in(start_s, end_s, on_s, off_s):
     """Return how long [s] a valve open from ``on_s`` to ``off_s`` is open in [start, end]."""
     overlap = min(end_s, off_s) - max(start_s, on_s)
     return overlap if overlap > 0.0 else 0.0
 
 
-@compiled
+@inlined
 def pulse_edges(pulse_s, last_off_s, period_s, open_time_s, close_time_s):
     """
     Return (on, off) edges [s] of one valve in the PWM period that begins now.

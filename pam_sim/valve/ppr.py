@@ -20,7 +20,7 @@ Proportional pressure regulator (PPR): a first order lag of the set point.
 The regulator imposes the pressure; volume changes do not disturb it.
 """
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'ppr'
@@ -35,7 +35,7 @@ PARAMETERS = (
 )
 
 
-@compiled
+@inlined
 def set_point_pa(voltage_v, gain_pa_per_v, atmosphere_pa):
     """Return the absolute pressure set point [Pa] of a command voltage, clipped to 0-6 V."""
     voltage = min(max(voltage_v, 0.0), MAX_VOLTAGE_V)

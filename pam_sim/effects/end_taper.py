@@ -1,0 +1,52 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ends that are not cylindrical make the braid work at a larger strain: F(p, k eps)."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.muscle.geometry import LENGTH_M
+from pam_sim.muscle.sarosi import tension_n
+from pam_sim.parameters import Parameter
+
+
+def _force_change(values, rig):
+    """Return the change of tension at 500 kPa gauge and 10 mm, N."""
+    strain = 10e-3 / LENGTH_M
+    gain = rig.parameters['force_map_gain'] if rig is not None else 1.0
+    return gain * float(tension_n(500e3, (1.0 + values['k_minus_1']) * strain)
+                        - tension_n(500e3, strain))
+
+
+EFFECT = Effect(
+    name='end_taper',
+    family='static_map',
+    subsystem='muscle',
+    sentence='The tapered ends shorten the part that contracts: force falls faster with strain.',
+    source='Tondu and Lopez (2000), IEEE Control Systems Magazine 20(2), parameter k.',
+    parameters=(
+        Parameter('k_minus_1', '-', 0.05, -0.3, 1.0, description='Strain factor less one.'),
+    ),
+    amplitude=('k_minus_1',),
+    reported=(
+        Reported('k_minus_1', '-', lambda values, rig: values['k_minus_1']),
+        Reported('force_change_at_500kpa_10mm_n', 'N', _force_change),
+    ),
+)
+
+
+@compiled
+def map_input(gauge_pa, strain, state, i, par, k):
+    """Return the strain scaled."""
+    return gauge_pa, strain * (1.0 + par[k])

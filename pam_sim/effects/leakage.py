@@ -1,0 +1,84 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Air lost from muscle or fitting: an orifice to the atmosphere, ISO 6358, b = 0.5.
+
+HSV: the flow is missing in the muscle. PPR: the regulator makes up for it and is
+left with a small droop.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.muscle import geometry
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.parameters import Parameter
+from pam_sim.units import (
+    GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
+from pam_sim.valve.flow import mass_flow_kg_per_s
+
+CRITICAL_RATIO = 0.5
+_KG_PER_S_PA = RHO_REFERENCE * (T_REFERENCE_K / TEMPERATURE_K) ** 0.5
+_CONDUCTANCE, _ATMOSPHERE, _RT, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(7)
+
+
+def _pack(values, numbers):
+    thread, turns = geometry.braid()
+    return (values['conductance_m3_per_s_pa'] * _KG_PER_S_PA, P_ATM_PA,
+            GAS_CONSTANT_AIR * TEMPERATURE_K, numbers.parameters['V_dead'], geometry.LENGTH_M,
+            thread * thread, 1.0 / (12.566370614359172 * turns * turns))
+
+
+def _flow_at_400kpa(values, rig):
+    return float(mass_flow_kg_per_s(
+        400e3 + P_ATM_PA, P_ATM_PA, values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
+        CRITICAL_RATIO))
+
+
+EFFECT = Effect(
+    name='leakage',
+    family='loss',
+    subsystem='valve',
+    sentence='Air escapes from the muscle or a fitting.',
+    source='ISO 6358 orifice to the atmosphere.',
+    parameters=(
+        Parameter('conductance_m3_per_s_pa', 'm3/(s Pa)', 2.0e-13, 0.0, 1e-9,
+                  description='Sonic conductance of the leak.'),
+    ),
+    amplitude=('conductance_m3_per_s_pa',),
+    reported=(
+        Reported('conductance_m3_per_s_pa', 'm3/(s Pa)',
+                 lambda values, rig: values['conductance_m3_per_s_pa']),
+        Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', _flow_at_400kpa),
+    ),
+    slots=7,
+    pack=_pack,
+)
+
+
+@compiled
+def mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, i, par, k):
+    """Return the net flow less the leak."""
+    return flow_kg_per_s - mass_flow_kg_per_s(
+        pressure_pa, par[k + _ATMOSPHERE], par[k + _CONDUCTANCE], CRITICAL_RATIO)
+
+
+@compiled
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the pressure rate behind the PPR less the leak's share."""
+    lost = mass_flow_kg_per_s(
+        pressure_pa, par[k + _ATMOSPHERE], par[k + _CONDUCTANCE], CRITICAL_RATIO)
+    volume = par[k + _DEAD] + volume_m3(
+        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
+    return rate_pa_per_s - par[k + _RT] / volume * lost

@@ -1,0 +1,38 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pressure needed before the bladder touches the braid: F(p - p_th, eps)."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+EFFECT = Effect(
+    name='threshold_pressure',
+    family='static_map',
+    subsystem='muscle',
+    sentence='Part of the pressure only brings the bladder to the braid and gives no force.',
+    source='Radial expansion of the bladder, e.g. Davis et al. (2003), Int. J. Robotics Research.',
+    parameters=(
+        Parameter('pressure_pa', 'Pa', 10e3, -100e3, 200e3, description='Pressure without force.'),
+    ),
+    amplitude=('pressure_pa',),
+    reported=(Reported('pressure_pa', 'Pa', lambda values, rig: values['pressure_pa']),),
+)
+
+
+@compiled
+def map_input(gauge_pa, strain, state, i, par, k):
+    """Return the pressure less the threshold."""
+    return gauge_pa - par[k], strain
