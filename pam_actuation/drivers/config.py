@@ -89,6 +89,7 @@ _RANGES = {
     'hsv.slope_share': (0.0, 1.0, 'share of the slope of the command fed forward'),
     'hsv.band_pa': (0.0, 5e4, 'half width of the set-point band'),
     'hsv.rest_share': (0.0, 1.0, 'errors below this share of the shortest pulse rest'),
+    'hsv.look_ahead_periods': (1.0, 20.0, 'periods the error is looked ahead'),
     'hsv.correct': (0.0, 1.0, 'observer: correction of the pressure'),
     'hsv.correct_volume': (-1.0, 1.0, 'observer: correction of the volume'),
     'hsv.correct_rate': (0.0, 1.0, 'observer: correction of the volume rate'),

@@ -71,7 +71,8 @@ P_CORRECT_RATE = 26     # observer: correction of the volume's rate, in pressure
 P_LEARN_DRIFT = 27      # observer: learning of the drift
 P_LEARN_GAIN = 28       # observer: learning of the flow gains
 P_SWING_LOWEST = 29     # lowest natural frequency of the load [rad/period]
-PAR_SIZE = 30
+P_LOOK_AHEAD = 30       # periods the error is looked ahead without the valves
+PAR_SIZE = 31
 
 # State.
 S_MODEL = 0             # model pressure now [Pa]
@@ -159,19 +160,24 @@ def _advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
 @numba.njit(cache=True)
 def duty_of_opening(opening, open_part, close_part, margin):
     """Return the duty whose pulse is effectively open for ``opening`` (0..1) of a period."""
-    if opening >= 1.0:
+    # A valve that has no time to shut before the next pulse stays open: between the
+    # longest pulse that still shuts and fully open there is nothing.
+    longest = 1.0 - close_part
+    if opening > 0.5 * (1.0 + longest - open_part + close_part):
         return 1.0
     duty = opening + open_part - close_part
-    return min(max(duty, open_part + margin), 1.0)
+    return min(max(duty, open_part + margin), longest)
 
 
 @numba.njit(cache=True)
 def opening_of_duty(duty, open_part, close_part):
     """Return the effective opening (0..1 of a period) of a duty."""
+    if duty <= 0.0:
+        return 0.0
+    if duty > 1.0 - close_part:
+        return 1.0
     if duty <= open_part:
-        return 1.0 if duty >= 1.0 else 0.0
-    if 1.0 - duty < close_part:
-        return 1.0       # the valve has no time to close before the next pulse
+        return 0.0
     return min(duty - open_part + close_part, 1.0)
 
 
@@ -273,13 +279,34 @@ def _command_slope(state, par, p_cmd_pa):
 
 
 @numba.njit(cache=True)
-def _wanted_opening(state, par, p_pa, volume_m3, free_pa, target_pa, slope_pa, supply_pa):
+def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
+    """
+    Return the error [Pa] that stays if the valves do nothing from now on.
+
+    The smallest over the look-ahead, 0 where it changes sign: a swing of the load that
+    will close the error is left to do so.
+    """
+    error = 0.0
+    for i in range(max(int(par[P_LOOK_AHEAD]), 1)):
+        p_pa, volume_m3, rate_m3, _ = _advance(
+            state, par, p_pa, volume_m3, rate_m3, 0.0, 1.0, supply_pa)
+        now = target_pa - p_pa
+        if i == 0:
+            error = now
+        elif now * error <= 0.0:
+            return 0.0
+        elif abs(now) < abs(error):
+            error = now
+    return error
+
+
+@numba.njit(cache=True)
+def _wanted_opening(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     """
     Return the signed opening for the next period.
 
-    ``p_pa`` is the pressure it starts at, ``free_pa`` where that would go by itself.
+    ``p_pa`` is the pressure it starts at, ``error`` what it has to change [Pa].
     """
-    error = target_pa - free_pa
     if abs(error) <= par[P_BAND]:
         return 0.0
     # The slope is part of the error one period on: only the rest is scaled by the gain.
@@ -328,19 +355,20 @@ def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     out[O_PREDICTED] = math.nan
     if state[S_STARTED] > 0.5:
         predicted, vol, vrate = predict(state, par, supply_pa)
-        free, _, _, _ = _advance(state, par, predicted, vol, vrate, 0.0, 1.0, supply_pa)
         out[O_PREDICTED] = predicted
-        opening = _wanted_opening(state, par, predicted, vol, free, target, slope, supply_pa)
-    _push(state, opening)
+        error = _free_error(state, par, predicted, vol, vrate, target, supply_pa)
+        opening = _wanted_opening(state, par, predicted, vol, error, slope, supply_pa)
     out[O_FILL] = 0.0
     out[O_VENT] = 0.0
-    if opening > 0.0:
-        out[O_FILL] = duty_of_opening(opening, par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
-    elif opening < 0.0:
-        out[O_VENT] = duty_of_opening(-opening, par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
     out[O_SATURATED] = 0.0
-    if abs(opening) >= 1.0:
-        out[O_SATURATED] = math.copysign(1.0, opening)
+    if opening != 0.0:
+        duty = duty_of_opening(abs(opening), par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
+        out[O_FILL if opening > 0.0 else O_VENT] = duty
+        if duty >= 1.0:
+            out[O_SATURATED] = math.copysign(1.0, opening)
+        opening = math.copysign(
+            opening_of_duty(duty, par[P_OPEN], par[P_CLOSE]), opening)
+    _push(state, opening)
 
 
 @numba.njit(cache=True)

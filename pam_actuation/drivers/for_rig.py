@@ -1,0 +1,120 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a valve driver is told of a rig: the data sheet of its model file.
+
+The law then knows valves, line, volume and load as the rig states them; a lab does the
+same with its own rig's model file. Effects that no data sheet lists (hysteresis, creep,
+leak) stay unknown to the driver.
+"""
+
+import math
+
+from pam_actuation.drivers.config import DriverConfig
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+
+_UNKNOWN_SWING_HZ = 5.9
+_GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
+
+
+def driver_config(rig, changes=(), where='parameter'):
+    """
+    Return the DriverConfig for a rig.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+        Any rig, PPR or HSV.
+    changes : mapping, optional
+        Parameters that differ from what the rig tells, by name.
+    where : str
+        Place of ``changes`` for the error text.
+
+    Raises
+    ------
+    InputError
+        For an unknown or impossible parameter in ``changes``.
+
+    """
+    values = rig.parameters
+    told = {
+        'ppr.gain_pa_per_v': values['K_m'],
+        'ppr.time_constant_s': values['T_m'],
+        'hsv.period_s': values['pwm_period_s'],
+        'hsv.conductance_m3_per_s_pa': values['C'],
+        'hsv.critical_ratio': values['b'],
+        'hsv.supply_pa': values['supply_pa'],
+        'hsv.dead_time_s': _effect(rig, 'valve_dead_time', 'delay_s'),
+        'hsv.open_time_s': _effect(rig, 'valve_dead_zone', 'open_time_s'),
+        'hsv.close_time_s': _effect(rig, 'valve_dead_zone', 'close_time_s'),
+    }
+    # Without a dead time to wait for, the loop can remove more of the error per period.
+    told['hsv.gain'] = 0.35 + 0.35 * max(0.0, 1.0 - told['hsv.dead_time_s'] / 0.02)
+    told.update(_load(rig))
+    config = DriverConfig.from_parameters(told, where=f'rig {rig.name}')
+    return DriverConfig.from_parameters(changes, config, where)
+
+
+def _effect(rig, name, parameter):
+    setting = rig.effect(name)
+    return 0.0 if setting is None else setting.parameters[parameter]
+
+
+def _load(rig):
+    """Return volume and swing of the load on the muscle, from the statics of the rig."""
+    if rig.load != 'hanging_mass':
+        # The contraction is prescribed: nothing swings with the pressure.
+        volume_m3 = float(rig.volume_m3(rig.parameters.get('contraction_m', 0.0)))
+        return {'hsv.volume_m3': volume_m3, 'hsv.volume_at_600kpa_m3': volume_m3,
+                'hsv.volume_slope_m3_per_pa': 0.0}
+    lift_off = next((gauge for gauge in _GAUGES_PA
+                     if rig.static_contraction_m(P_ATM_PA + gauge) > 0.0), 550_000) - 10_000.0
+    lift_off = min(max(lift_off, 0.0), 550_000.0)
+    swings = [(_swing_hz(rig, lift_off + part * (600_000.0 - lift_off)),
+               lift_off + part * (600_000.0 - lift_off)) for part in
+              (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)]
+    lowest_hz = min(swings)[0]
+    highest_hz = max(swings)[0]
+    # The frequency falls fast, then stays: take the bend for the end of the fall.
+    lowest_at = next(gauge for hz, gauge in swings if hz <= 1.05 * lowest_hz)
+    slope = (_volume(rig, lift_off + 30e3) - _volume(rig, lift_off + 10e3)) / 20e3
+    return {
+        'hsv.volume_m3': _volume(rig, 0.0),
+        'hsv.volume_at_600kpa_m3': _volume(rig, 600e3),
+        'hsv.volume_slope_m3_per_pa': max(slope, 0.0),
+        'hsv.lift_off_gauge_pa': lift_off,
+        'hsv.swing_hz': highest_hz,
+        'hsv.swing_lowest_hz': lowest_hz,
+        'hsv.swing_lowest_gauge_pa': lowest_at,
+        'hsv.swing_damping': rig.parameters['damping_n_s_per_m'] / (
+            4.0 * math.pi * rig.parameters['mass_kg'] * math.sqrt(highest_hz * lowest_hz)),
+    }
+
+
+def _volume(rig, gauge_pa):
+    return float(rig.volume_m3(rig.static_contraction_m(P_ATM_PA + gauge_pa)))
+
+
+def _swing_hz(rig, gauge_pa):
+    """Return the natural frequency [Hz] of the load at constant pressure."""
+    x_m = rig.static_contraction_m(P_ATM_PA + gauge_pa)
+    weight_n = rig.parameters['mass_kg'] * GRAVITY_M_PER_S2
+    h_n = 0.01 * weight_n
+    # dF/dx at constant pressure from two static points of the same pressure.
+    up = rig.static_contraction_m(P_ATM_PA + gauge_pa, weight_n - h_n)
+    down = rig.static_contraction_m(P_ATM_PA + gauge_pa, weight_n + h_n)
+    if up <= down or x_m <= 0.0:
+        return _UNKNOWN_SWING_HZ
+    return math.sqrt(2.0 * h_n / (up - down) / rig.parameters['mass_kg']) / (2.0 * math.pi)

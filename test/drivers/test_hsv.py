@@ -1,0 +1,212 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The HSV law against the simulated rig: tracking, steps, rest, limits, compiled form."""
+
+import math
+
+import numba
+import numpy as np
+from pam_actuation.drivers import hsv_kernel as kernel
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.hsv import HsvConfig, HsvLaw, initial_state
+import pam_sim
+from pam_sim.errors import InputError
+from pam_sim.rollout.kernel import step as plant_step
+from pam_sim.units import P_ATM_PA
+import pytest
+
+NOISE_PA = 300.0
+
+
+@pytest.fixture(scope='module')
+def rig():
+    """Return the realistic rig with the switching valves, duty-averaged."""
+    return pam_sim.load_rig('dmsp_5_300_realistic', valve='hsv')
+
+
+def run(rig, command, seconds, config=None, seed=1):
+    """
+    Close the loop; return gauge pressures and commands [kPa] each ms and duties per period.
+
+    ``command`` maps time [s] to gauge kPa.
+    """
+    plant, law = rig.plant(seed), HsvLaw(config or driver_config(rig).hsv)
+    noise = np.random.default_rng(seed)
+    pressures, commands, duties = [], [], []
+    for k in range(round(seconds * 100)):
+        now = 0.01 * k
+        duty = law.step(P_ATM_PA + 1e3 * command(now),
+                        plant.pressure_pa + NOISE_PA * noise.standard_normal())
+        duties.append(duty)
+        for j in range(10):
+            plant.step(duty)
+            pressures.append((plant.pressure_pa - P_ATM_PA) * 1e-3)
+            commands.append(command(now + 1e-3 * (j + 1)))
+    return np.array(pressures), np.array(commands), np.array(duties)
+
+
+def lag_and_rest(pressures, commands, skip=2000):
+    """Return the lag [ms] that fits best and the rms and largest error [kPa] left after it."""
+    p, c = pressures[skip:], commands[skip:]
+    errors = [np.mean((p[n:] - c[:len(c) - n]) ** 2) for n in range(150)]
+    lag = int(np.argmin(errors))
+    return lag, math.sqrt(errors[lag]), np.abs(p[lag:] - c[:len(c) - lag]).max()
+
+
+@pytest.mark.parametrize('hz, rms_kpa', [(0.25, 2.5), (0.5, 4.0)])
+def test_tracks_a_sine(rig, hz, rms_kpa):
+    """150-550 kPa: lag of dead time + at most 2 periods, small error beside the lag."""
+    p, c, duties = run(rig, lambda t: 350.0 - 200.0 * math.cos(2 * math.pi * hz * t), 6.0)
+    lag_ms, rms, _ = lag_and_rest(p, c)
+    assert 30 <= lag_ms <= 50
+    assert rms < rms_kpa
+    assert not np.any((duties[:, 0] > 0.0) & (duties[:, 1] > 0.0))
+
+
+def test_one_hertz_within_what_the_valve_can(rig):
+    """At 1 Hz and +-100 kPa the vent valve is not yet the limit."""
+    p, c, _ = run(rig, lambda t: 350.0 - 100.0 * math.cos(2 * math.pi * t), 5.0)
+    lag_ms, rms, _ = lag_and_rest(p, c)
+    assert 30 <= lag_ms <= 55 and rms < 5.0
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_step_and_rest(rig, seed):
+    """200 to 400 kPa: fast, overshoot near one shortest pulse, then both valves shut."""
+    p, _, duties = run(rig, lambda t: 200.0 if t < 1.5 else 400.0, 4.0, seed=seed)
+    after = p[1500:]
+    assert np.argmax(after > 392.0) < 260            # ms; the fill valve alone needs 130
+    assert after.max() - 400.0 < 5.0
+    assert np.abs(p[3000:] - 400.0).max() < 2.5
+    assert np.ptp(p[3500:]) < 4.0
+    assert np.count_nonzero(duties[350:]) <= 4
+
+
+def test_both_duties_exactly_zero_in_the_band():
+    """In the set-point band, with nothing under way, no valve moves."""
+    law = HsvLaw()
+    for k in range(100):
+        wiggle = 400.0 * (-1.0) ** k
+        assert law.step(P_ATM_PA + 300e3, P_ATM_PA + 300e3 + wiggle) == (0.0, 0.0)
+
+
+def test_atmosphere_and_supply_limits(rig):
+    """Commands beyond both ends end in shut valves, not in ones held open."""
+    p, _, duties = run(
+        rig, lambda t: 0.0 if t < 0.5 else 750.0 if t < 3.0 else -50.0, 6.0)
+    assert np.all(duties[:50] == 0.0)
+    assert 690.0 < p[2999] < 700.0 and np.count_nonzero(duties[250:300]) <= 2
+    assert 0.0 <= p[-1] < 1.5 and np.all(duties[-50:] == 0.0)
+
+
+def test_switching_valves(rig):
+    """Resolved PWM edges behave as the mean openings do."""
+    p, c, _ = run(rig.with_(fidelity='switching'),
+                  lambda t: 350.0 - 200.0 * math.cos(math.pi * t), 4.0)
+    lag_ms, rms, _ = lag_and_rest(p, c)
+    assert 30 <= lag_ms <= 52 and rms < 5.0
+
+
+@pytest.mark.parametrize('change', [
+    {'C': 1.6e-10}, {'C': 2.4e-10}, {'V_dead': 6.0e-6}, {'mass_kg': 4.0}, {'supply_pa': 721e3}])
+def test_stands_wrong_numbers(rig, change):
+    """With a rig 20 % and more off its data sheet the loop settles and rests."""
+    config = driver_config(rig).hsv
+    p, _, duties = run(rig.with_(parameters=change),
+                       lambda t: 200.0 if t < 1.5 else 400.0, 4.5, config)
+    assert p[1500:].max() - 400.0 < 20.0
+    assert np.abs(p[4000:] - 400.0).max() < 4.0
+    assert np.count_nonzero(duties[400:]) <= 10
+
+
+@pytest.mark.parametrize('delay_s', [0.024, 0.036])
+def test_stands_a_wrong_dead_time(rig, delay_s):
+    """6 ms more or less than told: no growing oscillation."""
+    effects = [{'name': item.name, 'parameters': {'delay_s': delay_s}
+                if item.name == 'valve_dead_time' else item.parameters} for item in rig.effects]
+    p, _, _ = run(rig.with_(effects=effects), lambda t: 200.0 if t < 1.5 else 400.0, 4.5,
+                  driver_config(rig).hsv)
+    assert np.abs(p[3500:] - 400.0).max() < 6.0
+
+
+def test_nominal_rig_has_no_dead_time_to_wait_for():
+    """Told by the nominal model file the lag is one to two periods."""
+    rig = pam_sim.load_rig('dmsp_5_300_hanging_mass', valve='hsv')
+    config = driver_config(rig).hsv
+    assert config.dead_time_s == 0.0 and config.open_time_s == 0.0
+    p, c, _ = run(rig, lambda t: 350.0 - 200.0 * math.cos(math.pi * t), 4.0)
+    lag_ms, rms, _ = lag_and_rest(p, c)
+    assert lag_ms <= 20 and rms < 2.0
+
+
+def test_duty_and_opening_are_inverse():
+    """Opening times: shortest pulse, no pulse, always open."""
+    opening_of, duty_of = kernel.opening_of_duty, kernel.duty_of_opening
+    assert opening_of(0.17, 0.17, 0.2) == 0.0
+    assert opening_of(0.18, 0.17, 0.2) == pytest.approx(0.21)
+    assert opening_of(0.81, 0.17, 0.2) == 1.0
+    for opening in (0.22, 0.4, 0.8, 1.0):
+        duty = duty_of(opening, 0.17, 0.2, 0.01)
+        assert opening_of(duty, 0.17, 0.2) == pytest.approx(opening)
+    assert duty_of(0.05, 0.17, 0.2, 0.01) == pytest.approx(0.18)
+    assert opening_of(0.0, 0.0, 0.0) == 0.0 and opening_of(0.3, 0.0, 0.0) == 0.3
+
+
+def test_dead_time_longer_than_memory():
+    """A dead time the law cannot remember is refused with the allowed range."""
+    with pytest.raises(InputError, match='dead time of 0.5 s, allowed are 0 to below 0.30 s'):
+        HsvConfig(dead_time_s=0.5).par()
+
+
+def test_missing_measurements(rig):
+    """NaN every second period: the model bridges; never measured: both shut."""
+    plant, law = rig.plant(1), HsvLaw(driver_config(rig).hsv)
+    assert law.step(P_ATM_PA + 3e5, math.nan) == (0.0, 0.0)
+    for k in range(200):
+        duty = law.step(P_ATM_PA + 3e5, plant.pressure_pa if k % 2 else math.nan)
+        for _ in range(10):
+            plant.step(duty)
+    assert plant.pressure_pa - P_ATM_PA == pytest.approx(300e3, abs=3e3)
+
+
+@numba.njit
+def _closed_loop(state, par, law_state, law_par, periods, command_pa, pressures):
+    inp = np.zeros(4)
+    out = np.zeros(13)
+    law_out = np.zeros(kernel.OUT_SIZE)
+    pressure = 101325.0
+    for k in range(periods):
+        kernel.hsv_step(law_state, law_par, command_pa, pressure, np.nan, law_out)
+        inp[0] = law_out[0]
+        inp[1] = law_out[1]
+        for _ in range(10):
+            plant_step(state, par, inp, out)
+        pressure = out[1]
+        pressures[k] = pressure
+
+
+def test_compiled_closed_loop(rig):
+    """Law and plant run inside one compiled function, equal to the objects to the bit."""
+    config = driver_config(rig).hsv
+    state, par = rig.pack()
+    pressures = np.zeros(150)
+    _closed_loop(state, par, initial_state(), config.par(), 150, P_ATM_PA + 350e3, pressures)
+    plant, law = rig.plant(0), HsvLaw(config)
+    for k in range(150):
+        duty = law.step(P_ATM_PA + 350e3, plant.pressure_pa)
+        for _ in range(10):
+            plant.step(duty)
+        assert plant.pressure_pa == pressures[k]
+    assert pressures[-1] - P_ATM_PA == pytest.approx(350e3, abs=3e3)

@@ -1,0 +1,209 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The driver loop with the simulated rig: whole chain, venting, status, bad input."""
+
+import math
+
+from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.messages import Pressure
+from pam_actuation.plant_loop import PlantLoop
+import pam_sim
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
+import pytest
+
+MS = 1_000_000
+START = 1_700_000_000_123_456_789
+SAFE = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
+
+
+class Chain:
+    """Driver and simulated rig on one clock; the command can be switched off."""
+
+    def __init__(self, valve, **changes):
+        """Start at rest with a 5 ms sensor and command raster."""
+        rig = pam_sim.load_rig('dmsp_5_300_realistic', valve=valve)
+        self.loop = DriverLoop(valve, driver_config(rig, changes))
+        self.plant = PlantLoop(rig, 3)
+        self.now = START
+        self.plant.advance_to(self.now)
+        self.command_kpa = 300.0
+        self.sensor = True
+        self.signals, self.statuses, self.pressures_kpa = [], [], []
+
+    def run(self, ms):
+        """Go on for some ms; return the last status."""
+        every = round(200 / self.loop.rate_hz)
+        for k in range(ms // 5):
+            self.now += 5 * MS
+            self.plant.advance_to(self.now)
+            sample = self.plant.sample(self.now)
+            if self.sensor:
+                self.loop.on_pressure(sample['pressure'])
+            if 'supply_pressure' in sample:
+                self.loop.on_supply(sample['supply_pressure'])
+            if self.command_kpa is not None:
+                self.loop.on_command(Pressure(self.now, P_ATM_PA + 1e3 * self.command_kpa))
+            self.pressures_kpa.append((self.plant.plant.pressure_pa - P_ATM_PA) * 1e-3)
+            if k % every == 0:
+                signal, status = self.loop.tick(self.now)
+                self.plant.set_signal(signal)
+                self.signals.append(signal)
+                self.statuses.append(status)
+        return self.statuses[-1]
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_follows_and_vents_when_the_controller_dies(valve):
+    """The pressure arrives; 0.3 s after the last command the safe signal is out."""
+    chain = Chain(valve)
+    status = chain.run(2000)
+    assert status.level == 0 and status.message == 'following the pressure command'
+    assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
+    chain.command_kpa = None
+    died, count = chain.now, len(chain.signals)
+    status = chain.run(300)
+    safe = [s.stamp_ns for s in chain.signals[count:] if s.efforts == SAFE[valve]]
+    assert safe and safe[0] - died <= 120 * MS
+    assert status.level == 2 and 'no valid pressure command' in status.message
+    messages = {s.message for s in chain.statuses[-20:]}
+    assert len(messages) == 1
+    chain.run(1500)
+    assert chain.pressures_kpa[-1] < 15.0
+    chain.command_kpa = 400.0
+    chain.run(200)
+    assert chain.pressures_kpa[-1] < 130.0           # 500 kPa/s at most
+    assert chain.run(1500).level == 0
+    assert chain.pressures_kpa[-1] == pytest.approx(400.0, abs=3.0)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_sensor_lost(valve):
+    """Without readings both valve types vent and say so."""
+    chain = Chain(valve)
+    chain.run(1000)
+    chain.sensor = False
+    status = chain.run(150)
+    assert chain.signals[-1].efforts == SAFE[valve]
+    assert 'no valid measured pressure' in status.message
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_emergency_stop_and_reset(valve):
+    """Latched; after the reset the pressure climbs back without a jump."""
+    chain = Chain(valve)
+    chain.run(1000)
+    assert chain.loop.emergency_stop('test')[0]
+    status = chain.run(100)
+    assert status.level == 2 and chain.signals[-1].efforts == SAFE[valve]
+    chain.run(1000)
+    assert chain.signals[-1].efforts == SAFE[valve]
+    done, text = chain.loop.reset()
+    assert done and 'emergency stop' in text
+    chain.run(1500)
+    assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
+    rise = [b - a for a, b in zip(chain.pressures_kpa[420:], chain.pressures_kpa[430:])]
+    assert max(rise) < 0.05 * 500.0 + 12.0           # kPa in 50 ms
+
+
+def test_frozen_sensor_with_hsv():
+    """The reading sticks while the command rises: vents before the supply is reached."""
+    chain = Chain('hsv')
+    chain.run(1000)
+    chain.command_kpa = 550.0
+    stuck = Pressure(0, P_ATM_PA + 301e3)
+    chain.sensor = False
+    for _ in range(60):
+        chain.loop.on_pressure(Pressure(chain.now + 5 * MS, stuck.pressure_pa))
+        chain.run(5)
+    assert 'stands still' in chain.statuses[-1].message
+    assert chain.signals[-1].efforts == (0.0, 1.0)
+    assert max(chain.pressures_kpa) < 700.0
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_rest_is_still_signalled(valve):
+    """At rest the signal goes on at the full rate with fresh stamps."""
+    chain = Chain(valve)
+    chain.run(2000)
+    count = len(chain.signals)
+    chain.run(1000)
+    assert len(chain.signals) - count == round(chain.loop.rate_hz)
+    stamps = [s.stamp_ns for s in chain.signals]
+    assert all(b > a for a, b in zip(stamps, stamps[1:]))
+    if valve == 'hsv':
+        quiet = [s.efforts == (0.0, 0.0) for s in chain.signals[-50:]]
+        assert sum(quiet) >= 45
+    values = dict(chain.statuses[-1].values)
+    assert float(values['rate_hz']) == pytest.approx(chain.loop.rate_hz, rel=0.02)
+    assert values['state'] == 'ok' and float(values['command_age_ms']) < 6.0
+
+
+def test_never_both_valves_open():
+    """Whatever the command does, fill and vent are never open together."""
+    chain = Chain('hsv')
+    for kpa in (300.0, 50.0, 600.0, 0.0, 900.0, 290.0, 310.0, math.nan, 200.0):
+        chain.command_kpa = kpa
+        chain.run(150)
+    assert all(s.efforts[0] == 0.0 or s.efforts[1] == 0.0 for s in chain.signals)
+    assert all(0.0 <= effort <= 1.0 for s in chain.signals for effort in s.efforts)
+
+
+def test_missed_ticks_keep_the_model_right():
+    """After a gap of 8 periods with the fill valve open the law still knows the air inside."""
+    chain = Chain('hsv')
+    chain.run(1000)
+    chain.command_kpa = 500.0
+    for _ in range(4):
+        chain.run(20)
+        chain.now += 20 * MS       # the plant goes on with the last signal
+    chain.run(1500)
+    assert chain.statuses[-1].level == 0
+    assert chain.pressures_kpa[-1] == pytest.approx(500.0, abs=4.0)
+    assert int(dict(chain.statuses[-1].values)['late_ticks']) >= 3
+
+
+def test_safe_signal():
+    """PPR 0 V; HSV fill 0, vent 1."""
+    for valve, efforts in SAFE.items():
+        signal = DriverLoop(valve).safe_signal(5)
+        assert signal.efforts == efforts and signal.stamp_ns == 5
+        assert signal.names == (('ppr_voltage',) if valve == 'ppr'
+                                else ('fill_duty', 'vent_duty'))
+
+
+@pytest.mark.parametrize('valve, config, words', [
+    ('xyz', None, "unknown valve type 'xyz', choose ppr or hsv"),
+    ('hsv', {'hsv.dead_tme_s': 0.03}, 'did you mean hsv.dead_time_s'),
+    ('hsv', {'hsv.gain': 3.0}, 'hsv.gain is 3.0, allowed are 0.05 to 1'),
+    ('ppr', {'max_pressure_gauge_pa': 'high'}, 'a number is needed'),
+    ('ppr', {'max_pressure_gauge_pa': math.nan}, 'allowed are 1000 to'),
+    ('ppr', {'ppr.lowest_v': 5.0, 'ppr.highest_v': 4.0}, 'is not below')])
+def test_bad_configuration(valve, config, words):
+    """One sentence with place, value and allowed range."""
+    with pytest.raises(InputError, match=words):
+        DriverLoop(valve, config)
+
+
+def test_parameters_round_trip():
+    """The parameter table, the configuration and the flat dict agree."""
+    names = [parameter.name for parameter in DRIVER_PARAMETERS]
+    assert len(set(names)) == len(names)
+    assert all(p.lower <= p.default <= p.upper and p.description for p in DRIVER_PARAMETERS)
+    config = DriverConfig.from_parameters({'hsv.gain': 0.5, 'max_pressure_gauge_pa': 5e5})
+    assert DriverConfig.from_parameters(config.as_parameters()) == config
+    assert config.hsv.gain == 0.5 and config.safety.max_pressure_gauge_pa == 5e5

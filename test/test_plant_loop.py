@@ -1,0 +1,132 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated rig on a clock: steps, held signal, samples, catch-up."""
+
+import math
+
+from pam_actuation.messages import Force, ValveSignal
+from pam_actuation.plant_loop import PlantLoop
+import pam_sim
+from pam_sim.units import P_ATM_PA
+import pytest
+
+MS = 1_000_000
+START = 1_700_000_000_000_000_007
+
+
+def make(valve='ppr', preset='dmsp_5_300_hanging_mass', seed=1):
+    """Return a started plant loop."""
+    plant = PlantLoop(pam_sim.load_rig(preset, valve=valve), seed)
+    assert plant.advance_to(START) == 0
+    return plant
+
+
+def test_steps_to_the_clock():
+    """1 kHz physics: as many steps as ms have passed, the rest carried over."""
+    plant = make()
+    assert plant.advance_to(START + 5 * MS) == 5
+    assert plant.advance_to(START + 5 * MS + MS // 2) == 0
+    assert plant.advance_to(START + 7 * MS - 1) == 1
+    assert plant.advance_to(START + 3 * MS) == 0          # the clock went back
+    assert plant.advance_to(START + 10 * MS) == 4
+    assert plant.plant.time_s == pytest.approx(0.010) and plant.steps == 10
+
+
+def test_equals_the_rollout():
+    """The same inputs through simulate give the same pressures to the bit."""
+    plant = make('hsv', 'dmsp_5_300_realistic')
+    duties = [(0.4, 0.0)] * 10 + [(0.0, 0.3)] * 10
+    for k, duty in enumerate(duties):
+        plant.set_signal(ValveSignal(0, ('fill_duty', 'vent_duty'), duty))
+        plant.advance_to(START + (k + 1) * 10 * MS)
+    response = plant.rig.simulate([duty for duty in duties for _ in range(10)])
+    assert plant.plant.pressure_pa == response.pressure_pa[-1]
+
+
+def test_signal_by_name_and_held():
+    """Matched by name in any order; not finite or unknown: ignored, the old one stays."""
+    plant = make('hsv')
+    plant.set_signal(ValveSignal(0, ('vent_duty', 'fill_duty'), (0.0, 0.7)))
+    assert plant.signal == (0.7, 0.0)
+    plant.set_signal(ValveSignal(0, ('fill_duty', 'vent_duty'), (math.nan, 0.2)))
+    assert plant.signal == (0.7, 0.2)
+    plant.set_signal(ValveSignal(0, ('ppr_voltage',), (3.0,)))
+    assert plant.signal == (0.7, 0.2) and plant.signals_ignored == 2
+    plant.set_signal(ValveSignal(0, ('fill_duty',), (0.0,)))
+    assert plant.signal == (0.0, 0.2) and plant.signals == 4
+
+
+def test_ppr_reaches_its_pressure():
+    """3 V give 300 kPa gauge and the contraction of the force map."""
+    plant = make()
+    plant.set_signal(ValveSignal(0, ('ppr_voltage',), (3.0,)))
+    for k in range(1, 31):
+        plant.advance_to(START + k * 100 * MS)
+    sample = plant.sample(START + 3000 * MS)
+    assert sample['pressure'].pressure_pa == pytest.approx(P_ATM_PA + 300e3, rel=1e-6)
+    assert sample['contraction'].contraction_m == pytest.approx(2.62e-3, abs=2e-5)
+    assert math.isnan(sample['contraction'].velocity_m_per_s)
+    assert sample['force'].force_n == pytest.approx(49.03, abs=0.05)
+    assert 'supply_pressure' not in sample
+    assert sample['pressure'].stamp_ns == START + 3000 * MS
+
+
+def test_external_force():
+    """10 N against the contraction reduce it; NaN is ignored."""
+    held = []
+    for force_n in (0.0, 10.0):
+        plant = make()
+        plant.set_signal(ValveSignal(0, ('ppr_voltage',), (4.0,)))
+        plant.set_external_force(Force(0, force_n))
+        plant.set_external_force(Force(0, math.nan))
+        for k in range(1, 21):
+            plant.advance_to(START + k * 100 * MS)
+        held.append(plant.sample(0)['contraction'].contraction_m)
+    assert held[1] < held[0] - 1e-3
+
+
+def test_late_call_is_bounded_and_counted():
+    """After a pause of 10 s at most 0.25 s are simulated; the time goes on from now."""
+    plant = make()
+    plant.advance_to(START + 10 * MS)
+    assert plant.advance_to(START + 10_010 * MS) == 250
+    assert plant.overruns == 1 and plant.skipped_s == pytest.approx(9.75)
+    assert plant.now_ns == START + 10_010 * MS
+    assert plant.advance_to(START + 10_015 * MS) == 5
+
+
+def test_noise_and_jitter_from_the_rig():
+    """The realistic rig: 0.3 kPa, 10 um, 0.1 N, 50 us; the same seed gives the same."""
+    def read(seed):
+        plant = make('hsv', 'dmsp_5_300_realistic', seed)
+        samples = []
+        for k in range(1, 1001):
+            plant.advance_to(START + k * 5 * MS)
+            samples.append(plant.sample(START + k * 5 * MS))
+        return samples
+
+    def spread(values):
+        mean = sum(values) / len(values)
+        return math.sqrt(sum((value - mean) ** 2 for value in values) / len(values))
+
+    samples = read(1)
+    assert spread([s['pressure'].pressure_pa for s in samples]) == pytest.approx(300, rel=0.1)
+    assert spread([s['contraction'].contraction_m for s in samples]) == pytest.approx(
+        1e-5, rel=0.1)
+    jitter = [s['pressure'].stamp_ns - START - (k + 1) * 5 * MS for k, s in enumerate(samples)]
+    assert spread(jitter) == pytest.approx(50_000, rel=0.1)
+    assert samples[0]['supply_pressure'].pressure_pa == pytest.approx(801_325.0)
+    assert str(read(1)) == str(samples)
+    assert str(read(2)) != str(samples)
