@@ -31,14 +31,13 @@ rule file).
 import os
 
 import numpy as np
-from pam_sim.errors import InputError
-from pam_sim.located_yaml import dump_yaml, load_yaml
-
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import (
     load_rules, rules_from_mapping, rules_to_mapping)
 from pam_actuation.control.static_inverse import tabulate_static_inverse
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import dump_yaml, load_yaml
 
 _KINDS = ('sofc', 'pid')
 _KEYS = ('controller', 'rig', 'settings', 'rules', 'static_inverse', 'initial_rules')

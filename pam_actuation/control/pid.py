@@ -24,13 +24,12 @@ import math
 
 from numba import njit
 import numpy as np
-from pam_sim.compiled import compiled
-from pam_sim.units import P_ATM_PA
-
 from pam_actuation.control import inputs as place
 from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.settings import checked_settings, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim.compiled import compiled
+from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
     Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),

@@ -23,11 +23,10 @@ fresh controller and compares commands and internals bit for bit.
 from dataclasses import dataclass, field
 
 import numpy as np
-from pam_sim.errors import InputError
-
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.tick import (
     INPUT_NAMES, join_stamp, RUNNING, TickCore, TickInputs)
+from pam_sim.errors import InputError
 
 # Input of a tick -> (topic it came from, field of that topic).
 _MEASURED = {
@@ -159,7 +158,8 @@ def _columns(states, path):
     missing = [name for name in INPUT_NAMES if name not in states.values]
     if missing:
         raise InputError(
-            f'controller_state is not of this project\'s controllers: it lacks {missing[0]}', path)
+            f'controller_state is not from a controller of this project: it lacks {missing[0]}',
+            path)
     return states.values
 
 

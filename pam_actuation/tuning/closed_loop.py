@@ -27,15 +27,14 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pam_sim.errors import InputError
-from pam_sim.rollout import layout
-from pam_sim.rollout.generate import kernel_hash, load_cached_module
-
 from pam_actuation.control import compiled_entry, pid
 from pam_actuation.control.sofc import step as sofc_step_module
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.hsv import HsvConfig, initial_state
 from pam_actuation.drivers.ppr import PprConfig
+from pam_sim.errors import InputError
+from pam_sim.rollout import layout
+from pam_sim.rollout.generate import kernel_hash, load_cached_module
 
 PHYSICS_S = 0.001
 _MAX_LEAD_S = 0.5

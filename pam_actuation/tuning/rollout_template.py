@@ -26,14 +26,13 @@ signal arrives after ``latency_steps`` of them.
 
 from numba import njit
 import numpy as np
-from pam_sim.rollout import layout
-from pam_sim.rollout.kernel import step
-
 from pam_actuation.control import inputs as place
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
 from pam_actuation.drivers.ppr import ppr_step
+from pam_sim.rollout import layout
+from pam_sim.rollout.kernel import step
 
 LOG_CONTRACTION = 0       # m, true, at the tick
 LOG_PRESSURE = 1          # Pa absolute, true
@@ -112,7 +111,9 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
     plant : tuple
         state, par, inp, out of the kernel; ``out`` holds the start.
     hsv : bool
-        Which driver law ``driver`` (state, par, out) belongs to.
+        Which driver law is used.
+    driver : tuple
+        state, par, out of the driver law.
     timing : tuple of int
         Physics steps per tick, ticks per driver step, latency in physics steps.
     lead_ticks : float

@@ -26,15 +26,14 @@ import time
 
 import joblib
 import numpy as np
-from pam_sim.errors import InputError
-from scipy.optimize import differential_evolution
-
 from pam_actuation.control.config import controller_to_yaml
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.cost import tracking_cost_mm
 from pam_actuation.tuning.space import check_axes, default_axes, from_unit, to_unit
+from pam_sim.errors import InputError
+from scipy.optimize import differential_evolution
 
 HELD_OUT_SEED = 7919      # added to the seed for the noise the optimiser never sees
 

@@ -15,10 +15,9 @@
 """A rig of known statics and a slow muscle for tests of controllers."""
 
 import numpy as np
-from pam_sim.units import P_ATM_PA
-
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.static_inverse import tabulate_static_inverse
+from pam_sim.units import P_ATM_PA
 
 SLOPE_PA_PER_M = 1.0e7        # static pressure rises by 10 kPa per mm
 

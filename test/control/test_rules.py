@@ -21,7 +21,6 @@ from pam_actuation.control.sofc.performance_index import index_linear, index_tab
 from pam_actuation.control.sofc.rule_table import (
     contracting_share, infer_feedback, infer_feedforward, linear_feedback_table)
 import pytest
-
 from straight_rig import sofc
 
 

@@ -14,6 +14,7 @@
 
 """Offline tuning: improves on runs it did not see, same seed same result."""
 
+import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.cost import tracking_cost_mm
@@ -22,7 +23,6 @@ from pam_actuation.tuning.space import (
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-import numpy as np
 import pytest
 
 SHORT_SINE = """

@@ -17,8 +17,6 @@
 import math
 
 import numpy as np
-from pam_sim.errors import InputError
-
 from pam_actuation.control.inputs import INPUT_COUNT
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc import layout
@@ -28,6 +26,7 @@ from pam_actuation.control.sofc.persistence import check_fit
 from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
 from pam_actuation.control.sofc.settings import parameter_vector, SCALING, SETTINGS
 from pam_actuation.control.sofc.step import sofc_step
+from pam_sim.errors import InputError
 
 
 class SelfOrganizingFuzzyController:

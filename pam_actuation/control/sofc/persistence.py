@@ -26,9 +26,8 @@ import os
 import tempfile
 
 import numpy as np
-from pam_sim.errors import InputError
-
 from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_sim.errors import InputError
 
 SCHEMA = 1
 _ARRAYS = ('feedback', 'feedforward', 'feedback_initial', 'feedforward_initial',

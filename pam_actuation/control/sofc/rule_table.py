@@ -31,9 +31,8 @@ from dataclasses import dataclass, field
 import hashlib
 
 import numpy as np
-from pam_sim.compiled import compiled
-
 from pam_actuation.control.sofc.membership import SET_COUNT, SET_NAMES, SET_WORDS
+from pam_sim.compiled import compiled
 
 CONTRACTING, EXTENDING = 0, 1
 DIRECTIONS = ('contracting', 'extending')

@@ -20,7 +20,6 @@ The order of ``SETTINGS`` is the order of the parameter vector: ``P_<NAME>`` in
 """
 
 import numpy as np
-
 from pam_actuation.control.settings import Setting
 from pam_actuation.control.sofc import layout
 

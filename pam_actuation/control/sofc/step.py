@@ -23,9 +23,6 @@ strengths; modification of the rules that were active one credit delay ago.
 import math
 
 from numba import njit
-from pam_sim.compiled import compiled
-from pam_sim.units import P_ATM_PA
-
 from pam_actuation.control import inputs as place
 from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.sofc import credit, layout as at, learning
@@ -34,6 +31,8 @@ from pam_actuation.control.sofc.performance_index import index_linear, index_tab
 from pam_actuation.control.sofc.rule_table import (
     contracting_share, infer_feedback, infer_feedforward)
 from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim.compiled import compiled
+from pam_sim.units import P_ATM_PA
 
 _STALE_RATE_S = 0.1       # a longer gap between measurements restarts the rate filter
 _START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
