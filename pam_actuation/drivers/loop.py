@@ -122,15 +122,15 @@ class DriverLoop:
 
     def _ppr(self, decision, now_ns):
         target_pa = decision.pressure_pa
+        dt_s = None if self._last_ns is None else max(now_ns - self._last_ns, 0) / _NS
         if target_pa is None:
             volts = max(self.config.ppr.lowest_v, 0.0)
             self.law.force(volts)
             target_pa = P_ATM_PA
         else:
-            volts = self.law.step(target_pa)
+            volts = self.law.step(target_pa, dt_s)
         away_pa = target_pa - self.safety.pressure.pressure_pa
-        if self._last_ns is not None and abs(away_pa) > _PPR_MOVE_PA:
-            dt_s = (now_ns - self._last_ns) / _NS
+        if dt_s is not None and abs(away_pa) > _PPR_MOVE_PA:
             self.safety.flow(away_pa * dt_s / self.config.ppr.time_constant_s)
         return (float(volts),)
 

@@ -25,6 +25,7 @@ import math
 from pam_sim.units import gauge_kpa
 
 NS_PER_S = 1_000_000_000
+_NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all bits set
 
 
 def stamp_problem(stamp_ns, now_ns, oldest_s, ahead_s):
@@ -163,7 +164,7 @@ class CommandOrder:
         newer = self._stamp_ns is None or stamp_ns > self._stamp_ns
         same = stamp_ns == self._stamp_ns and pressure_pa == self._pressure_pa
         back = not newer and not same
-        if sequence is not None:
+        if sequence is not None and 0 < sequence < _NO_SEQUENCE:
             if self._sequence is not None and sequence <= self._sequence:
                 back = True
             self._sequence = sequence

@@ -104,8 +104,14 @@ class PprLaw:
         self.state = np.zeros(PPR_STATE_SIZE)
         self.out = np.zeros(PPR_OUT_SIZE)
 
-    def step(self, p_cmd_pa):
-        """Return the volts for a wanted absolute pressure [Pa]."""
+    def step(self, p_cmd_pa, dt_s=None):
+        """
+        Return the volts for a wanted absolute pressure [Pa].
+
+        ``dt_s`` is the time since the last step where it is not the configured period.
+        """
+        if dt_s is not None and self.config.slew_v_per_s > 0.0:
+            self.par[3] = self.config.slew_v_per_s * dt_s
         ppr_step(self.state, self.par, p_cmd_pa, math.nan, math.nan, self.out)
         return self.out[0]
 

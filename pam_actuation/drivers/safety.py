@@ -362,8 +362,8 @@ class SafetySupervisor:
                 target = self._ramp_pa
         self._watch_supply(target, now_ns)
         if self.publishers > 1:
-            self._warn('second_publisher_seen',
-                       f'{self.publishers} publishers of pressure_command are on the graph', now_ns)
+            self._warn('second_publisher_seen', (
+                f'{self.publishers} publishers of pressure_command are on the graph'), now_ns)
         texts = []
         if self._ramp_pa is not None:
             texts.append('resuming, pressure rises at no more than '

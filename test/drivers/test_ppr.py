@@ -17,7 +17,7 @@
 import math
 
 import numpy as np
-from pam_actuation.drivers.ppr import PPR_OUT_SIZE, ppr_step, PPR_STATE_SIZE, PprConfig, PprLaw
+from pam_actuation.drivers.ppr import PPR_OUT_SIZE, PPR_STATE_SIZE, ppr_step, PprConfig, PprLaw
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -57,6 +57,7 @@ def test_forced_signal_is_where_the_slew_limit_starts():
     law.step(P_ATM_PA + 500e3)
     law.force(0.0)
     assert law.step(P_ATM_PA + 500e3) == pytest.approx(0.1)
+    assert law.step(P_ATM_PA + 500e3, dt_s=0.020) == pytest.approx(0.5)
 
 
 def test_compiled_step_is_the_law():

@@ -206,6 +206,19 @@ def test_two_publishers_by_stamp_and_by_sequence():
         assert bench.last(300).state == OK
 
 
+@pytest.mark.parametrize('sequence', [0, 2 ** 64 - 1, None])
+def test_middleware_without_sequence_numbers(sequence):
+    """A constant number means unknown, not two publishers."""
+    bench = Bench()
+    bench.command = None
+    for k in range(50):
+        bench.now += 5 * MS
+        bench.safety.on_pressure(bench.now, P_ATM_PA + k)
+        bench.safety.on_command(bench.now - MS, P_ATM_PA + 2e5, sequence)
+        decision = bench.safety.tick(bench.now)
+    assert decision.state == OK and decision.level == 0
+
+
 def test_one_message_out_of_order_is_ignored():
     """A single late message or a restarted publisher is no fault."""
     bench = Bench()
