@@ -34,6 +34,7 @@ from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
 
 TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
+CHECK_EVERY = 10            # ticks between two looks at the counts
 QUIET_S = 0.15              # nothing for this long: all that was sent has arrived
 READY_TIMEOUT_S = 5.0
 FAREWELL_S = 2.0            # stopped together with the others: wait for their last messages
@@ -146,9 +147,13 @@ class ExperimentRecorder(ManagedNode):
         self._take_all()
         if self.core.write_error:
             self.diagnostics.update(ERROR, self.core.write_error)
-            return
-        lost = sum(counts.lost or 0 for counts in self.core.counts.values())
-        dropped = sum(counts.dropped for counts in self.core.counts.values())
+        elif self.timing.ticks % CHECK_EVERY == 1:
+            self._check_losses()
+
+    def _check_losses(self):
+        counts = self.core.counts.values()
+        lost = sum(one.lost or 0 for one in counts)
+        dropped = sum(one.dropped for one in counts)
         if lost or dropped:
             self.diagnostics.update(
                 ERROR, f'recording, but {lost} messages were lost and {dropped} dropped')

@@ -45,6 +45,8 @@ from rclpy.lifecycle import TransitionCallbackReturn
 
 from pam_sim.errors import InputError
 
+FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
+
 COMMON_PARAMETERS = (
     NodeParameter('autostart', True, 'Configure and activate without being told to.'),
     NodeParameter(
@@ -205,11 +207,12 @@ class ManagedNode(LifecycleNode):
                 self.get_logger().info(why)
 
     def _end_work(self, why):
-        level = ERROR if self.exit_code else OK
-        self.diagnostics.update(level, why, self.diagnostics.values)
+        self.diagnostics.level = ERROR if self.exit_code else OK
+        self.diagnostics.message = why
         self.diagnostics.send()
+        deadline = time.monotonic() + FAREWELL_S
         for publisher in (*self.publishers_counted, self.diagnostics.publisher):
-            publisher.wait_for_all_acked(0.5)
+            publisher.wait_for_all_acked(max(deadline - time.monotonic(), 0.0))
         self.stop()
 
     # Transitions: each is wrapped, since rclpy swallows exceptions without a word.

@@ -121,6 +121,7 @@ def run(node_class, args=None):
         serving.join(timeout=1.0)
         node.destroy_node()
         rclpy.try_shutdown()
+        signal.set_wakeup_fd(-1)
     return node.exit_code or node.result_code
 
 
