@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parent.parent
 NODES = (
     'valve_driver', 'plant_simulator', 'sofc_controller', 'pid_controller',
     'reference_generator', 'experiment_recorder')
+PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',
     'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs')
@@ -123,7 +124,7 @@ def test_every_executable_starts_and_ends_from_the_colcon_install(isolated_insta
             started[name] = subprocess.Popen(
                 [folder / name, '--ros-args', '-r', '__ns:=/muscle'], cwd=tmp_path,
                 env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        wait_for_nodes({f'/muscle/{name}' for name in NODES}, started)
+        wait_until_active({f'/muscle/{name}' for name in NODES}, started)
     finally:
         for process in started.values():
             process.send_signal(signal.SIGINT)
@@ -141,26 +142,30 @@ def end(process):
         return process.communicate()[0]
 
 
-def wait_for_nodes(wanted, started, timeout_s=120.0):
-    """Wait until the ROS graph shows all nodes; fail if a process ends before."""
+def wait_until_active(wanted, started, timeout_s=180.0):
+    """Wait until every node has said on /diagnostics that it works; fail if one ends before."""
+    from diagnostic_msgs.msg import DiagnosticArray
     import rclpy
+    said = {}
     context = rclpy.Context()
     rclpy.init(context=context)
     watcher = rclpy.create_node('installation_test', context=context)
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor.add_node(watcher)
+    watcher.create_subscription(
+        DiagnosticArray, '/diagnostics',
+        lambda array: said.update((status.name, status.message) for status in array.status), 100)
     deadline = time.monotonic() + timeout_s
-    seen = set()
     try:
-        while time.monotonic() < deadline and not wanted <= seen:
+        while {name for name in wanted if said.get(name, PASSIVE) != PASSIVE} != wanted:
             for name, process in started.items():
                 assert process.poll() is None, f'{name}: {process.stdout.read()[-2000:]}'
-            seen = {
-                f'{namespace.rstrip("/")}/{name}'
-                for name, namespace in watcher.get_node_names_and_namespaces()}
-            time.sleep(0.2)
+            assert time.monotonic() < deadline, f'not all active within {timeout_s} s: {said}'
+            executor.spin_once(timeout_sec=0.2)
     finally:
+        executor.shutdown()
         watcher.destroy_node()
         rclpy.shutdown(context=context)
-    assert wanted <= seen, f'not started within {timeout_s} s: {sorted(wanted - seen)}'
 
 
 @pytest.mark.slow
