@@ -268,13 +268,13 @@ class ManagedNode(LifecycleNode):
 
     def _activate(self):
         self._await_subscriber()
+        gc.collect()
+        gc.freeze()                  # what exists now stays: no long collections in the loop
         self.start()
         self.diagnostics.silent = False
         self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send)
         self.diagnostics.update(OK, 'active')
         self.get_logger().info('active')
-        gc.collect()
-        gc.freeze()                  # what exists now stays: no long collections in the loop
 
     def _await_subscriber(self):
         subscriber = self.value('await_subscriber')

@@ -1,0 +1,134 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The whole rig: plant, valve driver, controller, reference and recorder.
+
+    ros2 launch pam_actuation rig.launch.py valve:=hsv experiment:=sine_quarter_hz
+
+Ends by itself when the experiment is over, and when the driver or the plant ends.
+"""
+
+from datetime import datetime
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.actions import EmitEvent
+from launch.actions import RegisterEventHandler
+from launch.conditions import IfCondition
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from launch.substitutions import EqualsSubstitution
+from launch.substitutions import IfElseSubstitution
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import LifecycleNode
+from launch_ros.parameter_descriptions import ParameterValue
+
+PACKAGE = 'pam_actuation'
+RECORDER = 'experiment_recorder'
+
+
+def _arguments():
+    """Return the declared arguments."""
+    started = datetime.now().strftime('%Y%m%d_%H%M%S')
+    return [
+        DeclareLaunchArgument(
+            'valve', default_value='ppr', choices=['ppr', 'hsv'],
+            description='Proportional pressure regulator or a pair of high-speed valves.'),
+        DeclareLaunchArgument(
+            'rig', default_value='dmsp_5_300_realistic',
+            description='Rig preset, or path of a model file.'),
+        DeclareLaunchArgument(
+            'controller', default_value='sofc', choices=['sofc', 'pid'],
+            description='Self-organizing fuzzy controller or PID.'),
+        DeclareLaunchArgument(
+            'controller_file', default_value='',
+            description='Controller preset or file; empty: the preset that fits the valve.'),
+        DeclareLaunchArgument(
+            'learning', default_value='true', choices=['true', 'false'],
+            description='Whether the rules of the controller may change.'),
+        DeclareLaunchArgument(
+            'experiment', default_value='sine_quarter_hz',
+            description='Experiment by name, or path of its file.'),
+        DeclareLaunchArgument(
+            'record', default_value='true', choices=['true', 'false'],
+            description='Whether to record a bag.'),
+        DeclareLaunchArgument(
+            'output', default_value=f'bags/rig_{started}', description='Folder of the bag.'),
+        DeclareLaunchArgument(
+            'seed', default_value='0', description='Seed of the simulated sensors.'),
+        DeclareLaunchArgument(
+            'namespace', default_value='muscle', description='Namespace of the rig.'),
+    ]
+
+
+def _text(name):
+    """Return a launch argument as a text parameter, whatever it looks like."""
+    return ParameterValue(LaunchConfiguration(name), value_type=str)
+
+
+def _node(executable, *parameters, condition=None):
+    """Return one managed node; it activates by itself."""
+    recorder = IfElseSubstitution(
+        LaunchConfiguration('record'),
+        ['/', LaunchConfiguration('namespace'), '/', RECORDER], '')
+    common = {'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str)}
+    return LifecycleNode(
+        package=PACKAGE, executable=executable, name=executable,
+        namespace=LaunchConfiguration('namespace'), output='screen', condition=condition,
+        parameters=[common, *parameters])
+
+
+def generate_launch_description():
+    """Return nodes, arguments and the two ways to end."""
+    valve = {'valve_type': _text('valve')}
+    seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
+    control = {'rig': _text('rig'), 'controller': _text('controller_file')}
+    learning = {'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
+
+    def chosen(name):
+        return IfCondition(EqualsSubstitution(LaunchConfiguration('controller'), name))
+
+    recorder = _node(
+        RECORDER, valve, seed,
+        {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
+         'controller': ParameterValue(_controller_name(), value_type=str)},
+        condition=IfCondition(LaunchConfiguration('record')))
+    plant = _node('plant_simulator', valve, seed, {'rig': _text('rig')})
+    driver = _node('valve_driver', valve)
+    reference = _node(
+        'reference_generator',
+        {'experiment': _text('experiment'), 'start_delay_s': 3.0, 'exit_when_finished': True})
+    nodes = [
+        recorder, plant, driver,
+        _node('sofc_controller', valve, control, learning, condition=chosen('sofc')),
+        _node('pid_controller', valve, control, condition=chosen('pid')),
+        reference,
+    ]
+    ends = [
+        RegisterEventHandler(OnProcessExit(
+            target_action=node, on_exit=[EmitEvent(event=Shutdown(reason=reason))]))
+        for node, reason in (
+            (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
+            (plant, 'the plant ended'))]
+    return LaunchDescription([*_arguments(), *nodes, *ends])
+
+
+def _controller_name():
+    """Return the controller the nodes load: the file given, else the preset."""
+    preset = IfElseSubstitution(
+        EqualsSubstitution(LaunchConfiguration('controller'), 'pid'), 'pid',
+        ['sofc_', LaunchConfiguration('valve')])
+    given = EqualsSubstitution(LaunchConfiguration('controller_file'), '')
+    return IfElseSubstitution(given, preset, LaunchConfiguration('controller_file'))
