@@ -20,7 +20,7 @@ controller on it. The same compiled steps as in the live nodes are used
 (controller, driver law, plant), only the clock differs.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import functools
 import hashlib
 import math
@@ -30,8 +30,8 @@ import numpy as np
 from pam_actuation.control import compiled_entry, pid
 from pam_actuation.control.sofc import step as sofc_step_module
 from pam_actuation.drivers import hsv_kernel, ppr
-from pam_actuation.drivers.hsv import HsvConfig, initial_state
-from pam_actuation.drivers.ppr import PprConfig
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.hsv import initial_state
 from pam_sim.errors import InputError
 from pam_sim.rollout import layout
 from pam_sim.rollout.generate import kernel_hash, load_cached_module
@@ -113,6 +113,9 @@ class ClosedLoop:
         scheduling of the live nodes).
     external_force_n : callable or None
         Force [N] against contraction as a function of time [s].
+    driver : DriverConfig, optional
+        What the valve driver knows; by default the data sheet of ``rig``. Give that of the
+        nominal rig where ``rig`` differs from what its model file says.
 
     Raises
     ------
@@ -122,7 +125,7 @@ class ClosedLoop:
     """
 
     def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
-                 external_force_n=None):
+                 external_force_n=None, driver=None):
         if experiment.domain != 'contraction':
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
@@ -154,7 +157,10 @@ class ClosedLoop:
         self._external = np.zeros(self.ticks)
         if external_force_n is not None:
             self._external[:] = [external_force_n(k * period_s) for k in range(self.ticks)]
-        driver_period = HsvConfig().period_s if self.hsv else period_s
+        driver = driver if driver is not None else driver_config(rig)
+        self._hsv_config = driver.hsv
+        self._ppr_config = replace(driver.ppr, period_s=period_s)
+        driver_period = driver.hsv.period_s if self.hsv else period_s
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, max(1, round(driver_period * rate_hz)), latency)
 
@@ -172,9 +178,8 @@ class ClosedLoop:
     def _driver(self):
         """Return fresh state, par, out of the driver law."""
         if self.hsv:
-            return initial_state(), HsvConfig().par(), np.zeros(hsv_kernel.OUT_SIZE)
-        config = PprConfig(period_s=1.0 / self.rate_hz)
-        return np.zeros(ppr.PPR_STATE_SIZE), config.par(), np.zeros(ppr.PPR_OUT_SIZE)
+            return initial_state(), self._hsv_config.par(), np.zeros(hsv_kernel.OUT_SIZE)
+        return np.zeros(ppr.PPR_STATE_SIZE), self._ppr_config.par(), np.zeros(ppr.PPR_OUT_SIZE)
 
     def run(self, controller, learn=True):
         """

@@ -29,6 +29,7 @@ import numpy as np
 from pam_actuation.control.config import controller_to_yaml
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
+from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.cost import tracking_cost_mm
 from pam_actuation.tuning.space import check_axes, default_axes, from_unit, to_unit
@@ -115,7 +116,8 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     Parameters
     ----------
     rig : Rig or list of Rig
-        Cost is the mean over all (nominal and randomised ones, for instance).
+        Cost is the mean over all (nominal and randomised ones, for instance). The valve driver
+        knows the data sheet of the first one only.
     controller : SelfOrganizingFuzzyController or PidController
         Start of the search; not changed. Its rules are where every rollout starts.
     experiment : Experiment or list of Experiment
@@ -152,8 +154,9 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     check_axes(axes, controller.settings)
     rigs, experiments = _as_list(rig), _as_list(experiment)
     rate_hz = controller.rate_hz
-    train = [ClosedLoop(r, e, seed, rate_hz) for r in rigs for e in experiments]
-    test = [ClosedLoop(r, e, seed + HELD_OUT_SEED, rate_hz)
+    driver = driver_config(rigs[0])
+    train = [ClosedLoop(r, e, seed, rate_hz, driver=driver) for r in rigs for e in experiments]
+    test = [ClosedLoop(r, e, seed + HELD_OUT_SEED, rate_hz, driver=driver)
             for r in rigs for e in _as_list(held_out or experiments)]
     members = population or int(min(max(budget // (10 * len(train)), 6), 3 * len(axes)))
     generations = budget // (members * len(train)) - 1
