@@ -49,7 +49,7 @@ def rig_identity(rig):
     return f'{rig.name}/{rig.valve}'
 
 
-def load_controller(name_or_path_or_text, rig=None):
+def load_controller(name_or_path_or_text, rig=None, rules_file=None):
     """
     Build a controller.
 
@@ -60,6 +60,8 @@ def load_controller(name_or_path_or_text, rig=None):
     rig : pam_sim.rig.Rig, optional
         Gives the static inverse at nominal load and the identity the rules are tied to. May
         be None for text that brings its own ``static_inverse``.
+    rules_file : str or os.PathLike, optional
+        File of rules to start from instead of those of the controller's text.
 
     Returns
     -------
@@ -81,7 +83,12 @@ def load_controller(name_or_path_or_text, rig=None):
         path = find_config('controllers', text)
         folder = os.path.dirname(path)
         tree = load_yaml(path)
-    return controller_from_tree(tree, rig, folder)
+    controller = controller_from_tree(tree, rig, folder)
+    if rules_file is not None:
+        if controller.rules is None:
+            raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))
+        controller.rules.assign(load_rules(rules_file, controller.rules))
+    return controller
 
 
 def controller_from_tree(tree, rig=None, folder='.'):

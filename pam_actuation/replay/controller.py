@@ -21,11 +21,13 @@ fresh controller and compares commands and internals bit for bit.
 """
 
 from dataclasses import dataclass, field
+import os
 
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.tick import (
     INPUT_NAMES, join_stamp, RUNNING, TickCore, TickInputs)
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 
 # Input of a tick -> (topic it came from, field of that topic).
@@ -90,9 +92,9 @@ def replay_controller(run, controller=None):
     run : pam_sim.run.Run
         Needs ``controller_state``, ``pressure_command`` and the measurements it used.
     controller : optional
-        A controller in the state the recording began with; by default built from the
-        recording's metadata. Another controller answers what it *would* have commanded, but
-        its internals are then not compared.
+        By default the recording's own, built from its metadata. Another one (an object, or
+        what ``load_controller`` takes) answers what it *would* have commanded; its internals
+        are then not compared.
 
     Returns
     -------
@@ -113,6 +115,9 @@ def replay_controller(run, controller=None):
         if not text:
             raise InputError('the recording does not say which controller ran', run.path)
         controller = load_controller(text)
+    elif isinstance(controller, (str, os.PathLike)):
+        rig_text = run.metadata.get('rig')
+        controller = load_controller(controller, load_rig(rig_text) if rig_text else None)
     columns = _columns(states, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     _check_complete(columns, order, run.path)

@@ -27,6 +27,7 @@ import time
 import joblib
 import numpy as np
 from pam_actuation.control.config import controller_to_yaml
+from pam_actuation.control.files import write_atomically
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.drivers.for_rig import driver_config
@@ -81,6 +82,38 @@ class TuneResult:
         """Return the tuned controller as YAML text for ``load_controller``."""
         return controller_to_yaml(self.controller)
 
+    def save(self, path):
+        """
+        Write the tuned controller to a file, whole or not at all.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+
+        """
+        write_atomically(path, self.to_yaml())
+
+    def to_dict(self):
+        """Return the outcome as plain data."""
+        return {
+            'improved': self.improved,
+            'cost_before_mm': self.cost_before, 'cost_after_mm': self.cost_after,
+            'held_out_before_mm': self.held_out_before, 'held_out_after_mm': self.held_out_after,
+            'rollouts': self.rollouts, 'seconds': self.seconds,
+            'changed': {name: {'before': before, 'after': after}
+                        for name, (before, after) in self.changed.items()}}
+
+    def text(self):
+        """Return the outcome for people."""
+        verdict = 'better' if self.improved else 'not better: settings left as they were'
+        lines = [
+            f'{self.rollouts} rollouts in {self.seconds:.1f} s; cost on held-out runs '
+            f'{self.held_out_before:.3f} -> {self.held_out_after:.3f} mm, {verdict}']
+        lines += [f'  {name}: {before:g} -> {after:g}'
+                  for name, (before, after) in self.changed.items()]
+        return '\n'.join(lines)
+
 
 def rebuild(controller, settings):
     """Return a fresh controller of the same kind, rig and rules with other settings."""
@@ -129,7 +162,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     jobs : int
         Parallel rollouts.
     progress : callable, optional
-        Called as ``progress(rollouts_done, budget, best_cost_mm)``.
+        Called with the number of rollouts done after every generation.
     axes : tuple of space.Axis, optional
         What to tune; ``space.default_axes`` by default.
     held_out : Experiment or list, optional
@@ -158,11 +191,11 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     train = [ClosedLoop(r, e, seed, rate_hz, driver=driver) for r in rigs for e in experiments]
     test = [ClosedLoop(r, e, seed + HELD_OUT_SEED, rate_hz, driver=driver)
             for r in rigs for e in _as_list(held_out or experiments)]
-    members = population or int(min(max(budget // (10 * len(train)), 6), 3 * len(axes)))
+    members = population or int(min(max(budget // (10 * len(train)), 5), 3 * len(axes)))
     generations = budget // (members * len(train)) - 1
     if members < 5 or generations < 1:
         raise InputError(
-            f'a budget of {budget} rollouts is too small: {2 * len(train) * max(members, 6)} at '
+            f'a budget of {budget} rollouts is too small: {2 * len(train) * max(members, 5)} at '
             'least', 'budget')
     before = {axis.name: controller.settings[axis.name] for axis in axes}
     start = to_unit(axes, before)
@@ -183,7 +216,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
         seen['best'] = min(seen['best'], best)
         history.append((seen['rollouts'], seen['best']))
         if progress is not None:
-            progress(min(seen['rollouts'], budget), budget, seen['best'])
+            progress(min(seen['rollouts'], budget))
         return costs
 
     found = differential_evolution(

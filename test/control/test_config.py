@@ -82,6 +82,10 @@ def test_rules_file_beside_the_controller_file_is_loaded(tmp_path):
     (tmp_path / 'mine.yaml').write_text(preset + 'rules: learned.json\n')
     second = load_controller(tmp_path / 'mine.yaml', StraightRig())
     assert second.rules.feedforward[0, 4] == 1234.5
+    third = load_controller('sofc_ppr', StraightRig(), rules_file=tmp_path / 'learned.json')
+    assert third.rules.digest() == second.rules.digest()
+    with pytest.raises(InputError, match='no rules'):
+        load_controller('pid', StraightRig(), rules_file=tmp_path / 'learned.json')
     (tmp_path / 'learned.json').write_text('{}')
     with pytest.raises(InputError, match='learned.json'):
         load_controller(tmp_path / 'mine.yaml', StraightRig())

@@ -80,7 +80,7 @@ def test_rules_of_another_scaling_rig_or_shape_are_refused(learned, tmp_path):
 
 
 def test_a_missing_folder_is_the_users_mistake(learned, tmp_path):
-    with pytest.raises(InputError, match='cannot write'):
+    with pytest.raises(InputError, match='cannot be written'):
         save_rules(learned.rules, tmp_path / 'no' / 'rules.json')
     with pytest.raises(InputError, match='cannot read'):
         load_rules(tmp_path / 'rules.json')

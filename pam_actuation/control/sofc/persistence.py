@@ -23,9 +23,9 @@ often each fired, and a sha256 over all of that in canonical form.
 import hashlib
 import json
 import os
-import tempfile
 
 import numpy as np
+from pam_actuation.control.files import write_atomically
 from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_sim.errors import InputError
 
@@ -128,20 +128,7 @@ def save_rules(rules, path):
         The file cannot be written.
 
     """
-    path = os.path.abspath(os.fspath(path))
-    text = json.dumps(rules_to_mapping(rules), indent=1) + '\n'
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(prefix='.rules-', dir=os.path.dirname(path))
-        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
-        raise InputError(f'cannot write the rules: {error.strerror}', path) from None
+    write_atomically(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n')
 
 
 def load_rules(path, expected=None):
