@@ -109,7 +109,8 @@ def generate_launch_description():
     driver = _node('valve_driver', valve)
     reference = _node(
         'reference_generator',
-        {'experiment': _text('experiment'), 'start_delay_s': 3.0, 'exit_when_finished': True})
+        {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
+         'exit_when_finished': True})
     nodes = [
         recorder, plant, driver,
         _node('sofc_controller', valve, control, learning, condition=chosen('sofc')),
@@ -117,12 +118,18 @@ def generate_launch_description():
         reference,
     ]
     ends = [
-        RegisterEventHandler(OnProcessExit(
-            target_action=node, on_exit=[EmitEvent(event=Shutdown(reason=reason))]))
+        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
             (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
             (plant, 'the plant ended'))]
     return LaunchDescription([*_arguments(), *nodes, *ends])
+
+
+def _shut_down(reason):
+    """Return the handler that ends everything, once."""
+    def on_exit(event, context):
+        return [] if context.is_shutdown else [EmitEvent(event=Shutdown(reason=reason))]
+    return on_exit
 
 
 def _controller_name():

@@ -153,9 +153,19 @@ def full_name(namespace, name):
     return f'{namespace.rstrip("/")}/{name}'
 
 
-def wait_until_matched(publishers, subscriber, timeout_s=5.0, stopping=lambda: False):
+def wait_until_matched(publishers, subscriber, timeout_s, stopping):
     """
     Wait until every publisher reaches the named subscriber, so that no message is lost.
+
+    Parameters
+    ----------
+    publishers : iterable of CountedPublisher
+    subscriber : str
+        Full name of a node.
+    timeout_s : float
+        Longest wait [s].
+    stopping : callable
+        Ends the wait when it returns True.
 
     Returns
     -------

@@ -54,9 +54,15 @@ COMMON_PARAMETERS = (
         'Full name of a node that must receive every message, such as the recorder; '
         'activation waits for it. Empty: none.'),
     NodeParameter(
+        'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].', 0.1, 600.0),
+    NodeParameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
     NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),
 )
+
+
+class StoppedEarly(Exception):
+    """A signal came while a transition was under way."""
 
 
 class ManagedNode(LifecycleNode):
@@ -249,6 +255,8 @@ class ManagedNode(LifecycleNode):
             with self.loops.lock:
                 action()
             return TransitionCallbackReturn.SUCCESS
+        except StoppedEarly:
+            return TransitionCallbackReturn.FAILURE
         except InputError as error:
             self.get_logger().error(f'cannot {word}: {error}')
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
@@ -281,7 +289,9 @@ class ManagedNode(LifecycleNode):
         if subscriber:
             publishers = (*self.publishers_counted, self.diagnostics.publisher)
             missed = wait_until_matched(
-                publishers, subscriber, stopping=lambda: self.stopping)
+                publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping)
+            if missed and self.stopping:
+                raise StoppedEarly
             if missed:
                 raise InputError(
                     f'{subscriber} does not receive {", ".join(missed)}',

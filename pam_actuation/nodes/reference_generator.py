@@ -38,8 +38,10 @@ class ReferenceGenerator(ManagedNode):
             'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file.'),
         NodeParameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
         NodeParameter(
-            'start_delay_s', 0.0, 'Wait after activation before the experiment starts [s].',
-            0.0, 60.0),
+            'await_receiver', False, 'Wait before the experiment starts until some node besides '
+            'await_subscriber receives it.'),
+        NodeParameter(
+            'start_delay_s', 0.0, 'Wait after that before the experiment starts [s].', 0.0, 60.0),
         NodeParameter('exit_when_finished', False, 'End the process when the experiment is over.'),
     )
 
@@ -53,16 +55,27 @@ class ReferenceGenerator(ManagedNode):
         topics = ('pressure_command',) if in_pressure else ('reference', 'reference_trajectory')
         for topic in topics:
             self.add_publisher(topic)
+        self.main_topic = self.publishers_counted[0].topic
 
     def start(self):
-        """Start the experiment's clock after the delay."""
-        self.begin_ns = self.now_ns() + round(self.value('start_delay_s') * 1e9)
+        """Play from the beginning."""
+        self.loop.start_ns = None
+        self.begin_ns = None
         self.add_loop(1.0 / self.loop.rate_hz)
+
+    def _received(self):
+        """Tell whether anybody is there to receive the experiment."""
+        if not self.value('await_receiver'):
+            return True
+        expected = 1 if self.value('await_subscriber') else 0
+        return self.count_subscribers(self.main_topic) > expected
 
     def tick(self):
         """Send what is due."""
         now_ns = self.now_ns()
-        if now_ns < self.begin_ns:
+        if self.begin_ns is None and self._received():
+            self.begin_ns = now_ns + round(self.value('start_delay_s') * 1e9)
+        if self.begin_ns is None or now_ns < self.begin_ns:
             self.diagnostics.update(OK, 'waiting for the start')
             return
         for topic, plain in self.loop.tick(now_ns).items():

@@ -35,6 +35,7 @@ from rclpy.signals import SignalHandlerOptions
 from pam_sim.errors import InputError
 
 SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
 
 
 class _Stopper(threading.Thread):
@@ -66,9 +67,12 @@ class _Stopper(threading.Thread):
             number = self._read_end.recv(1)[0]
         self.reason = f'stopped by {SIGNALS[number]}'
         self.node.stopping = True
-        if not self.safe.wait(self.node.STUCK_AFTER_S):
-            self.node.safe_stop(f'{self.reason}, the loop did not answer')
-            os._exit(1)
+        limit_s = self.node.STUCK_AFTER_S if self.node.loops else LONGEST_START_S
+        if not self.safe.wait(limit_s):
+            try:
+                self.node.safe_stop(f'{self.reason}, the loop did not answer')
+            finally:
+                os._exit(1)
 
 
 def _noted(number, frame):
@@ -137,6 +141,8 @@ def _bring_up(node):
     """Configure and activate; a mistake of the user ends the process with exit code 2."""
     for trigger in (node.trigger_configure, node.trigger_activate):
         trigger()
+        if node.stopping:
+            return
         if node.input_error is not None:
             node.exit_code = 2
             return
