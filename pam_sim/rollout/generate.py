@@ -25,6 +25,7 @@ import importlib.util
 import inspect
 import os
 from pathlib import Path
+import re
 import sys
 import tempfile
 
@@ -47,20 +48,26 @@ from pam_sim.effects.registry import effects
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.sarosi import tension_n
+from pam_sim.rollout import hooks
 from pam_sim.rollout.layout import *
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
 
 _EFFECTS = effects()
-'''
+''' + ''.join(
+    f'plain_{name} = hooks.{name}\n'
+    for name in (*(f'apply_{hook}' for hook in HOOKS), 'pressure_rate_active'))
 
 _TAIL = '''
 
 @njit(cache=True, error_model='numpy', nogil=True)
 def step(state, par, inp, out):
     """Advance ``state`` by one step and fill ``out`` (see pam_sim.rollout.layout)."""
-    step_body(state, par, inp, out)
+    if par[PAR_ANY_EFFECT] == 0.0:
+        plain_step_body(state, par, inp, out)
+    else:
+        step_body(state, par, inp, out)
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
@@ -74,7 +81,7 @@ def settle(state, par):
     """Make the dependent states agree with pressure and contraction before the first step."""
     p = state[S_PRESSURE]
     x = state[S_CONTRACTION]
-    state[S_AIR_MASS] = p * air_volume(p, x, state, par) / par[PAR_RT]
+    state[S_AIR_MASS] = p * air_volume(p, x, state, par) * par[PAR_INVERSE_RT]
     state[S_SUPPLY] = apply_supply(par[PAR_SUPPLY], state, par)
     state[S_MUSCLE_FORCE] = muscle_force(
         map_tension(p, x, state, par), p, x, state[S_VELOCITY], 0.0, 0.0, state, par)
@@ -86,16 +93,16 @@ def rollout(state, par, inputs, outputs):
     # One working row of each: slices would be reference counted in every step.
     inp = np.empty(INP_SIZE)
     out = np.empty(OUT_SIZE)
-    for i in range(inputs.shape[0] + 1):
-        if i == 0:
-            inp[:] = inputs[0]
-            observe(state, par, inp, out)
-        else:
-            for j in range(INP_SIZE):
-                inp[j] = inputs[i - 1, j]
-            step_body(state, par, inp, out)
+    for j in range(INP_SIZE):
+        inp[j] = inputs[0, j]
+    look(state, par, inp, out)
+    outputs[0, :] = out
+    for i in range(inputs.shape[0]):
+        for j in range(INP_SIZE):
+            inp[j] = inputs[i, j]
+        step(state, par, inp, out)
         for j in range(OUT_SIZE):
-            outputs[i, j] = out[j]
+            outputs[i + 1, j] = out[j]
 '''
 
 
@@ -153,8 +160,12 @@ def _dispatchers():
 def kernel_source():
     """Return the source text of the kernel module."""
     template = (Path(__file__).parent / 'step_template.py').read_text(encoding='utf-8')
-    body = template[template.index(_MARK):].split('\n', 1)[1]
-    return _HEAD + _dispatchers() + body.rstrip('\n') + '\n' + _TAIL
+    body = template[template.index(_MARK):].split('\n', 1)[1].rstrip('\n') + '\n'
+    # A copy without any hook for rigs without effects: same operations, same bits, faster.
+    names = re.findall(r'^def (\w+)\(', body, re.MULTILINE)
+    names += [f'apply_{hook}' for hook in HOOKS] + ['pressure_rate_active']
+    plain = re.sub(rf'\b({"|".join(names)})\b', r'plain_\1', body)
+    return _HEAD + _dispatchers() + body + plain + _TAIL
 
 
 def kernel_hash():
