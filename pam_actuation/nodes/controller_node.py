@@ -21,7 +21,6 @@ from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
-
 from pam_sim.units import P_ATM_PA
 
 OK_REASON = REASONS[0]

@@ -28,11 +28,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import WrenchStamped
-from sensor_msgs.msg import FluidPressure
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
-from trajectory_msgs.msg import JointTrajectoryPoint
-
 from pam_actuation.messages import Contraction
 from pam_actuation.messages import ControllerState
 from pam_actuation.messages import Force
@@ -40,6 +35,10 @@ from pam_actuation.messages import Pressure
 from pam_actuation.messages import Reference
 from pam_actuation.messages import ReferenceTrajectory
 from pam_actuation.messages import ValveSignal
+from sensor_msgs.msg import FluidPressure
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+from trajectory_msgs.msg import JointTrajectoryPoint
 
 NANOSECONDS = 1_000_000_000
 

@@ -22,7 +22,6 @@ values hold how many messages each publisher of the node has sent
 """
 
 from diagnostic_msgs.msg import DiagnosticArray
-
 from pam_actuation.messages import Status
 from pam_actuation.nodes.conversions import diagnostic_array
 from pam_actuation.nodes.endpoints import CountedPublisher

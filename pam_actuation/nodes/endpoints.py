@@ -22,10 +22,9 @@ arrived when the loop asks, each with the time it was received.
 
 import time
 
+from pam_actuation.nodes import qos
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
-
-from pam_actuation.nodes import qos
 
 
 class CountedPublisher:
@@ -160,6 +159,7 @@ def wait_until_matched(publishers, subscriber, timeout_s, stopping):
     Parameters
     ----------
     publishers : iterable of CountedPublisher
+        Publishers of one node.
     subscriber : str
         Full name of a node.
     timeout_s : float

@@ -28,22 +28,21 @@ import gc
 import time
 import traceback
 
+from pam_actuation.nodes.conversions import MESSAGE_TYPES
+from pam_actuation.nodes.conversions import RosWriter
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.endpoints import wait_until_matched
-from pam_actuation.nodes.conversions import MESSAGE_TYPES
-from pam_actuation.nodes.conversions import RosWriter
 from pam_actuation.nodes.loops import LoopSet
 from pam_actuation.nodes.parameters import declare
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.timing import LoopTiming
+from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import TransitionCallbackReturn
-
-from pam_sim.errors import InputError
 
 FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
 
@@ -54,7 +53,8 @@ COMMON_PARAMETERS = (
         'Full name of a node that must receive every message, such as the recorder; '
         'activation waits for it. Empty: none.'),
     NodeParameter(
-        'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].', 0.1, 600.0),
+        'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].',
+        0.1, 600.0),
     NodeParameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
     NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),

@@ -22,14 +22,13 @@ its text and turns a wrong value, at start or live, into one sentence.
 from dataclasses import dataclass
 import difflib
 
+from pam_sim.errors import InputError
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.exceptions import InvalidParameterValueException
-
-from pam_sim.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,9 @@ def declare(node, parameters):
     Parameters
     ----------
     node : rclpy.node.Node
+        Node that gets the parameters.
     parameters : iterable of NodeParameter
+        What to declare.
 
     Raises
     ------

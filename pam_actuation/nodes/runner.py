@@ -27,12 +27,11 @@ import sys
 import threading
 
 from pam_actuation.nodes.diagnostics import WARN
+from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-
-from pam_sim.errors import InputError
 
 SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted

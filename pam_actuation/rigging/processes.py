@@ -22,6 +22,7 @@ import subprocess
 import sys
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
 PR_SET_PDEATHSIG = 1
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
@@ -160,5 +161,5 @@ def end_all(processes, timeout_s=5.0):
 
 def _end_with_parent():
     """Ask Linux for a SIGTERM to this process when its parent dies."""
-    if sys.platform == 'linux':
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if LIBC is not None:
+        LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

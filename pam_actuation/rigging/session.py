@@ -18,7 +18,8 @@ One experiment on live nodes, from the first process to the closed bag.
 Order of the start: all nodes are configured, the recorder is active first and connected
 to every publisher, then plant, driver, controller and reference. Order of the end:
 reference and controller stop (which commands atmospheric pressure), the driver stops with
-the signal that vents, the plant a little later, the recorder last. The same order on Ctrl-C and when a node dies.
+the signal that vents, the plant a little later, the recorder last. The same order on
+Ctrl-C and when a node dies.
 """
 
 from dataclasses import dataclass, field
@@ -104,6 +105,7 @@ class RigSession:
     def __init__(self, plan, namespace='/muscle', domain_id=None):
         try:
             from pam_actuation.rigging.client import RigClient
+            self._new_client = RigClient
         except ImportError as error:
             raise InputError(
                 f'live nodes need ROS 2 ({error.name} is missing): source its setup file or '
@@ -113,7 +115,7 @@ class RigSession:
         self.processes = {}
         self._lock = DomainLock(domain_id)
         self.domain_id = self._lock.domain_id
-        self.client = RigClient(self.domain_id)
+        self.client = None
         self._cpu = {}
         self._active_since = None
         self.ended_at = None
@@ -125,7 +127,8 @@ class RigSession:
     def __exit__(self, *_):
         """End all processes of this session."""
         end_all(self.processes.values())
-        self.client.close()
+        if self.client is not None:
+            self.client.close()
         self._lock.release()
 
     def start(self):
@@ -142,6 +145,8 @@ class RigSession:
         for name, parameters in self.plan.parameters.items():
             self.processes[name] = NodeProcess(
                 name, self.namespace, parameters, environment, self.plan.folder)
+        # Only now: a process with the threads of the middleware does not fork safely.
+        self.client = self._new_client(self.domain_id)
         for name in self.processes:
             self.change(name, 'configure', START_TIMEOUT_S)
         for name in self.processes:
@@ -215,6 +220,8 @@ class RigSession:
         self._note_cpu()
         self.ended_at = time.monotonic()
         problems = []
+        if self.client is None:
+            return problems
         problems += self._deactivate([REFERENCE, self.plan.controller_node, DRIVER])
         self.client.spin(VENT_S)
         problems += self._deactivate([PLANT])
@@ -246,6 +253,8 @@ class RigSession:
 
     def fill(self, result):
         """Enter counts, exit codes and findings into a Result."""
+        if self.client is None:
+            return
         result.published = self.client.published()
         result.recorded = recorded_counts(result.bag) if result.bag else {}
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}

@@ -1,0 +1,115 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Start nodes as processes and listen to them: what the tests of the nodes share."""
+
+import collections
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES
+from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+NAMESPACE = '/muscle'
+
+Heard = collections.namedtuple('Heard', 'time_s plain')
+Health = collections.namedtuple('Health', 'time_s level message values')
+
+
+class LiveRig:
+    """Processes in a domain of their own, and a node that hears every topic of theirs."""
+
+    def __init__(self, log_dir, namespace=NAMESPACE):
+        self._log_dir = log_dir
+        self._namespace = namespace
+        self._lock = DomainLock()
+        self.environment = node_environment(self._lock.domain_id, log_dir)
+        self.processes = {}
+        self.heard = {topic: [] for topic in MESSAGE_TYPES}
+        self.health = collections.defaultdict(list)
+        self._context = None
+
+    def start(self, name, **parameters):
+        """Start a node."""
+        self.processes[name] = NodeProcess(
+            name, self._namespace, parameters, self.environment, self._log_dir)
+
+    def listen(self):
+        """Join the graph; processes are started before (forking with threads is unsafe)."""
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=self._lock.domain_id, args=[])
+        self.node = Node('listener', namespace=self._namespace, context=self._context)
+        for topic, message_type in MESSAGE_TYPES.items():
+            self.node.create_subscription(
+                message_type, topic, self._hearer(topic), qos.reliable(1000))
+        self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.reliable(1000))
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self):
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    def _hearer(self, topic):
+        def hear(message):
+            self.heard[topic].append(Heard(time.monotonic(), from_ros(topic, message)))
+        return hear
+
+    def _on_diagnostics(self, message):
+        for status in message.status:
+            self.health[status.name.rsplit('/', 1)[-1]].append(Health(
+                time.monotonic(), status.level[0], status.message,
+                {item.key: item.value for item in status.values}))
+
+    def call(self, service_type, name, request=None, timeout_s=5.0):
+        """Call a service of the rig and return its response."""
+        client = self.node.create_client(service_type, f'{self._namespace}/{name}')
+        assert client.wait_for_service(timeout_s), f'no service {name}'
+        future = client.call_async(request or service_type.Request())
+        wait_for(future.done, timeout_s, f'the answer of {name}')
+        self.node.destroy_client(client)
+        return future.result()
+
+    def publisher(self, topic):
+        """Return a publisher of the listener's own."""
+        return self.node.create_publisher(MESSAGE_TYPES[topic], topic, qos.PUBLISHER)
+
+    def close(self):
+        """End everything."""
+        end_all(self.processes.values())
+        if self._context is not None:
+            self._executor.shutdown(timeout_sec=1.0)
+            self._thread.join(2.0)
+            self.node.destroy_node()
+            rclpy.try_shutdown(context=self._context)
+        self._lock.release()
+
+
+def wait_for(condition, timeout_s, what):
+    """Wait until a condition holds; fail with a sentence."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f'{what} did not come within {timeout_s} s'
+        time.sleep(0.005)

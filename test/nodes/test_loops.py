@@ -1,0 +1,79 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test the loops of a node and their statistics, without ROS."""
+
+from pam_actuation.nodes.loops import Loop, LoopSet
+from pam_actuation.nodes.timing import LoopTiming
+
+MS = 1_000_000
+
+
+def test_a_late_tick_keeps_the_phase_and_is_not_made_up_for():
+    loop = Loop(10 * MS, None, now_ns=0)
+    assert loop.next_ns == 10 * MS
+    loop.advance(10 * MS + 5)
+    assert loop.next_ns == 20 * MS
+    loop.advance(57 * MS)
+    assert loop.next_ns == 60 * MS
+
+
+def test_loops_run_at_their_own_rates_and_end_when_cleared():
+    loops = LoopSet()
+    calls = []
+    loops.add(0.002, lambda: calls.append('fast'))
+    loops.add(0.010, lambda: calls.append('slow'))
+    for _ in range(60):
+        loops.run_once()
+        if calls.count('slow') == 3:
+            break
+    assert calls.count('slow') == 3
+    assert 6 <= calls.count('fast') <= 16
+    loops.clear()
+    assert not loops
+    before = len(calls)
+    loops.run_once()
+    assert len(calls) == before
+
+
+def test_a_loop_may_end_all_loops():
+    loops = LoopSet()
+    loops.add(0.001, loops.clear)
+    loops.run_once()
+    assert not loops
+
+
+def test_timing_counts_period_jitter_and_overruns():
+    timing = LoopTiming(0.01)
+    for start_ms in (0, 10, 20, 36, 40):
+        timing.begin(start_ms * MS)
+        timing.end((start_ms + 2) * MS)
+    values = dict(timing.values())
+    assert values['loop.ticks'] == '5'
+    assert values['loop.period_mean_ms'] == '10.0000'
+    assert values['loop.jitter_max_ms'] == '6.000'
+    assert values['loop.overruns'] == '1'
+    assert values['loop.busy_mean_ms'] == '2.000'
+
+
+def test_a_pause_is_no_overrun():
+    timing = LoopTiming(0.01)
+    timing.begin(0)
+    timing.end(MS)
+    timing.pause()
+    timing.begin(500 * MS)
+    timing.end(501 * MS)
+    timing.begin(510 * MS)
+    assert timing.overruns == 0
+    assert dict(timing.values())['loop.period_mean_ms'] == '10.0000'

@@ -1,0 +1,77 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test that a mistake on the command line of a node is one sentence and exit code 2."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
+from pam_actuation.rigging.processes import node_environment                # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+MISTAKES = {
+    'valve_driver valve': (
+        'valve_driver', ['valve_type:=xyz'], "valve_type: 'xyz' is not allowed", 'ppr or hsv'),
+    'valve_driver limit': (
+        'valve_driver', ['max_pressure_gauge_pa:=5e7'], 'max_pressure_gauge_pa: 5e+07',
+        '1000 to 1e+06'),
+    'plant_simulator rig': (
+        'plant_simulator', ['rig:=dmsp_99'], 'dmsp_99', 'dmsp_5_300_realistic'),
+    'plant_simulator rate': (
+        'plant_simulator', ['publish_rate_hz:=50'], 'publish_rate_hz: 50', '200 to 1000'),
+    'sofc_controller preset': (
+        'sofc_controller', ['controller:=nobody'], 'nobody', 'sofc_ppr'),
+    'pid_controller type': (
+        'pid_controller', ['valve_type:=3'], 'valve_type: 3', 'must be of type str'),
+    'reference_generator experiment': (
+        'reference_generator', ['experiment:=nothing'], 'nothing', 'sine_quarter_hz'),
+    'experiment_recorder topic': (
+        'experiment_recorder', ['topics:=[pressure, tension]'], "'tension'", 'contraction'),
+}
+
+
+@pytest.fixture(scope='module')
+def outcomes(tmp_path_factory):
+    """Run all commands at once; return (exit code, standard error) per case."""
+    folder = tmp_path_factory.mktemp('mistakes')
+    lock = DomainLock()
+    running = {}
+    for case, (node, parameters, *_) in MISTAKES.items():
+        arguments = [text for value in parameters for text in ('-p', value)]
+        running[case] = subprocess.Popen(
+            [sys.executable, '-m', f'pam_actuation.nodes.{node}', '--ros-args', *arguments],
+            env=node_environment(lock.domain_id, folder), text=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    results = {}
+    for case, process in running.items():
+        _, errors = process.communicate(timeout=60)
+        results[case] = (process.returncode, errors)
+    lock.release()
+    return results
+
+
+@pytest.mark.parametrize('case', MISTAKES)
+def test_one_sentence_and_exit_code_2(outcomes, case):
+    _, _, problem, allowed = MISTAKES[case]
+    code, errors = outcomes[case]
+    assert code == 2, errors
+    assert problem in errors and allowed in errors
+    assert 'Traceback' not in errors
+    assert len(errors.strip().splitlines()) == 1
