@@ -115,8 +115,9 @@ SCRIPT = """
       if (/^legend/.test(key)) { layout[key].bgcolor = 'rgba(0,0,0,0)'; }
     });
     if (source) { node.removeChild(source); }
+    layout.modebar = { bgcolor: 'rgba(0,0,0,0)', color: css('--soft'), activecolor: css('--accent') };
     Plotly.react(node, figure.data, layout, { responsive: true, displaylogo: false,
-      modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] });
+      displayModeBar: 'hover', modeBarButtons: [['zoom2d', 'pan2d', 'resetScale2d', 'toImage']] });
     node.drawn = true;
   }
   function start() {

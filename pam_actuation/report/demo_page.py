@@ -17,7 +17,8 @@
 from dataclasses import dataclass, field
 
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import paragraph, render, Section, table, write_text
+from pam_actuation.report.page import (
+    paragraph, render, Section, signed, table, write_text)
 from pam_actuation.report.pages import FOOTER, muscle_volume, summary
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
@@ -158,7 +159,7 @@ def cycle_sentence(named):
         if len(m.cycle_rmse_m) > 1:
             first, last = m.cycle_rmse_m[0] * 1e3, m.cycle_rmse_m[-1] * 1e3
             parts.append(f'{title}: {first:.2f} mm in the first cycle, {last:.2f} mm in the '
-                         f'last ({100 * (last / first - 1):+.0f} %)')
+                         f'last ({signed(100 * (last / first - 1))} %)')
     return '; '.join(parts) + '.' if parts else ''
 
 
@@ -171,7 +172,7 @@ def part_numbers(named):
             mood = 'good' if last <= 0.5 * first else ''
             numbers.append((f'{first:.2f} → {last:.2f} mm', title,
                             f'tracking RMSE, first → last of {len(m.cycle_rmse_m)} cycles '
-                            f'({100 * (last / first - 1):+.0f} %)', mood))
+                            f'({signed(100 * (last / first - 1))} %)', mood))
         elif m.rmse_m is not None:
             numbers.append((f'{m.rmse_m * 1e3:.2f} mm', title, 'tracking RMSE', ''))
     return numbers

@@ -96,7 +96,7 @@ def stack(rows, x_title, row_px=ROW_PX):
     n = len(rows)
     inner = n * (row_px + LEGEND_PX)
     height = inner + BOTTOM_PX
-    layout = {'height': height, 'margin': {'l': 68, 'r': 14, 't': 4, 'b': BOTTOM_PX},
+    layout = {'height': height, 'margin': {'l': 78, 'r': 14, 't': 4, 'b': BOTTOM_PX},
               'hovermode': 'x'}
     data = []
     for k, (title, traces) in enumerate(rows):
@@ -141,7 +141,7 @@ def bars(categories, groups, x_title, y_title, height=300):
             for name, values, role in groups]
     return {'data': data, 'layout': {
         'height': height, 'barmode': 'group', 'bargap': 0.25, 'hovermode': 'x',
-        'margin': {'l': 68, 'r': 14, 't': 34, 'b': BOTTOM_PX},
+        'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
         'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
         'xaxis': {'title': {'text': x_title}, 'type': 'category'},
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
@@ -178,7 +178,7 @@ def histogram(groups, x_title, y_title, bins=80, height=280):
                      'line': {'color': f'@{role}', 'shape': 'hvh', 'width': 1.4},
                      'showlegend': len(groups) > 1})
     return {'data': data, 'layout': {
-        'height': height, 'margin': {'l': 68, 'r': 14, 't': 34, 'b': BOTTOM_PX},
+        'height': height, 'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
         'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
         'xaxis': {'title': {'text': x_title}},
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}

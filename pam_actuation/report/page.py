@@ -70,6 +70,12 @@ def table(head, rows, kind=''):
     return f'<div class="scroll"><table class="{kind}">{top}<tbody>{body}</tbody></table></div>'
 
 
+def signed(value, digits=0):
+    """Return a number with its sign as text; what rounds to zero has none."""
+    shown = f'{value:+.{digits}f}'
+    return shown[1:] if float(shown) == 0.0 else shown
+
+
 def key_numbers(numbers):
     """
     Return the HTML of the numbers a reader should see first.

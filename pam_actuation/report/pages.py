@@ -15,7 +15,7 @@
 """The page about one experiment or several runs of it."""
 
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import render, write_text
+from pam_actuation.report.page import render, signed, write_text
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -121,7 +121,7 @@ def run_numbers(named):
         if len(m.cycle_rmse_m) > 1:
             first, last = m.cycle_rmse_m[0] * 1e3, m.cycle_rmse_m[-1] * 1e3
             numbers.append((f'{first:.2f} → {last:.2f} mm', 'Tracking RMSE, first → last cycle',
-                            f'{title}: {100 * (last / first - 1):+.0f} %', ''))
+                            f'{title}: {signed(100 * (last / first - 1))} %', ''))
         elif m.rmse_m is not None:
             numbers.append((f'{m.rmse_m * 1e3:.2f} mm', 'Tracking RMSE', title, ''))
         if m.max_error_m is not None and len(named) == 1:

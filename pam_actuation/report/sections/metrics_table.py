@@ -14,7 +14,7 @@
 
 """The table of figures of merit, one column per run."""
 
-from pam_actuation.report.page import paragraph, Section, table
+from pam_actuation.report.page import paragraph, Section, signed, table
 
 AIR_DENSITY = 1.185          # kg/m^3 at the reference atmosphere of ISO 8778
 
@@ -34,7 +34,9 @@ def metrics(named, key='metrics', title='Figures of merit'):
     rows = [
         ('Tracking RMSE', _mm(m.rmse_m for _, m in named)),
         ('Largest error', _mm(m.max_error_m for _, m in named)),
-        ('Mean error (reference − contraction)', _mm((m.mean_error_m for _, m in named), '+')),
+        ('Mean error (reference − contraction)', [
+            None if m.mean_error_m is None else f'{signed(m.mean_error_m * 1e3, 3)} mm'
+            for _, m in named]),
         ('RMSE of the first cycle', _mm(_cycle(m, 0) for _, m in named)),
         ('RMSE of the last cycle', _mm(_cycle(m, -1) for _, m in named)),
         ('Last cycle against the first', [_change(m) for _, m in named]),
@@ -56,8 +58,8 @@ def metrics(named, key='metrics', title='Figures of merit'):
     return Section(key, title, body)
 
 
-def _mm(values, sign=''):
-    return [None if v is None else f'{v * 1e3:{sign}.3f} mm' for v in values]
+def _mm(values):
+    return [None if v is None else f'{v * 1e3:.3f} mm' for v in values]
 
 
 def _percent(value):
@@ -71,7 +73,7 @@ def _cycle(m, index):
 def _change(m):
     if len(m.cycle_rmse_m) < 2:
         return None
-    return f'{100.0 * (m.cycle_rmse_m[-1] / m.cycle_rmse_m[0] - 1.0):+.0f} %'
+    return f'{signed(100.0 * (m.cycle_rmse_m[-1] / m.cycle_rmse_m[0] - 1.0))} %'
 
 
 def _settling(m):
