@@ -50,6 +50,7 @@ class ControllerNode(ManagedNode):
         valve = self.value('valve_type')
         rig = load_rig(self.value('rig'), valve=valve)
         name = self.value('controller') or self.DEFAULT_CONTROLLER.format(valve=valve)
+        load_controller(name, rig).step(0.0, 0.0, 0.0, 0.0, 0.0)    # compiled before time counts
         self.controller = load_controller(name, rig)
         self.loop = ControllerLoop(self.controller)
         self.add_publisher('pressure_command')

@@ -326,13 +326,13 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
     result = Result(bag or '')
     try:
         with _termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:
-            _run_guarded(session, result, progress)
+            run_guarded(session, result, progress)
     finally:
         plan.remove()
     return result
 
 
-def _run_guarded(session, result, progress):
+def run_guarded(session, result, progress):
     """Start, run and stop; a failure or Ctrl-C goes into the result."""
     begin = None
     try:

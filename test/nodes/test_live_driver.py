@@ -1,0 +1,131 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test the live driver with a plant: it follows, it stops, and its last word is the safe signal."""
+
+import signal
+import threading
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
+from pam_actuation.messages import Pressure                                 # noqa: E402
+from pam_actuation.nodes.conversions import RosWriter                       # noqa: E402
+from std_srvs.srv import Trigger                                            # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+SAFE = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
+COMMAND_PA = 350_000.0
+
+
+class Commander:
+    """Publish a constant pressure command at 100 Hz, stamped with the time."""
+
+    def __init__(self, rig):
+        self._publisher = rig.publisher('pressure_command')
+        self._writer = RosWriter('pressure_command')
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        while not self._ending.wait(0.01):
+            self._publisher.publish(self._writer.fill(Pressure(time.time_ns(), COMMAND_PA)))
+
+    def end(self):
+        self._ending.set()
+        self._thread.join()
+
+
+@pytest.fixture(scope='module', params=['ppr', 'hsv'])
+def valve(request):
+    return request.param
+
+
+@pytest.fixture(scope='module')
+def rig(valve, tmp_path_factory):
+    live = LiveRig(tmp_path_factory.mktemp(valve))
+    live.start('plant_simulator', rig='dmsp_5_300_hanging_mass', valve_type=valve)
+    live.start('valve_driver', valve_type=valve)
+    live.listen()
+    commander = Commander(live)
+    yield live
+    commander.end()
+    live.close()
+
+
+def last_pressure(rig):
+    heard = rig.heard['pressure']
+    return heard[-1].plain.pressure_pa if heard else 0.0
+
+
+def last_signal(rig):
+    return rig.heard['valve_signal'][-1].plain.efforts
+
+
+def test_it_follows_the_command(rig, valve):
+    wait_for(lambda: abs(last_pressure(rig) - COMMAND_PA) < 10e3, 30.0, 'the wanted pressure')
+    names = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}[valve]
+    assert rig.heard['valve_signal'][-1].plain.names == names
+    assert bool(rig.heard['supply_pressure']) == (valve == 'hsv')
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 0, 3.0, 'an untroubled status')
+
+
+def test_emergency_stop_is_latched_until_reset(rig, valve):
+    answer = rig.call(Trigger, 'valve_driver/emergency_stop')
+    answered_s = time.monotonic()
+    assert answer.success and 'Venting' in answer.message
+    wait_for(lambda: last_signal(rig) == SAFE[valve], 0.3, 'the safe signal')
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 0.3, 'the reason')
+    assert 'emergency stop' in rig.health['valve_driver'][-1].message
+    time.sleep(0.3)          # commands go on arriving all the time
+    since = [heard.plain.efforts for heard in rig.heard['valve_signal']
+             if heard.time_s > answered_s + 0.1]
+    assert len(since) >= 15 and set(since) == {SAFE[valve]}
+    answer = rig.call(Trigger, 'valve_driver/reset')
+    assert answer.success and 'emergency stop' in answer.message
+    wait_for(lambda: abs(last_pressure(rig) - COMMAND_PA) < 20e3, 5.0, 'the wanted pressure')
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_the_safe_signal_is_the_last_one(rig, valve, number):
+    driver = rig.processes['valve_driver']
+    if not driver.running:
+        rig.health['valve_driver'].clear()
+        rig.start('valve_driver', valve_type=valve)
+        driver = rig.processes['valve_driver']
+        wait_for(lambda: rig.health['valve_driver'], 20.0, 'the driver')
+        wait_for(lambda: abs(last_pressure(rig) - COMMAND_PA) < 20e3, 5.0, 'the wanted pressure')
+    driver.send_signal(number)
+    assert driver.wait(5.0) and driver.exit_code == 0
+    time.sleep(0.2)
+    assert last_signal(rig) == SAFE[valve]
+    final = rig.health['valve_driver'][-1]
+    assert final.message == f'stopped by {number.name}'
+    pressures = rig.heard['pressure']
+    before = last_pressure(rig)
+    count = len(pressures)
+    wait_for(lambda: len(pressures) > count + 100, 3.0, 'the plant')
+    assert last_pressure(rig) < before       # the air really leaves
+
+
+def test_signals_were_counted_and_came_in_order(rig):
+    published = int(rig.health['valve_driver'][-1].values['published./muscle/valve_signal'])
+    stamps = [heard.plain.stamp_ns for heard in rig.heard['valve_signal']]
+    assert 10 < published <= len(stamps)
+    assert stamps == sorted(stamps)

@@ -1,0 +1,179 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test all nodes together, each started as ``ros2 run`` does: topics, services, a kill."""
+
+import signal
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
+from lifecycle_msgs.srv import ChangeState, GetState                        # noqa: E402
+from live_rig import LiveRig, wait_for                                      # noqa: E402
+from pam_sim.units import P_ATM_PA                                          # noqa: E402
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue     # noqa: E402
+from rcl_interfaces.srv import DescribeParameters, SetParameters            # noqa: E402
+from std_srvs.srv import SetBool, Trigger                                   # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+NODES = ('plant_simulator', 'valve_driver', 'sofc_controller', 'reference_generator')
+# topic: lowest and highest rate [Hz] that is right, on a busy machine too
+RATES = {
+    'pressure': (200, 260), 'contraction': (200, 260), 'force': (200, 260),
+    'valve_signal': (100, 420), 'pressure_command': (160, 210), 'controller_state': (160, 210),
+    'reference': (90, 105), 'reference_trajectory': (5, 12)}
+
+
+@pytest.fixture(scope='module')
+def rules_file(tmp_path_factory):
+    return tmp_path_factory.mktemp('rules') / 'rules.json'
+
+
+@pytest.fixture(scope='module')
+def rig(tmp_path_factory, rules_file):
+    live = LiveRig(tmp_path_factory.mktemp('rig'))
+    live.start('plant_simulator')
+    live.start('valve_driver')
+    live.start('sofc_controller', rules_file=str(rules_file))
+    live.start('reference_generator', experiment='sine_half_hz', await_receiver=True)
+    live.listen()
+    wait_for(lambda: all(live.health[name] for name in NODES), 60.0, 'all nodes')
+    wait_for(lambda: live.health['sofc_controller'][-1].level == 0, 10.0, 'the controller')
+    yield live
+    live.close()
+
+
+def test_every_topic_comes_at_its_rate(rig):
+    begin_s = time.monotonic() + 0.2
+    time.sleep(3.2)
+    end_s = begin_s + 3.0
+    rates = {
+        topic: sum(begin_s <= heard.time_s < end_s for heard in rig.heard[topic]) / 3.0
+        for topic in RATES}
+    wrong = {topic: rate for topic, rate in rates.items()
+             if not RATES[topic][0] <= rate <= RATES[topic][1]}
+    assert not wrong
+    assert not rig.heard['supply_pressure']       # a regulator has no sensor for it
+
+
+def test_the_messages_make_sense(rig):
+    pressure = rig.heard['pressure'][-1].plain
+    assert 0.9 * P_ATM_PA < pressure.pressure_pa < 8e5
+    assert abs(time.time_ns() - pressure.stamp_ns) < 0.2e9
+    assert -0.002 < rig.heard['contraction'][-1].plain.contraction_m < 0.04
+    assert 0.0 < rig.heard['force'][-1].plain.force_n < 100.0
+    trajectory = rig.heard['reference_trajectory'][-1].plain
+    offsets = trajectory.time_from_start_ns
+    assert offsets[-1] - offsets[0] >= 0.5e9
+    assert max(b - a for a, b in zip(offsets, offsets[1:])) <= 20_000_000
+    state = rig.heard['controller_state'][-1].plain
+    assert len(state.names) == len(state.values) > 10
+
+
+def test_every_node_tells_how_it_is(rig):
+    for name in NODES:
+        last = rig.health[name][-1]
+        assert last.level <= 1, (name, last.message)
+        times = [health.time_s for health in rig.health[name][-5:]]
+        assert times[-1] - times[0] < 4 * 0.7
+        assert int(last.values['loop.ticks']) > 100
+        assert any(key.startswith('published./muscle/') for key in last.values)
+
+
+def test_parameters_are_described_and_guarded(rig):
+    request = DescribeParameters.Request(names=['max_pressure_gauge_pa'])
+    answer = rig.call(DescribeParameters, 'valve_driver/describe_parameters', request)
+    descriptor = answer.descriptors[0]
+    assert 'limit' in descriptor.description and descriptor.read_only
+    assert descriptor.floating_point_range[0].to_value == 1e6
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2e5)
+    request = SetParameters.Request(parameters=[
+        Parameter(name='max_pressure_gauge_pa', value=value)])
+    answer = rig.call(SetParameters, 'valve_driver/set_parameters', request)
+    assert not answer.results[0].successful and answer.results[0].reason
+
+
+def test_an_impossible_transition_is_refused_and_hurts_nobody(rig):
+    request = ChangeState.Request(
+        transition=Transition(id=Transition.TRANSITION_CONFIGURE))
+    assert not rig.call(ChangeState, 'valve_driver/change_state', request).success
+    state = rig.call(GetState, 'valve_driver/get_state').current_state
+    assert state.label == 'active'
+
+
+def test_learning_can_be_frozen_and_rules_saved_loaded_and_reset(rig, rules_file):
+    answer = rig.call(SetBool, 'sofc_controller/freeze_learning', SetBool.Request(data=True))
+    assert answer.success and 'frozen' in answer.message
+    learning = [heard.plain for heard in rig.heard['controller_state']]
+    assert dict(zip(learning[-1].names, learning[-1].values))['learning'] in (0.0, 1.0)
+    wait_for(lambda: _last_state(rig)['learning'] == 0.0, 1.0, 'the end of learning')
+    for service in ('save_rules', 'load_rules', 'reset_rules'):
+        answer = rig.call(Trigger, f'sofc_controller/{service}')
+        assert answer.success, answer.message
+    assert rules_file.stat().st_size > 100
+    rules_file.write_text('no rules')
+    answer = rig.call(Trigger, 'sofc_controller/load_rules')
+    assert not answer.success and 'rule' in answer.message
+    rules_file.unlink()
+    rig.call(SetBool, 'sofc_controller/freeze_learning', SetBool.Request(data=False))
+    wait_for(lambda: _last_state(rig)['learning'] == 1.0, 3.0, 'learning')
+
+
+def _last_state(rig):
+    state = rig.heard['controller_state'][-1].plain
+    return dict(zip(state.names, state.values))
+
+
+def test_a_node_can_be_stopped_and_started_again(rig):
+    for transition in (
+            Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert rig.call(ChangeState, 'sofc_controller/change_state', request, 20.0).success
+    count = len(rig.heard['controller_state'])
+    wait_for(lambda: len(rig.heard['controller_state']) > count + 50, 3.0, 'the controller')
+    wait_for(lambda: rig.health['sofc_controller'][-1].level == 0, 3.0, 'control')
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 0, 3.0, 'the driver')
+
+
+def test_a_killed_controller_lets_the_driver_vent_and_say_why(rig):
+    wait_for(lambda: rig.heard['valve_signal'][-1].plain.efforts[0] > 1.0, 5.0, 'pressure')
+    killed_s = time.monotonic()
+    rig.processes['sofc_controller'].send_signal(signal.SIGKILL)
+
+    def vented():
+        return [heard for heard in rig.heard['valve_signal']
+                if heard.time_s > killed_s and heard.plain.efforts == (0.0,)]
+
+    wait_for(vented, 1.0, 'the safe signal')
+    assert vented()[0].time_s - killed_s < 0.3
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 0.5, 'the reason')
+    reason = rig.health['valve_driver'][-1]
+    assert 'no valid pressure command' in reason.message
+    assert reason.time_s - killed_s < 0.3
+    assert rig.processes['valve_driver'].running
+
+
+def test_a_new_controller_is_taken_up_again(rig):
+    rig.health['sofc_controller'].clear()
+    rig.start('pid_controller')
+    wait_for(lambda: rig.health['pid_controller'] and rig.health['pid_controller'][-1].level == 0,
+             30.0, 'the other controller')
+    # The killed one stays on the graph for some seconds more: a warning, no fault.
+    wait_for(lambda: rig.health['valve_driver'][-1].level <= 1, 3.0, 'the driver')
+    wait_for(lambda: rig.heard['valve_signal'][-1].plain.efforts[0] > 1.0, 5.0, 'pressure')

@@ -1,0 +1,130 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test whole sessions: real processes, a complete bag, and an orderly end of every kind."""
+
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from pam_actuation.replay.controller import replay_controller               # noqa: E402
+from pam_actuation.rigging import session                                   # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.rigging.plan import make_plan                            # noqa: E402
+from pam_sim.errors import InputError                                       # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+SHORT = """\
+name: short
+domain: contraction
+segments:
+  - rest: {duration_s: 0.3}
+  - ramp: {to_m: 0.008, duration_s: 0.7}
+  - hold: {duration_s: 0.5}
+"""
+LONG = SHORT.replace('hold: {duration_s: 0.5}', 'hold: {duration_s: 60.0}')
+PRESSURE = """\
+name: pressure
+domain: pressure
+segments:
+  - rest: {duration_s: 0.2}
+  - step: {to_pa: 300000.0, duration_s: 0.8}
+"""
+
+
+def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
+    seen = []
+    result = session.run_experiment(
+        SHORT, valve='ppr', out_dir=tmp_path / 'bag', seed=3,
+        progress=lambda done_s, total_s: seen.append((done_s, total_s)))
+    assert result.failure == '' and result.findings == []
+    assert result.published == result.recorded
+    assert result.complete
+    assert set(result.exit_codes.values()) == {0}
+    assert len(result.cpu_share) == 5
+    assert seen[-1][0] <= seen[-1][1] == 1.5
+    run = load_run(result.bag)
+    assert run.metadata['experiment_name'] == 'short' and run.metadata['seed'] == '3'
+    assert {'pressure', 'contraction', 'force', 'pressure_command', 'valve_signal', 'reference',
+            'controller_state'} <= set(run.topics)
+    replayed = replay_controller(run)
+    assert replayed.identical, replayed.max_abs_difference_pa
+    volts = run.topics['valve_signal'].values['ppr_voltage']
+    assert volts.max() > 1.0 and volts[-1] == 0.0
+
+
+def test_pressure_experiments_need_no_controller(tmp_path):
+    result = session.run_experiment(PRESSURE, valve='hsv', out_dir=tmp_path / 'bag')
+    assert result.complete, result
+    assert 'sofc_controller' not in result.exit_codes
+    run = load_run(result.bag)
+    assert run.topics['pressure'].values['pressure_pa'].max() > 280e3
+    assert 'supply_pressure' in run.topics
+
+
+def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(tmp_path):
+    bag = tmp_path / 'bag'
+    plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'hsv', bag)
+    result = session.Result(str(bag))
+    with session.RigSession(plan) as rig:
+        def kill(done_s, total_s):
+            if done_s > 1.5:
+                rig.processes['sofc_controller'].send_signal(signal.SIGKILL)
+
+        session.run_guarded(rig, result, kill)
+    plan.remove()
+    assert 'sofc_controller was ended by SIGKILL' in result.failure
+    assert 'vented because no valid pressure command' in result.failure
+    assert result.exit_codes.pop('sofc_controller') == -signal.SIGKILL
+    assert set(result.exit_codes.values()) == {0}
+    run = load_run(bag)
+    signals, states = run.topics['valve_signal'], run.topics['controller_state']
+    vented = (signals.values['fill_duty'] == 0.0) & (signals.values['vent_duty'] == 1.0)
+    after = signals.stamp_ns[vented & (signals.stamp_ns > states.stamp_ns[-1])]
+    assert (after[0] - states.stamp_ns[-1]) * 1e-9 < 0.3
+    assert vented[-1]
+
+
+def test_the_user_may_stop_it(tmp_path):
+    def stop(done_s, total_s):
+        if done_s > 0.5:
+            raise KeyboardInterrupt
+
+    result = session.run_experiment(
+        LONG, 'dmsp_5_300_hanging_mass', 'pid', out_dir=tmp_path / 'bag', progress=stop)
+    assert result.failure == 'stopped by the user'
+    assert set(result.exit_codes.values()) == {0}
+    assert result.published == result.recorded
+    assert load_run(result.bag).topics['valve_signal'].values['ppr_voltage'][-1] == 0.0
+
+
+def test_mistakes_are_told_before_anything_starts(tmp_path):
+    with pytest.raises(InputError, match='dmsp_99'):
+        session.run_experiment(SHORT, 'dmsp_99', out_dir=tmp_path / 'bag')
+    (tmp_path / 'bag').mkdir()
+    with pytest.raises(InputError, match='exists'):
+        session.run_experiment(SHORT, out_dir=tmp_path / 'bag')
+    with pytest.raises(InputError, match='domain id'):
+        DomainLock(999)
+
+
+def test_two_sessions_get_two_domains():
+    first, second = DomainLock(), DomainLock()
+    assert first.domain_id != second.domain_id
+    first.release()
+    second.release()
