@@ -36,6 +36,11 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict = {}
 
 
+def _construct_int(loader, node):
+    return int(loader.construct_scalar(node))       # YAML 1.2: a leading zero is not octal
+
+
+_Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
 for _tag, _pattern, _first in (
     ('bool', r'^(?:true|True|TRUE|false|False|FALSE)$', 'tTfF'),
     ('null', r'^(?:~|null|Null|NULL|)$', ['~', 'n', 'N', '']),
@@ -119,6 +124,7 @@ class Located(Mapping):
         Parameters
         ----------
         key : str
+            Key in this mapping.
         type : type, optional
             ``float`` (takes integers, refuses nan, inf and booleans), ``int``,
             ``str``, ``bool``, ``Located``/``dict`` or ``LocatedList``/``list``.

@@ -99,10 +99,10 @@ def _from_mapping(data, name, seen):
         data.require('muscle', str, choices=(dmsp_5_300.NAME,))
         base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)))
     known = rig_parameters(base.load)
-    given = data.get('parameters', dict, Located({})) if data.get('parameters') is not None else {}
+    given = data.get('parameters', dict) if data.get('parameters') is not None else {}
     check_parameters(known, given)
     tolerance = dict(base.tolerance)
-    stated = data.get('tolerance', dict, {}) if data.get('tolerance') is not None else Located({})
+    stated = data.get('tolerance', dict) if data.get('tolerance') is not None else Located({})
     stated.check_keys([parameter.name for parameter in known], 'parameter')
     for key in stated:
         tolerance[key] = stated.require(key, float, lower=0.0, upper=1.0)
@@ -112,8 +112,8 @@ def _from_mapping(data, name, seen):
         name or base.name, base.load,
         data.get('valve', str, base.valve, choices=VALVES),
         data.get('fidelity', str, base.fidelity, choices=hsv.FIDELITIES),
-        {**base.parameters, **dict(given)}, _effects(data, base), {**base.sensors, **dict(sensors)},
-        tolerance)
+        {**base.parameters, **dict(given)}, _effects(data, base),
+        {**base.sensors, **dict(sensors)}, tolerance)
 
 
 def _effects(data, base):

@@ -81,6 +81,7 @@ def check_parameters(parameters, values, what='parameter', where=''):
     Parameters
     ----------
     parameters : iterable of Parameter
+        What is known.
     values : mapping
         Name to number; a ``Located`` mapping gives the line in messages.
     what : str

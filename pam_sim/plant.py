@@ -14,9 +14,9 @@
 
 """The rig as a live object: one physics step at a time, the compiled step of the rollout."""
 
+import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.rollout import kernel, layout
-import numpy as np
 
 
 class Plant:

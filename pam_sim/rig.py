@@ -58,7 +58,7 @@ class EffectSetting:
     @classmethod
     def of(cls, item):
         """
-        Return a checked setting from a name, a mapping with ``name`` and ``parameters``, or itself.
+        Return a checked setting from a name, a mapping (name, parameters) or a setting.
 
         Raises
         ------
@@ -154,6 +154,7 @@ class Rig:
         effects : list, optional
             The effects instead of the present ones (``EffectSetting``, dict or name).
         valve, fidelity, load, name : str, optional
+            As of the class; parameters the new load does not have are dropped.
         sensors : dict, optional
             Sensor settings to change.
 
@@ -183,6 +184,7 @@ class Rig:
         Parameters
         ----------
         contraction_m : float or ndarray
+            Contraction to hold, m.
         load_n : float or ndarray, optional
             Tension to hold, N; by default the weight of a hanging mass.
 

@@ -16,8 +16,8 @@
 
 from dataclasses import dataclass, field
 
-from pam_sim.errors import InputError
 import numpy as np
+from pam_sim.errors import InputError
 
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = ('valve_signal', 'reference', 'pressure_command', 'controller_state')

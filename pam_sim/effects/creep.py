@@ -32,13 +32,17 @@ def _initial(values, numbers):
     return numbers.contraction_m, numbers.contraction_m      # relaxed at the start
 
 
+def _relaxing_stiffness(values, rig):
+    return values['stiffness_1_n_per_m'] + values['stiffness_2_n_per_m']
+
+
 def _creep_fraction(values, rig):
     """Return relaxing over static stiffness at 400 kPa gauge and 8.9 mm (5 kg at rest)."""
     length, x, d = 0.300, 8.86e-3, 1e-5
     static = (float(tension_n(400e3, (x - d) / length))
               - float(tension_n(400e3, (x + d) / length))) / (2.0 * d)
     gain = rig.parameters['force_map_gain'] if rig is not None else 1.0
-    return (values['stiffness_1_n_per_m'] + values['stiffness_2_n_per_m']) / (gain * static)
+    return _relaxing_stiffness(values, rig) / (gain * static)
 
 
 EFFECT = Effect(
@@ -59,8 +63,7 @@ EFFECT = Effect(
     ),
     amplitude=('stiffness_1_n_per_m', 'stiffness_2_n_per_m'),
     reported=(
-        Reported('relaxing_stiffness_n_per_m', 'N/m',
-                 lambda values, rig: values['stiffness_1_n_per_m'] + values['stiffness_2_n_per_m']),
+        Reported('relaxing_stiffness_n_per_m', 'N/m', _relaxing_stiffness),
         Reported('creep_fraction_at_400kpa', '-', _creep_fraction),
     ),
     states=2,

@@ -16,8 +16,8 @@
 
 from dataclasses import dataclass, field
 
-from pam_sim.parameters import check_parameters
 import numpy as np
+from pam_sim.parameters import check_parameters
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
@@ -153,13 +153,17 @@ class Effect:
         Parameters
         ----------
         values : dict
+            All parameters of the effect.
         numbers : Numbers
+            Of the rig.
         par : ndarray of float64
             ``par[k - 1]`` is the flag, ``par[k:k + slots]`` the packed values.
         k : int
+            Place of the first packed value.
         state : ndarray of float64
             ``state[i:i + states]`` are the effect's states.
         i : int
+            Place of the first state.
 
         """
         if not self.is_active(values, numbers):

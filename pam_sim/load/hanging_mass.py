@@ -40,7 +40,9 @@ def acceleration(net_n, contraction_m, velocity_m_per_s, inverse_mass_per_kg, ma
     net_n : float
         Sum of all forces in the direction of contraction, N.
     contraction_m, velocity_m_per_s : float
+        Motion, m and m/s.
     inverse_mass_per_kg, max_contraction_m : float
+        1/mass and the upper stop.
 
     """
     if contraction_m <= 0.0 and velocity_m_per_s <= 0.0 and net_n < 0.0:

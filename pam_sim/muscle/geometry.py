@@ -43,6 +43,7 @@ def volume_m3(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
     Parameters
     ----------
     contraction_m : float
+        Contraction x, m.
     length_m : float
         Length L0 at zero contraction.
     thread_squared_m2 : float

@@ -95,6 +95,7 @@ class SensorChain:
         Parameters
         ----------
         time_s, pressure_pa, contraction_m, force_n : ndarray, shape (N,)
+            Signals, s, Pa absolute, m, N.
 
         Returns
         -------

@@ -30,7 +30,8 @@ SWITCHING_STEP_S = 1e-4
 
 PARAMETERS = (
     Parameter('C', 'm3/(s Pa)', 2.0e-10, 1e-12, 1e-8, 0.02,
-              'Sonic conductance of each valve with its restrictor.', 'ISO 6358; fitted restrictor'),
+              'Sonic conductance of each valve with its restrictor.',
+              'ISO 6358; fitted restrictor'),
     Parameter('b', '-', 0.38, 0.05, 0.9, 0.0,
               'Critical pressure ratio of each valve.', 'ISO 6358; MHJ10-class valves'),
     Parameter('V_dead', 'm3', 3.0e-6, 0.0, 1e-3, 0.02,
@@ -67,6 +68,7 @@ def pulse_edges(pulse_s, last_off_s, period_s, open_time_s, close_time_s):
     last_off_s : float
         Closing edge in the period before, from that period's start.
     period_s : float
+        PWM period.
     open_time_s, close_time_s : float
         Delay from energising to open and from de-energising to shut, s. A
         pulse shorter than the first is swallowed; a valve not yet shut stays open.

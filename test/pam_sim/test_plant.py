@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The live plant equals the rollout; sensors add what they should."""
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.sensors import SensorChain
+import pytest
+
+
+@pytest.mark.parametrize('name', ['dmsp_5_300_hanging_mass', 'dmsp_5_300_realistic'])
+@pytest.mark.parametrize('valve, fidelity', [
+    ('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching')])
+def test_plant_steps_are_those_of_simulate_to_the_bit(name, valve, fidelity):
+    rig = load_rig(name, valve=valve, fidelity=fidelity)
+    random = np.random.default_rng(3)
+    signal = random.uniform(0.0, 6.0, 700) if valve == 'ppr' else random.uniform(0, 1, (700, 2))
+    pull = random.uniform(0.0, 5.0, 700)
+    response = rig.simulate(signal, external_force_n=pull)
+    plant = rig.plant()
+    for i in range(700):
+        for ours, theirs in ((plant.time_s, response.time_s), (plant.force_n, response.force_n),
+                             (plant.pressure_pa, response.pressure_pa),
+                             (plant.contraction_m, response.contraction_m),
+                             (plant.velocity_m_per_s, response.velocity_m_per_s),
+                             (plant.air_mass_kg, response.air_mass_kg),
+                             (plant.supply_pa, response.supply_pa)):
+            assert ours == theirs[i] or i == 0
+        plant.step(np.atleast_1d(signal[i]), external_force_n=pull[i])
+    assert np.array_equal(plant.outputs, response.outputs[-1])
+    plant.reset()
+    assert plant.time_s == 0.0
+
+
+def test_plant_refuses_what_does_not_fit():
+    plant = load_rig('dmsp_5_300_hanging_mass', valve='hsv').plant()
+    with pytest.raises(InputError, match='takes 2 numbers'):
+        plant.step(3.0)
+    with pytest.raises(InputError, match='not finite'):
+        plant.step((np.nan, 0.0))
+    plant.step((0.1, 0.0))
+    assert np.all(np.isfinite(plant.outputs))
+
+
+def test_nominal_sensors_add_nothing():
+    chain = SensorChain(load_rig('dmsp_5_300_hanging_mass'), seed=5)
+    assert chain.read(0.1, 3e5, 0.01, 40.0) == (3e5, 0.01, 40.0, 0)
+
+
+def test_realistic_sensors_have_the_stated_noise_and_repeat_with_the_seed():
+    rig = load_rig('dmsp_5_300_realistic')
+    count = 4000
+    zeros = np.zeros(count)
+    p, x, f, jitter_ns = SensorChain(rig, seed=5).read_all(zeros, zeros + 4e5, zeros, zeros)
+    for samples, sigma in ((p, 300.0), (x, 1e-5), (f, 0.1), (jitter_ns, 5e4)):
+        assert np.std(samples) == pytest.approx(sigma, rel=0.06)
+    again = SensorChain(rig.sensors, seed=5)
+    assert again.read(0.0, 4e5, 0.0, 0.0) == (p[0], x[0], f[0], jitter_ns[0])
+    assert SensorChain(rig, seed=6).read(0.0, 4e5, 0.0, 0.0)[0] != p[0]
+
+
+def test_quantisation():
+    chain = SensorChain({'contraction_step_m': 1e-4, 'pressure_step_pa': 100.0})
+    p, x, f, _ = chain.read(0.0, 400_049.0, 0.01234, 1.23456)
+    assert p == pytest.approx(400_000.0) and x == pytest.approx(0.0123) and f == 1.23456
+    with pytest.raises(InputError, match='allowed'):
+        SensorChain({'pressure_noise_pa': -1.0})
