@@ -21,17 +21,16 @@ import numpy as np
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
-from pam_sim.gap.nominal import calibrate, REFERENCE_PULL
+from pam_sim.gap.nominal import calibrate, LATENCY_MAX_S, REFERENCE_PULL
 from pam_sim.gap.noise import noise_floor, STAMP_SD_S
-from pam_sim.gap.result import GapResult, SignalGap, Trace, UNIT
+from pam_sim.gap.result import GapResult, READABLE, SignalGap, Trace, UNIT
 
 BLOCK_S = 2.0
 PATTERN = (True, True, True, False, False)    # of the blocks: fit, fit, fit, certify, certify
 INPUT_DRAWS = 4
 # A gap smaller than this many noise floors, noise taken out, is not worth a cause.
 MATERIAL = 0.5
-READABLE = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'force': (1.0, 'N')}
-LIMITS = ('This version locates and measures the gap and does not yet name effects.')
+LIMITS = 'This version locates and measures the gap and does not yet name effects.'
 
 
 def gap_first_look(run, rig, seconds=20.0, seed=0):
@@ -78,10 +77,10 @@ def gap_first_look(run, rig, seconds=20.0, seed=0):
                        remarks=list(health.remarks),
                        simulations=fit.simulations + INPUT_DRAWS + 4)
     if not fit.complete:
-        result.remarks.append('the calibration was stopped before it settled')
+        result.remarks.append('The time for the calibration ran out before it settled.')
     result.remarks.append(
-        f'A latency of {fit.latency_s * 1e3:.1f} ms, common to all signals, was fitted beside '
-        'the numbers.')
+        f'A latency of the measurement of {fit.latency_s * 1e3:.1f} ms, common to all signals, '
+        f'was fitted beside the numbers (at most {LATENCY_MAX_S * 1e3:.0f} ms).')
     result.where = locate(rig, recording, before, floor)
     result.traces = {
         s: Trace(recording.stamp_ns[s], recording.measured[s], before[s], refit[s], refit[s])

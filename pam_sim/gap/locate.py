@@ -124,7 +124,7 @@ def muscle_part(rig, recording, floor):
     # Averaging over the window leaves this much of the cell's noise.
     left = floor['force'] * np.sqrt(max(GRID_S / SMOOTH_S, 1e-3))
     muscle, load = _squared(muscle, left), _squared(load, left)
-    return muscle / (muscle + load) if muscle + load > 0.0 else None
+    return float(muscle / (muscle + load)) if muscle + load > 0.0 else None
 
 
 def smooth_motion(recording):
@@ -168,4 +168,4 @@ def _by_condition(residual, floor, conditions, subsystem, signal):
     total = sum(sums.values())
     if total <= 0.0:
         return []
-    return [Share(subsystem, signal, name, value / total) for name, value in sums.items()]
+    return [Share(subsystem, signal, name, float(value / total)) for name, value in sums.items()]

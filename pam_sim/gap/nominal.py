@@ -35,12 +35,13 @@ from pam_sim.valve import hsv, ppr
 
 LATENCY_PRIOR_S = 1e-3       # up to 2 ms is normal: mean and standard deviation 1 ms
 LATENCY_SD_S = 1e-3
+LATENCY_MAX_S = 3e-3         # more is no latency of a measurement but of the rig
 DIFFERENCE_SD = 0.05         # step of the numerical derivative, in prior deviations
 FIT_RATE_HZ = 200.0
-ROUNDS = 4
+ROUNDS = 6
 REFERENCE_PULL = 3.5         # beyond it a number is wrong rather than inexact
 MAX_PULL = 60.0
-SETTLED = 0.15               # relative change of the weights that ends the rounds
+SETTLED = 0.25               # relative change of the weights that ends the rounds
 
 
 @dataclass
@@ -59,7 +60,7 @@ class Fit:
     simulations : int
         Free runs it took.
     complete : bool
-        False if the time ran out before the weights settled.
+        False if the time ran out.
 
     """
 
@@ -96,10 +97,11 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
     problem = _Problem(rig, recording, floor, chosen)
     z = np.zeros(problem.size)
     temper = {s: 1.0 for s in recording.signals}
-    complete = False
+    complete = True
     for _ in range(ROUNDS):
         left = seconds - (time.perf_counter() - started)
         if left <= 0.0:
+            complete = False
             break
         problem.deadline = time.perf_counter() + left
         solution = least_squares(
@@ -108,9 +110,10 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
         z = solution.x
         fresh = problem.tempering(z)
         settled = all(abs(fresh[s] / temper[s] - 1.0) < SETTLED for s in temper)
-        temper = fresh
+        # The geometric mean keeps weights and numbers from chasing each other.
+        temper = {s: float(np.sqrt(fresh[s] * temper[s])) for s in temper} if not settled \
+            else fresh
         if settled:
-            complete = True
             break
     return problem.fit(z, temper, complete)
 
@@ -135,7 +138,7 @@ class _Problem:
         low = np.append((np.array([p.lower for p in self.parameters]) - self.nominal) / self.sd,
                         -LATENCY_PRIOR_S / LATENCY_SD_S)
         high = np.append((np.array([p.upper for p in self.parameters]) - self.nominal) / self.sd,
-                         MAX_PULL)
+                         (LATENCY_MAX_S - LATENCY_PRIOR_S) / LATENCY_SD_S)
         self.bounds = (np.maximum(low, -MAX_PULL), np.minimum(high, MAX_PULL))
 
     def values(self, z):

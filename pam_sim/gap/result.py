@@ -24,6 +24,8 @@ VERDICTS = ('effects', 'parameter', 'no_gap', 'unknown', 'ambiguous', 'refused')
 SIGNALS = ('pressure', 'contraction', 'force')
 FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
 UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
+# For people: factor from SI and unit.
+READABLE = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'force': (1.0, 'N')}
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,16 @@ class GapResult:
     remarks: list = field(default_factory=list)
     traces: dict = field(default_factory=dict)
     model_yaml: str = ''
+
+    def text(self):
+        """Return the result in lines for a person."""
+        rows = [f'{self.verdict}: {self.reason}']
+        for name, s in self.signals.items():
+            factor, unit = READABLE[name]
+            rows.append(
+                f'  {name}: noise floor {s.noise_floor * factor:.3g}, model off by '
+                f'{s.rmse_before * factor:.3g}, calibrated {s.rmse_refit * factor:.3g} {unit} rms')
+        return '\n'.join(rows + [f'  {r}' for r in self.remarks])
 
     def to_dict(self):
         """Return what gap.json holds, plain data without NaN."""

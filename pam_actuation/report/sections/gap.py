@@ -24,7 +24,6 @@ VERDICT_TEXT = {
     'no_gap': 'No gap beyond noise', 'parameter': 'A number of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
-CONDITION_ORDER = ('contracting', 'extending', 'at rest')
 
 
 def gap_section(result, key='gap', title='Recording against model', remark='',

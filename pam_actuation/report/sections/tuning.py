@@ -25,9 +25,9 @@ def tuning_section(result, key='tuning', title='Offline tuning'):
     Parameters
     ----------
     result : object or dict
-        With ``to_dict()`` or as a dict. Used where present: ``changes`` (name to
-        {before, after, unit}), ``history`` (best cost after each rollout), and any
-        other plain number, shown in a table.
+        With ``to_dict()`` or as a dict. Used where present: ``changed`` (name to
+        {before, after}), ``history`` (pairs of rollouts done and best cost [mm]), and
+        any other plain number, shown in a table.
     key, title : str
         Anchor and heading.
 
@@ -36,27 +36,25 @@ def tuning_section(result, key='tuning', title='Offline tuning'):
     body = paragraph(
         'Settings of the controller were searched on the model, against simulated runs of '
         'the same experiment; a run with other random numbers then checked the result.')
-    if hasattr(result, 'text'):
-        body += paragraph(result.text())
     plain = [[_words(name), _shown(value)] for name, value in data.items()
              if isinstance(value, (int, float, bool, str)) and value != '']
     if plain:
         body += table([], plain, 'facts')
-    changes = data.get('changes') or {}
-    if changes:
-        body += table(['setting', 'before', 'after', 'unit'], [
-            [name, _shown(c.get('before')), _shown(c.get('after')), c.get('unit', '')]
-            for name, c in changes.items()])
-    history = [v for v in data.get('history') or [] if isinstance(v, (int, float))]
+    changed = data.get('changed') or {}
+    if changed:
+        body += table(['setting', 'before', 'after'], [
+            [name, _shown(c['before']), _shown(c['after'])] for name, c in changed.items()])
+    history = data.get('history') or getattr(result, 'history', None) or []
     if len(history) > 1:
-        line = figures.line(range(1, len(history) + 1), history, 'best cost', 'after',
-                            held=True)
-        body += plot(figures.stack([('best cost', [line])], 'simulated runs', row_px=220))
+        done, cost = zip(*history)
+        line = figures.line(done, cost, 'best cost', 'after', held=True)
+        body += plot(figures.stack([('best cost [mm]', [line])], 'simulated runs', row_px=220))
     return Section(key, title, body)
 
 
 def _words(name):
-    return str(name).replace('_', ' ')
+    words = str(name).replace('_', ' ')
+    return f'{words[:-3]} [mm]' if words.endswith(' mm') else words
 
 
 def _shown(value):

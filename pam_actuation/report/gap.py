@@ -1,0 +1,143 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run the gap look on loaded bags and write its folder.
+
+``gap.json``, ``model.yaml``, ``compare.mcap`` and ``report.html``, each written whole or
+not at all.
+"""
+
+import json
+import os
+from pathlib import Path
+import tempfile
+
+import numpy as np
+
+from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.messages import Contraction, Force, Pressure
+from pam_actuation.report.page import render, write_text
+from pam_actuation.report.pages import FOOTER
+from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
+from pam_actuation.report.sections.provenance import provenance
+from pam_actuation.report.sections.replay import Overlay
+from pam_actuation.report.signals import start_ns
+from pam_sim import load_rig, preset_names
+from pam_sim.errors import InputError
+from pam_sim.gap import gap_first_look
+from pam_sim.gap.free_run import free_run, Recording
+from pam_sim.gap.health import check_health, recorded_valve
+from pam_sim.rig import Rig
+
+MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
+FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
+           'residual_before', 'residual_after')
+
+
+def write_gap(runs, model, out_dir, seconds=20.0):
+    """
+    Measure the gap between recordings and a model and write the result folder.
+
+    Parameters
+    ----------
+    runs : list of pam_sim.run.Run
+        Recordings; the first one is looked at.
+    model : str, path or pam_sim.Rig
+        The model. A preset named without its valve gets that of the recording.
+    out_dir : path
+        Folder for the results; made if needed.
+    seconds : float
+        Time budget of the calibration.
+
+    Returns
+    -------
+    pam_sim.gap.GapResult
+
+    Raises
+    ------
+    InputError
+        No recording, or a mistake in the model.
+
+    """
+    if not runs:
+        raise InputError('a gap look needs at least one recording')
+    run = runs[0]
+    result = gap_first_look(run, model_for(run, model), seconds)
+    if len(runs) > 1:
+        result.remarks.append(
+            f'This version looks at one recording at a time; shown is {run.path}.')
+    save_gap(result, run, out_dir)
+    return result
+
+
+def model_for(run, model):
+    """Return the rig of a model, with the recorded valve if the model is a preset."""
+    if isinstance(model, Rig):
+        return model
+    named = str(model) in preset_names()
+    return load_rig(model, valve=(recorded_valve(run) or None) if named else None)
+
+
+def save_gap(result, run, out_dir):
+    """Write gap.json, model.yaml, compare.mcap and report.html of a result."""
+    out_dir = Path(out_dir)
+    if out_dir.exists() and not out_dir.is_dir():
+        raise InputError('is a file; give a folder for the results', str(out_dir))
+    write_text(out_dir / 'gap.json',
+               json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
+    write_text(out_dir / 'model.yaml', result.model_yaml)
+    if result.traces:
+        write_compare(result, run.namespace, out_dir / 'compare.mcap')
+    write_text(out_dir / 'report.html', render(
+        'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
+        [gap_section(result), provenance([('recording', run)])], footer=FOOTER))
+
+
+def write_compare(result, namespace, path):
+    """Write measured and simulated signals and their residuals as one MCAP file."""
+    path = Path(path)
+    prefix = '/' + namespace.strip('/') if namespace.strip('/') else ''
+    rows = []
+    for signal, trace in result.traces.items():
+        curves = (trace.measured, trace.before, trace.refit, trace.after,
+                  trace.measured - trace.before, trace.measured - trace.after)
+        for folder, values in zip(FOLDERS, curves):
+            topic = f'{prefix}/{folder}/{signal}'
+            rows += [(int(t), topic, signal, float(v))
+                     for t, v in zip(trace.stamp_ns, values)]
+    rows.sort(key=lambda row: row[:2])
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix='.compare') as folder:
+        with BagWriter(Path(folder) / 'compare', {'verdict': result.verdict}) as bag:
+            for topic, signal in sorted({(row[1], row[2]) for row in rows}):
+                bag.add_topic(topic, TOPIC_TYPES[signal])
+            for stamp, topic, signal, value in rows:
+                bag.write(topic, encode(signal, MESSAGE[signal](stamp, value)), stamp, stamp)
+        os.replace(bag.file, path)
+
+
+def free_run_overlay(run, rig):
+    """
+    Return the Overlays of a model's free run on a recording; [] if it cannot be compared.
+
+    For the section "Simulated against recorded" of a report.
+    """
+    if not check_health(run, rig.valve).usable:
+        return []
+    recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
+    simulated = free_run(rig, recording)
+    offset = (recording.start_ns - start_ns(run)) * 1e-9
+    return [Overlay(s, recording.time_s[s] + offset, np.asarray(recording.measured[s]),
+                    simulated[s]) for s in recording.signals]
