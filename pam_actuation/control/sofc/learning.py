@@ -28,13 +28,13 @@ from pam_sim.compiled import compiled
 LEARNING = 0
 FROZEN_OFF = 1            # learning switched off
 FROZEN_START = 2          # start-up: bumpless offset or less history than the credit delay
-FROZEN_JUMP = 3           # the reference jumped
+FROZEN_JUMP = 3           # the reference jumped, or the pressure lagged, a moment ago
 FROZEN_SATURATED = 4      # the command is, or was when the rules were active, at a limit
 FROZEN_DEAD_ZONE = 5      # the error is within noise
 FROZEN_SLACK = 6          # the muscle is slack
 FROZEN_VALVE = 7          # the pressure does not follow: supply or valve
 REASONS = (
-    'learning', 'learning is off', 'starting', 'reference jumped', 'command at a limit',
+    'learning', 'learning is off', 'starting', 'settling after a jump', 'command at a limit',
     'error within the dead zone', 'muscle slack', 'pressure does not follow the command')
 
 

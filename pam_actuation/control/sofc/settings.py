@@ -66,8 +66,8 @@ SETTINGS = (
     Setting('jump_m', 'm', 1e-3, 1e-5, 0.1, 'reference jump that freezes learning'),
     Setting('jump_freeze_s', 's', 0.6, 0.0, 10.0, 'for how long, beyond the credit delay'),
     Setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
-    Setting('valve_gap_pa', 'Pa', 8e4, 1e3, 1e6,
-            'command minus pressure, one credit delay later, that freezes learning'),
+    Setting('valve_gap_pa', 'Pa', 4e4, 1e3, 1e6,
+            'command minus pressure, one credit delay later, that freezes learning and integral'),
 )
 
 NAMES = tuple(setting.name for setting in SETTINGS)

@@ -96,7 +96,18 @@ def _jumped(par, st, inp):
 
 
 @compiled
-def _reason(par, ring, st, inp, error, limited):
+def _valve_lags(par, ring, st, inp):
+    """Tell whether the measured pressure is far from the command of one credit delay ago."""
+    delay = int(par[at.P_DELAY])
+    if st[at.S_HISTORY] < delay:
+        return False
+    then = credit.row_of(ring, int(st[at.S_TICK]), delay)
+    gap = abs(ring[then, credit.ENTRY_OUTPUT] - inp[place.IN_PRESSURE])
+    return gap > par[at.P_VALVE_GAP]          # False for NaN: pressure is optional
+
+
+@compiled
+def _reason(par, ring, st, inp, error, limited, lags):
     """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
     tick = int(st[at.S_TICK])
     delay = int(par[at.P_DELAY])
@@ -105,15 +116,14 @@ def _reason(par, ring, st, inp, error, limited):
         return learning.FROZEN_OFF
     if st[at.S_HISTORY] < delay + spread or abs(st[at.S_OFFSET]) > _START_BAND_M:
         return learning.FROZEN_START
+    if lags:
+        return learning.FROZEN_VALVE
     if st[at.S_FREEZE_LEFT] > 0.0:
         return learning.FROZEN_JUMP
     force = inp[place.IN_FORCE]
     if force < par[at.P_SLACK_FORCE]:         # False for NaN: force is optional
         return learning.FROZEN_SLACK
     then = credit.row_of(ring, tick, delay)
-    gap = abs(ring[then, credit.ENTRY_OUTPUT] - inp[place.IN_PRESSURE])
-    if gap > par[at.P_VALVE_GAP]:             # False for NaN: pressure is optional
-        return learning.FROZEN_VALVE
     if limited or ring[then, credit.ENTRY_VALID] < 0.5:
         return learning.FROZEN_SATURATED
     if abs(error) <= par[at.P_DEAD_ZONE]:
@@ -174,7 +184,8 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
         _start(par, inverse, st, inp)
     change = _update_rate(par, st, inp)
     jumped = _jumped(par, st, inp)
-    if jumped:
+    lags = _valve_lags(par, ring, st, inp)
+    if jumped or lags:
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
     offset = st[at.S_OFFSET]
     error = inp[place.IN_REFERENCE] - offset - inp[place.IN_CONTRACTION]
@@ -216,6 +227,8 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
     # Integral with back-calculation against those limits.
     growth = (par[at.P_INTEGRAL] * error
               + (command - wanted) / par[at.P_ANTI_WINDUP_TIME]) * period
+    if lags:
+        growth = 0.0      # supply, valve or driver hold the pressure back: more would not help
     st[at.S_INTEGRAL] = min(
         max(integral + growth, -par[at.P_INTEGRAL_LIMIT]), par[at.P_INTEGRAL_LIMIT])
 
@@ -227,7 +240,7 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
     else:
         index = index_table(error_scaled, change_scaled, par[at.P_INDEX_LIMIT])
-    reason = _reason(par, ring, st, inp, error, limited)
+    reason = _reason(par, ring, st, inp, error, limited, lags)
     fb_squares = 0.0
     ff_squares = 0.0
     if reason == learning.LEARNING:
