@@ -69,6 +69,9 @@ def _arguments():
         DeclareLaunchArgument(
             'seed', default_value='0', description='Seed of the simulated sensors.'),
         DeclareLaunchArgument(
+            'realtime_priority', default_value='0',
+            description='Real-time priority of the nodes, 1 to 99; 0: none.'),
+        DeclareLaunchArgument(
             'namespace', default_value='muscle', description='Namespace of the rig.'),
     ]
 
@@ -83,7 +86,10 @@ def _node(executable, *parameters, condition=None):
     recorder = IfElseSubstitution(
         LaunchConfiguration('record'),
         ['/', LaunchConfiguration('namespace'), '/', RECORDER], '')
-    common = {'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str)}
+    priority = LaunchConfiguration('realtime_priority')
+    common = {
+        'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str),
+        'realtime_priority': ParameterValue(priority, value_type=int)}
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable,
         namespace=LaunchConfiguration('namespace'), output='screen', condition=condition,

@@ -39,6 +39,7 @@ from pam_actuation.nodes.endpoints import wait_until_matched
 from pam_actuation.nodes.loops import LoopSet
 from pam_actuation.nodes.parameters import declare
 from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import LoopTiming
 from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
@@ -57,6 +58,9 @@ COMMON_PARAMETERS = (
         0.1, 600.0),
     NodeParameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
+    NodeParameter(
+        'realtime_priority', 0, 'Real-time priority of this process (Linux, SCHED_RR); 0: none. '
+        'Without the right to it the node runs as before.', 0, 99),
     NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),
 )
 
@@ -278,6 +282,9 @@ class ManagedNode(LifecycleNode):
         self._await_subscriber()
         gc.collect()
         gc.freeze()                  # what exists now stays: no long collections in the loop
+        refused = ask_for_realtime(self.value('realtime_priority'))
+        if refused:
+            self.get_logger().info(f'no real-time scheduling: {refused}')
         self.start()
         self.diagnostics.silent = False
         self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send)

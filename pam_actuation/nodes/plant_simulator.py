@@ -60,6 +60,7 @@ class PlantSimulator(ManagedNode):
     def start(self):
         """Begin with the clock at the present."""
         self.plant.advance_to(self.now_ns())
+        self._sampled_steps = None
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def diagnostic_values(self):
@@ -80,6 +81,9 @@ class PlantSimulator(ManagedNode):
             self.plant.advance_to(min(signal.stamp_ns, now_ns))
             self.plant.set_signal(signal)
         self.plant.advance_to(now_ns)
+        if self.plant.steps == self._sampled_steps:
+            return              # right after a late tick: there is nothing new to measure
+        self._sampled_steps = self.plant.steps
         for topic, plain in self.plant.sample(now_ns).items():
             self.send(topic, plain)
 

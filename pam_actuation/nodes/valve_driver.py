@@ -17,6 +17,7 @@
 import sys
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS
+from pam_actuation.messages import Pressure
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -51,8 +52,9 @@ class ValveDriver(ManagedNode):
     def setup(self):
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
-        self.loop = DriverLoop(
-            self.value('valve_type'), {p.name: self.value(p.name) for p in DRIVER_PARAMETERS})
+        values = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS}
+        _warm_up(DriverLoop(self.value('valve_type'), values))
+        self.loop = DriverLoop(self.value('valve_type'), values)
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
         self.pressures = self.add_subscription('pressure')
@@ -120,6 +122,15 @@ class ValveDriver(ManagedNode):
         with self.loops.lock:
             response.success, response.message = self.loop.reset()
         return response
+
+
+def _warm_up(loop):
+    """Let a spare driver follow for some periods, so that all code is loaded and compiled."""
+    for k in range(5):
+        now_ns = round(k * loop.period_s * 1e9)
+        loop.on_pressure(Pressure(now_ns, 2e5))
+        loop.on_command(Pressure(now_ns, 3e5), k)
+        loop.tick(now_ns)
 
 
 def main(args=None):

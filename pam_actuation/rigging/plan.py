@@ -26,6 +26,7 @@ from pam_sim.errors import InputError
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
     'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
+REALTIME_PRIORITY = 1        # the lowest; where it is not allowed the nodes run without
 
 
 @dataclass
@@ -50,7 +51,7 @@ class RigPlan:
 
 
 def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learning=True, seed=0,
-              namespace='/muscle', overwrite=False):
+              namespace='/muscle', overwrite=False, realtime=True):
     """
     Load experiment, rig and controller and write them down for the nodes.
 
@@ -74,6 +75,8 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
         Namespace of the rig.
     overwrite : bool
         Replace an existing bag.
+    realtime : bool
+        Ask for real-time scheduling of the nodes.
 
     Raises
     ------
@@ -103,6 +106,9 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     if controller is not None:
         plan.controller_node = f'{controller.kind}_controller'
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
+    if realtime:
+        for parameters in plan.parameters.values():
+            parameters['realtime_priority'] = REALTIME_PRIORITY
     return plan
 
 

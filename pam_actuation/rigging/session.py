@@ -276,7 +276,7 @@ def recorded_counts(bag):
 
 def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valve=None,
                    out_dir=None, *, learning=True, seed=0, domain_id=None, progress=None,
-                   with_recorder=True, namespace='/muscle', overwrite=False):
+                   with_recorder=True, namespace='/muscle', overwrite=False, realtime=True):
     """
     Run one experiment on live nodes and record it.
 
@@ -302,6 +302,9 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         Namespace of the rig.
     overwrite : bool
         Replace an existing bag.
+    realtime : bool
+        Ask for real-time scheduling of the nodes; without the right to it (root, or a limit
+        set for the user) they run as ordinary processes.
 
     Returns
     -------
@@ -322,7 +325,7 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         os.makedirs(os.path.dirname(bag), exist_ok=True)
     plan = make_plan(
         experiment, rig, controller, valve, bag, learning=learning, seed=seed,
-        namespace=namespace, overwrite=overwrite)
+        namespace=namespace, overwrite=overwrite, realtime=realtime)
     result = Result(bag or '')
     try:
         with _termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:

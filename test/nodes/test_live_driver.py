@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Test the live driver with a plant: it follows, it stops, and its last word is the safe signal."""
+"""Test the live driver with a plant: it follows, it stops, its last word is the safe signal."""
 
 import signal
 import threading
