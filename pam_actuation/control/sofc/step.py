@@ -37,7 +37,7 @@ from pam_sim.units import P_ATM_PA
 _STALE_RATE_S = 0.1       # a longer gap between measurements restarts the rate filter
 _START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
 _OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
-_START_TRIM_PA = 3e4      # largest integral taken over at the start
+_START_TRIM_PA = 1e4      # largest integral taken over at the start: what dry friction explains
 _LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
 
 
