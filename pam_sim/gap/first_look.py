@@ -65,7 +65,7 @@ def gap_first_look(run, rig, seconds=20.0, seed=0):
     floor = floors(run, rig, recording, before, seed)
     fit_part = {s: in_fit_part(recording.time_s[s]) for s in recording.signals}
     fit = calibrate(rig, recording, floor, fit_part, seconds)
-    refit = free_run(fit.rig, recording, fit.latency_s)
+    refit = free_run(fit.rig, recording, fit.latency_s, start_error_pa=fit.start_error_pa)
     signals = {}
     for s in recording.signals:
         certify = ~fit_part[s]

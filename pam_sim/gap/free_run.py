@@ -28,7 +28,7 @@ from pam_sim.gap.result import FIELD, SIGNALS
 from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
-START_S = 0.05               # the state at the start is the median of this stretch
+START_S = 0.05               # the state at the start is read from this stretch
 # Feeding a measured pressure: a regulator this fast follows it exactly enough.
 FAST_T_S = 0.001
 FAST_GAIN_PA_PER_V = 200e3   # so that 6 V reach 1.2 MPa gauge
@@ -108,9 +108,20 @@ class Recording:
         return self._valve[0][0].size
 
     def start(self, signal):
-        """Return the value of a signal at the start of the recording."""
-        early = self.time_s[signal] <= self.time_s[signal][0] + START_S
-        return float(np.median(self.measured[signal][early]))
+        """
+        Return the value of a signal at the start of the recording.
+
+        The median of the first 50 ms, or the end of a straight line through them where
+        the signal is already moving.
+        """
+        early = self.time_s[signal] <= START_S
+        seconds, value = self.time_s[signal][early], self.measured[signal][early]
+        if value.size > 4:
+            slope, level = np.polyfit(seconds, value, 1)
+            left = float(np.std(value - level - slope * seconds))
+            if abs(slope) * float(np.std(seconds)) > 2.0 * left:
+                return float(level)
+        return float(np.median(value))
 
     def at_stamps(self, response):
         """Return the response at the measured stamps, by signal name."""
@@ -118,7 +129,7 @@ class Recording:
                 for s in self.signals}
 
 
-def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None):
+def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0):
     """
     Return the model's outputs at the measured stamps, by signal name.
 
@@ -132,10 +143,13 @@ def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None):
         Inputs and stamps.
     delay_s, stamp_shift_s :
         See ``Recording.valve_signal``.
+    start_error_pa : float
+        Added to the recorded pressure at the start; what fills a closed volume keeps
+        the error of its start.
 
     """
     return recording.at_stamps(simulate(
-        rig, recording, recording.valve_signal(delay_s, stamp_shift_s)))
+        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa))
 
 
 def run_from_pressure(rig, recording):
@@ -178,7 +192,7 @@ def pressure_driven(rig):
         'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
 
 
-def simulate(rig, recording, valve_signal):
+def simulate(rig, recording, valve_signal, start_error_pa=0.0):
     """Run the rig on the recording's grid from the recorded start; return its Response."""
     if recording.driven:
         x = np.interp(recording.grid_s, recording.time_s['contraction'],
@@ -186,7 +200,7 @@ def simulate(rig, recording, valve_signal):
         return simulate_driven(rig, recording, x, valve_signal)
     return rig.simulate(
         valve_signal, external_force_n=recording.external_force_n,
-        initial_pressure_pa=max(recording.start('pressure'), P_ATM_PA),
+        initial_pressure_pa=max(recording.start('pressure') + start_error_pa, P_ATM_PA),
         initial_contraction_m=max(recording.start('contraction'), 0.0), dt_s=GRID_S)
 
 

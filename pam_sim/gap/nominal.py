@@ -38,7 +38,7 @@ LATENCY_SD_S = 1e-3
 LATENCY_MAX_S = 3e-3         # more is no latency of a measurement but of the rig
 DIFFERENCE_SD = 0.05         # step of the numerical derivative, in prior deviations
 FIT_RATE_HZ = 200.0
-ROUNDS = 6
+ROUNDS = 5
 REFERENCE_PULL = 3.5         # beyond it a number is wrong rather than inexact
 MAX_PULL = 60.0
 SETTLED = 0.25               # relative change of the weights that ends the rounds
@@ -55,6 +55,8 @@ class Fit:
         The model with the calibrated numbers.
     latency_s : float
         Fitted latency common to all signals.
+    start_error_pa : float
+        Fitted error of the pressure at the start, HSV only.
     numbers : list of Calibrated
         Every number that was free.
     simulations : int
@@ -66,6 +68,7 @@ class Fit:
 
     rig: object
     latency_s: float
+    start_error_pa: float
     numbers: list
     simulations: int
     complete: bool
@@ -86,7 +89,7 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
     chosen : dict of str -> numpy.ndarray of bool
         Which samples of each signal to fit.
     seconds : float
-        Time budget.
+        Time budget [s].
 
     Returns
     -------
@@ -106,7 +109,7 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
         problem.deadline = time.perf_counter() + left
         solution = least_squares(
             problem.residuals, z, jac=problem.jacobian, bounds=problem.bounds,
-            kwargs={'temper': temper}, max_nfev=15, xtol=1e-5, ftol=1e-6, gtol=1e-8)
+            kwargs={'temper': temper}, max_nfev=8, xtol=1e-4, ftol=1e-5, gtol=1e-8)
         z = solution.x
         fresh = problem.tempering(z)
         settled = all(abs(fresh[s] / temper[s] - 1.0) < SETTLED for s in temper)
@@ -119,14 +122,20 @@ def calibrate(rig, recording, floor, chosen, seconds=20.0):
 
 
 class _Problem:
-    """Residuals of normalised numbers z = (value - nominal) / sd; the last one is latency."""
+    """
+    Residuals of normalised numbers z = (value - nominal) / sd.
+
+    Behind the numbers of the rig come the latency and, with the HSV, the error of the
+    start pressure, which a regulator forgets and a closed volume keeps.
+    """
 
     def __init__(self, rig, recording, floor, chosen):
         self.rig, self.recording, self.floor = rig, recording, floor
         self.parameters = uncertain_numbers(rig)
         self.nominal = np.array([p.value for p in self.parameters])
         self.sd = np.array([p.sd for p in self.parameters])
-        self.size = len(self.parameters) + 1
+        self.nuisances = 2 if rig.valve == 'hsv' else 1
+        self.size = len(self.parameters) + self.nuisances
         self.simulations = 0
         self.deadline = np.inf
         self._last = None
@@ -135,24 +144,27 @@ class _Problem:
             every = max(int(round(1.0 / (
                 np.median(np.diff(recording.time_s[signal])) * FIT_RATE_HZ))), 1)
             self.index[signal] = np.flatnonzero(chosen[signal])[::every]
-        low = np.append((np.array([p.lower for p in self.parameters]) - self.nominal) / self.sd,
-                        -LATENCY_PRIOR_S / LATENCY_SD_S)
-        high = np.append((np.array([p.upper for p in self.parameters]) - self.nominal) / self.sd,
-                         (LATENCY_MAX_S - LATENCY_PRIOR_S) / LATENCY_SD_S)
+        low = [(p.lower - p.value) / p.sd for p in self.parameters]
+        high = [(p.upper - p.value) / p.sd for p in self.parameters]
+        low += [-LATENCY_PRIOR_S / LATENCY_SD_S, -MAX_PULL][:self.nuisances]
+        high += [(LATENCY_MAX_S - LATENCY_PRIOR_S) / LATENCY_SD_S, MAX_PULL][:self.nuisances]
         self.bounds = (np.maximum(low, -MAX_PULL), np.minimum(high, MAX_PULL))
 
     def values(self, z):
-        """Return (dict of numbers, latency) of normalised numbers."""
-        numbers = self.nominal + self.sd * z[:-1]
+        """Return (dict of numbers, latency, error of the start) of normalised numbers."""
+        count = len(self.parameters)
+        numbers = self.nominal + self.sd * z[:count]
         return ({p.name: float(v) for p, v in zip(self.parameters, numbers)},
-                LATENCY_PRIOR_S + LATENCY_SD_S * float(z[-1]))
+                LATENCY_PRIOR_S + LATENCY_SD_S * float(z[count]),
+                self.floor['pressure'] * float(z[count + 1]) if self.nuisances > 1 else 0.0)
 
     def errors(self, z):
         """Return simulated minus measured in noise floors, by signal."""
         if self._last is not None and np.array_equal(self._last[0], z):
             return self._last[1]
-        numbers, latency = self.values(z)
-        simulated = free_run(self.rig.with_(parameters=numbers), self.recording, latency)
+        numbers, latency, start = self.values(z)
+        simulated = free_run(self.rig.with_(parameters=numbers), self.recording, latency,
+                             start_error_pa=start)
         self.simulations += 1
         found = {s: (simulated[s][i] - self.recording.measured[s][i]) / self.floor[s]
                  for s, i in self.index.items()}
@@ -192,14 +204,14 @@ class _Problem:
         self.deadline = np.inf
         slope = self.jacobian(z, temper)
         spread = np.sqrt(np.diag(np.linalg.inv(slope.T @ slope)))
-        numbers, latency = self.values(z)
+        numbers, latency, start = self.values(z)
         found = []
         for k, p in enumerate(self.parameters):
             value, half = numbers[p.name], 1.96 * spread[k] * p.sd
             found.append(Calibrated(
                 p.name, p.unit, p.value, value, (value - half, value + half), float(z[k])))
-        return Fit(self.rig.with_(parameters=numbers), latency, found, self.simulations,
-                   complete)
+        return Fit(self.rig.with_(parameters=numbers), latency, start, found,
+                   self.simulations, complete)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,179 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pages: complete, self-contained, small, safe against odd names."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
+from pam_actuation.report import demo_page, figures, page, pages
+from pam_actuation.report.sections.replay import Overlay
+from pam_sim.errors import InputError
+from pam_sim.gap.result import Calibrated, GapResult, Share, SignalGap, Trace
+import pytest
+from tracking_runs import step_run, tracking_run
+
+AMPLITUDES = 2e-3 * 0.7 ** np.arange(5)
+METADATA = {'experiment_name': 'sine <script>alert(1)</script>', 'valve': 'ppr', 'seed': '7',
+            'software_version': '0.0', 'controller': 'kind: sofc'}
+
+
+def markup(path):
+    """Return the page without its scripts, and the figures in it."""
+    content = path.read_text(encoding='utf-8')
+    data = re.findall(r'<script type="application/json">(.*?)</script>', content, re.S)
+    return re.sub(r'<script.*?</script>', '', content, flags=re.S), [json.loads(d) for d in data]
+
+
+def rules():
+    """Return (before, after) rule bases, the second with something learned."""
+    scaling = {'feedback_gain_pa': 6e3, 'error_universe_m': 2e-3,
+               'change_universe_m_per_s': 0.04, 'reference_lower_m': 0.0,
+               'reference_upper_m': 0.03}
+    before = RuleBase(linear_feedback_table(), np.zeros((2, 25)), scaling)
+    after = before.copy()
+    after.feedforward[0] += 5e3
+    after.feedback[1, 3, 3] = 0.7
+    after.feedback_fired += 2.0
+    return before, after
+
+
+def gap():
+    """Return a gap result as the first look makes it."""
+    stamp = np.arange(1000) * 5_000_000
+    value = np.sin(stamp * 1e-9)
+    return GapResult(
+        'unknown', 'The model misses something.',
+        {'contraction': SignalGap('m', 1e-5, 1e-3, 5e-4, 5e-4)},
+        [Share('muscle', 'contraction', 'all', 1.0),
+         Share('muscle', 'contraction', 'contracting', 0.7),
+         Share('muscle', 'contraction', 'extending', 0.3)],
+        calibration=[Calibrated('K_m', 'Pa/V', 1e5, 1.01e5, (1e5, 1.02e5), 0.5)],
+        traces={'contraction': Trace(stamp, value, value, value, value)})
+
+
+def overlay(run):
+    """Return an overlay of the run's contraction."""
+    series = run.topics['contraction']
+    value = series.values['contraction_m']
+    return [Overlay('contraction', series.time_s(series.stamp_ns[0]), value, value + 1e-5)]
+
+
+def test_a_report_is_complete_and_needs_no_network(tmp_path):
+    run = tracking_run(AMPLITUDES, metadata=METADATA)
+    before, after = rules()
+    replay = SimpleNamespace(identical=True, max_abs_difference_pa=0.0, recorded_pa=np.zeros(9))
+    found = pages.experiment_report(
+        [run], tmp_path / 'out' / 'page.html', ['learning'], before, after, overlay(run),
+        [('learning', replay)], gap())
+    html, plots = markup(tmp_path / 'out' / 'page.html')
+    for key in ('metrics', 'cycles', 'signals-0', 'rules', 'overlays', 'replay', 'timing', 'gap',
+                'provenance'):
+        assert f'id="{key}"' in html
+    for title in ('contraction [mm]', 'pressure [kPa gauge]', 'force [N]', 'valve voltage [V]'):
+        assert any(title == axis.get('title', {}).get('text')
+                   for plot in plots for name, axis in plot['layout'].items()
+                   if name.startswith('yaxis') and axis.get('title'))
+    assert not re.search(r'(src|href)\s*=\s*["\']?(https?:)?//', html)
+    assert 'url(' not in html and '@import' not in html
+    assert (tmp_path / 'out' / 'page.html').read_text().count('plotly.js v') == 1
+    assert found['learning']['cycle_rmse_m'][0] > found['learning']['cycle_rmse_m'][-1]
+    assert [p.name for p in (tmp_path / 'out').iterdir()] == ['page.html']
+
+
+def test_text_from_a_bag_cannot_become_markup(tmp_path):
+    run = tracking_run(AMPLITUDES, metadata=METADATA)
+    pages.experiment_report([run], tmp_path / 'page.html', ['</script><b>'])
+    content = (tmp_path / 'page.html').read_text()
+    assert '<script>alert' not in content
+    assert '</script><b>' not in content
+
+
+def test_a_run_with_hardly_any_topics_still_has_a_page(tmp_path):
+    run = step_run()
+    del run.topics['reference']
+    pages.bag_report([run], tmp_path / 'page.html')
+    html, plots = markup(tmp_path / 'page.html')
+    assert 'contraction [mm]' in str(plots)
+    run.topics.clear()
+    pages.bag_report([run], tmp_path / 'empty.html')
+    assert 'holds no signal' in (tmp_path / 'empty.html').read_text()
+
+
+def test_a_report_of_nothing_is_refused(tmp_path):
+    with pytest.raises(InputError, match='at least one'):
+        pages.bag_report([], tmp_path / 'page.html')
+    assert not (tmp_path / 'page.html').exists()
+
+
+def test_runs_of_equal_name_stay_apart(tmp_path):
+    found = pages.bag_report([step_run(), step_run()], tmp_path / 'page.html')
+    assert len(found) == 2
+
+
+def test_the_demo_page_is_small_and_has_the_key_numbers(tmp_path):
+    learning = tracking_run(AMPLITUDES, noise_m=1e-5)
+    frozen = tracking_run([2e-3] * 5, noise_m=1e-5)
+    before, after = rules()
+    parts = [demo_page.DemoPart('PPR', 'One paragraph.',
+                                [('PPR, learning', learning), ('PPR, frozen', frozen)],
+                                before, after, overlay(learning)),
+             demo_page.DemoPart('HSV', 'One paragraph.',
+                                [('HSV, learning', tracking_run(AMPLITUDES, valve='hsv'))])]
+    tuning = {'cost_before_mm': 1.0, 'changed': {'lead_s': {'before': 0.1, 'after': 0.12}},
+              'history': [(10, 1.0), (20, 0.8)]}
+    facts = demo_page.demo_report(tmp_path / 'demo.html', parts, tuning, gap(),
+                                  [('ppr', 'rosbags', 'all read')], ['A note.'])
+    html, plots = markup(tmp_path / 'demo.html')
+    assert (tmp_path / 'demo.html').stat().st_size < 8e6
+    assert {'PPR, learning', 'PPR, frozen', 'HSV, learning'} == set(facts)
+    numbers = re.findall(r'<b>(.*?)</b>', html)
+    assert any('→' in n for n in numbers) and '1.00 mm' in numbers
+    bars = next(p for p in plots if p['data'][0]['type'] == 'bar')
+    assert [trace['name'] for trace in bars['data']] == ['PPR, learning', 'PPR, frozen']
+    assert 'A note.' in html and 'duty' in str(plots) and 'lead_s' in html
+
+
+def test_rule_maps_share_one_colour_scale(tmp_path):
+    before, after = rules()
+    pages.experiment_report([step_run()], tmp_path / 'page.html', None, before, after)
+    _, plots = markup(tmp_path / 'page.html')
+    maps = [t for p in plots for t in p['data'] if t['type'] == 'heatmap']
+    assert len(maps) == 4
+    assert len({(m['zmin'], m['zmax']) for m in maps}) == 1
+    assert maps[0]['zmax'] == pytest.approx(6.0)
+
+
+def test_every_axis_of_a_stack_zooms_with_the_first():
+    line = figures.line([0, 1], [0, 1], 'a', 'measured')
+    layout = figures.stack([('a [m]', [line])] * 3, 'time [s]')['layout']
+    assert layout['xaxis2']['matches'] == layout['xaxis3']['matches'] == 'x'
+    domains = [layout[f'yaxis{k}']['domain'] for k in ('', '2', '3')]
+    assert domains[0][0] > domains[1][1] and domains[1][0] > domains[2][1]
+
+
+def test_signs_of_what_rounds_to_zero():
+    assert page.signed(-0.3) == '0' and page.signed(4.6) == '+5' and page.signed(-4.6) == '-5'
+
+
+def test_a_failed_write_leaves_the_old_page(tmp_path):
+    path = tmp_path / 'page.html'
+    path.write_text('old')
+    with pytest.raises(UnicodeEncodeError):
+        page.write_text(path, 'new \ud800')
+    assert path.read_text() == 'old'
+    assert [p.name for p in tmp_path.iterdir()] == ['page.html']
