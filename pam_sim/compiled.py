@@ -21,6 +21,8 @@ on every division. No fastmath: compiled and interpreted results stay equal.
 
 from numba import njit
 
-compiled = njit(error_model='numpy', nogil=True)
+# Without reference counting: none of these functions makes an array, and counting
+# the ones handed through cost more than the physics.
+compiled = njit(error_model='numpy', nogil=True, _nrt=False)
 # For the few functions on the path of every step: no call is left of them.
-inlined = njit(error_model='numpy', nogil=True, forceinline=True)
+inlined = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)

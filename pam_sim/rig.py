@@ -312,5 +312,5 @@ class Rig:
     def volume_m3(self, contraction_m):
         """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
         thread, turns = geometry.braid()
-        return self.parameters['V_dead'] + geometry.volume_m3(
+        return self.parameters['V_dead'] + geometry.volume_of(
             contraction_m, geometry.LENGTH_M, thread * thread, 1.0 / (4.0 * math.pi * turns ** 2))

@@ -35,10 +35,9 @@ def braid(length_m=LENGTH_M, bore_m=BORE_M, angle_rad=BRAID_ANGLE_RAD):
             length_m * math.tan(angle_rad) / (math.pi * bore_m))
 
 
-@inlined
-def volume_m3(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
+def volume_of(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
     """
-    Return the inner volume [m^3] without dead volume.
+    Return the inner volume [m^3] without dead volume; scalars or arrays.
 
     Parameters
     ----------
@@ -54,3 +53,6 @@ def volume_m3(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
     """
     length = length_m - contraction_m
     return length * (thread_squared_m2 - length * length) * inverse_4_pi_n2
+
+
+volume_m3 = inlined(volume_of)      # for compiled code; scalars only

@@ -25,7 +25,6 @@ import importlib.util
 import inspect
 import os
 from pathlib import Path
-import re
 import sys
 import tempfile
 
@@ -48,35 +47,29 @@ from pam_sim.effects.registry import effects
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.sarosi import tension_n
-from pam_sim.rollout import hooks
 from pam_sim.rollout.layout import *
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
 
 _EFFECTS = effects()
-''' + ''.join(
-    f'plain_{name} = hooks.{name}\n'
-    for name in (*(f'apply_{hook}' for hook in HOOKS), 'pressure_rate_active'))
+'''
 
 _TAIL = '''
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def step(state, par, inp, out):
     """Advance ``state`` by one step and fill ``out`` (see pam_sim.rollout.layout)."""
-    if par[PAR_ANY_EFFECT] == 0.0:
-        plain_step_body(state, par, inp, out)
-    else:
-        step_body(state, par, inp, out)
+    step_body(state, par, inp, out)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def look(state, par, inp, out):
     """Fill ``out`` from ``state`` without a step."""
     observe(state, par, inp, out)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def settle(state, par):
     """Make the dependent states agree with pressure and contraction before the first step."""
     p = state[S_PRESSURE]
@@ -161,11 +154,7 @@ def kernel_source():
     """Return the source text of the kernel module."""
     template = (Path(__file__).parent / 'step_template.py').read_text(encoding='utf-8')
     body = template[template.index(_MARK):].split('\n', 1)[1].rstrip('\n') + '\n'
-    # A copy without any hook for rigs without effects: same operations, same bits, faster.
-    names = re.findall(r'^def (\w+)\(', body, re.MULTILINE)
-    names += [f'apply_{hook}' for hook in HOOKS] + ['pressure_rate_active']
-    plain = re.sub(rf'\b({"|".join(names)})\b', r'plain_\1', body)
-    return _HEAD + _dispatchers() + body + plain + _TAIL
+    return _HEAD + _dispatchers() + body + _TAIL
 
 
 def kernel_hash():

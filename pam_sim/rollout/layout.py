@@ -89,8 +89,7 @@ PAR_PWM_PERIOD = 22         # s
 PAR_INVERSE_LENGTH = 23     # 1/m
 PAR_INVERSE_MASS = 24       # 1/kg
 PAR_INVERSE_RT = 25         # kg/J
-PAR_ANY_EFFECT = 26         # 1: some effect acts
-PAR_BASE = 27
+PAR_BASE = 26
 
 VALVE_PPR = 0
 VALVE_HSV_AVERAGED = 1

@@ -53,14 +53,14 @@ def test_zero_amplitude_changes_no_bit(rig, name, valve):
     rig = rig.with_(valve=valve)
     zero = with_effect(rig, name, **{key: 0.0 for key in effects()[name].amplitude})
     assert np.array_equal(run(zero).outputs, run(rig).outputs)
-    # Nor beside another effect, where the kernel with hooks runs.
+    # Nor beside another effect.
     other = {'name': 'hysteresis' if name != 'hysteresis' else 'creep'}
     both = rig.with_(effects=[other, zero.effects[0]])
     assert np.array_equal(run(both).outputs, run(rig.with_(effects=[other])).outputs)
 
 
-def test_the_kernel_with_hooks_gives_the_same_bits(rig):
-    """A vanishing effect that is switched on selects the other copy of the kernel."""
+def test_a_vanishing_effect_changes_no_bit(rig):
+    """An effect that is switched on but vanishes leaves every other operation alone."""
     tiny = with_effect(rig, 'valve_dead_zone', open_time_s=1e-3)       # does nothing on a PPR
     on = with_effect(rig, 'threshold_pressure', pressure_pa=1e-300)
     assert np.array_equal(run(tiny).outputs, run(rig).outputs)
