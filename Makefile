@@ -60,4 +60,6 @@ $(STAMP): setup.py pyproject.toml
 	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' \
 	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
 	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
+	'$(BIN)/python' -m pam_actuation.warm_up \
+	|| echo 'Not compiled ahead: the first run takes longer.' >&2; \
 	touch '$@'

@@ -205,3 +205,9 @@ def test_live_verbs_without_ros_say_what_to_install(tmp_path):
     assert done.returncode == 2, done.stderr
     assert '[ros]' in done.stderr and 'Traceback' not in done.stderr
     assert not (tmp_path / 'never').exists()
+
+
+@pytest.mark.slow
+def test_everything_can_be_compiled_ahead():
+    from pam_actuation.warm_up import warm_up
+    warm_up()
