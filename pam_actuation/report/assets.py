@@ -50,7 +50,8 @@ section { background: var(--card); border: 1px solid var(--rule); border-radius:
 table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); text-align: right;
   vertical-align: top; }
-th:first-child, td:first-child { text-align: left; } thead th { color: var(--soft); font-weight: 600; }
+th:first-child, td:first-child { text-align: left; }
+thead th { color: var(--soft); font-weight: 600; }
 table.facts td { text-align: left; overflow-wrap: anywhere; } table.facts td:first-child {
   color: var(--soft); white-space: nowrap; }
 td.text, th.text { text-align: left; }
@@ -95,16 +96,20 @@ SCRIPT = """
     }
     return value;
   }
-  function css(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+  function css(name) {
+    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  }
   function draw(node) {
     if (!window.Plotly) { return; }
     var source = node.querySelector('script');
     if (source) { node.figure = JSON.parse(source.textContent); }
     var figure = paint(node.figure), layout = figure.layout;
     layout.paper_bgcolor = layout.plot_bgcolor = 'rgba(0,0,0,0)';
-    layout.font = { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: css('--text') };
+    layout.font = { family: getComputedStyle(document.body).fontFamily, size: 12.5,
+      color: css('--text') };
     layout.dragmode = 'zoom';
-    layout.hoverlabel = { bgcolor: css('--card'), bordercolor: css('--rule'), font: { color: css('--text') } };
+    layout.hoverlabel = { bgcolor: css('--card'), bordercolor: css('--rule'),
+      font: { color: css('--text') } };
     Object.keys(layout).forEach(function (key) {
       if (/^[xy]axis/.test(key)) {
         var axis = layout[key];
@@ -115,7 +120,8 @@ SCRIPT = """
       if (/^legend/.test(key)) { layout[key].bgcolor = 'rgba(0,0,0,0)'; }
     });
     if (source) { node.removeChild(source); }
-    layout.modebar = { bgcolor: 'rgba(0,0,0,0)', color: css('--soft'), activecolor: css('--accent') };
+    layout.modebar = { bgcolor: 'rgba(0,0,0,0)', color: css('--soft'),
+      activecolor: css('--accent') };
     Plotly.react(node, figure.data, layout, { responsive: true, displaylogo: false,
       displayModeBar: 'hover', modeBarButtons: [['zoom2d', 'pan2d', 'resetScale2d', 'toImage']] });
     node.drawn = true;

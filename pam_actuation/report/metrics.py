@@ -266,6 +266,8 @@ def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
         Absolute pressure and contraction at the same instants.
     volume_m3 : callable
         Volume of muscle and fittings at a contraction [m].
+    temperature_k : float
+        Of the air.
 
     """
     mass = np.asarray(pressure_pa) * volume_m3(np.asarray(contraction_m)) / (

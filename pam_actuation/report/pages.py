@@ -14,6 +14,7 @@
 
 """The page about one experiment or several runs of it."""
 
+import numpy as np
 from pam_actuation.report.metrics import run_metrics
 from pam_actuation.report.page import render, signed, write_text
 from pam_actuation.report.sections.cycles import cycles
@@ -24,7 +25,9 @@ from pam_actuation.report.sections.replay import controller_replays, overlays
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
+from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.muscle.geometry import LENGTH_M
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
@@ -35,11 +38,13 @@ def muscle_volume(run):
     content = (run.metadata or {}).get('rig')
     if not content:
         return None
-    from pam_sim import load_rig
     try:
-        return load_rig(content).volume_m3
-    except (InputError, AttributeError):
+        rig = load_rig(content)
+    except InputError:
         return None
+    x = np.linspace(0.0, 0.25 * LENGTH_M, 301)
+    volume = np.array([rig.volume_m3(float(value)) for value in x])
+    return lambda contraction_m: np.interp(contraction_m, x, volume)
 
 
 def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,

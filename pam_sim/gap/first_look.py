@@ -17,12 +17,11 @@
 import time
 
 import numpy as np
-
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
-from pam_sim.gap.nominal import calibrate, LATENCY_MAX_S, REFERENCE_PULL
 from pam_sim.gap.noise import noise_floor, STAMP_SD_S
+from pam_sim.gap.nominal import calibrate, LATENCY_MAX_S, REFERENCE_PULL
 from pam_sim.gap.result import GapResult, READABLE, SignalGap, Trace, UNIT
 
 BLOCK_S = 2.0

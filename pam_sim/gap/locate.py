@@ -23,11 +23,10 @@ no knowledge of what is missing.
 """
 
 import numpy as np
-from scipy.signal import savgol_filter
-
 from pam_sim.gap.free_run import GRID_S, pressure_driven, run_from_pressure, simulate_driven
 from pam_sim.gap.result import Share
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from scipy.signal import savgol_filter
 
 SMOOTH_S = 0.1               # window of the derivatives of measured contraction
 MOVING_M_PER_S = 1e-3

@@ -27,11 +27,10 @@ from dataclasses import dataclass
 import time
 
 import numpy as np
-from scipy.optimize import least_squares
-
 from pam_sim.gap.free_run import free_run
 from pam_sim.gap.result import Calibrated
 from pam_sim.valve import hsv, ppr
+from scipy.optimize import least_squares
 
 LATENCY_PRIOR_S = 1e-3       # up to 2 ms is normal: mean and standard deviation 1 ms
 LATENCY_SD_S = 1e-3

@@ -16,7 +16,7 @@
 
 import json
 
-from gap_runs import nominal, NOMINAL, recorded, voltages
+from gap_runs import NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
