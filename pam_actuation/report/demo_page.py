@@ -160,6 +160,11 @@ def cycle_sentence(named):
             first, last = m.cycle_rmse_m[0] * 1e3, m.cycle_rmse_m[-1] * 1e3
             parts.append(f'{title}: {first:.2f} mm in the first cycle, {last:.2f} mm in the '
                          f'last ({signed(100 * (last / first - 1))} %)')
+    vented = [title for title, m in named if m.interruptions and m.interruptions[0]]
+    if parts and vented:
+        return '; '.join(parts) + (
+            f'. The safe command interrupted {" and ".join(vented)}, because measurements came '
+            'too late; its cycles are worse for it.')
     return '; '.join(parts) + '.' if parts else ''
 
 

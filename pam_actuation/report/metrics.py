@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
@@ -70,6 +71,7 @@ class RunMetrics:
     saturation_high: float | None
     air_use_kg: float | None
     timing: tuple
+    interruptions: tuple | None = None
 
 
 def rmse(error):
@@ -239,6 +241,25 @@ def saturation_share(run, high_v=6.0):
     return float(np.mean(volts[1] <= 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
 
 
+def interruptions(run):
+    """
+    Return (count, seconds) of stretches in which the controller vented for want of input.
+
+    Read from ``input_reason`` of ``controller_state`` between the first and the last tick
+    with good input; None if that was not recorded.
+    """
+    reason = signals.series(run, 'controller_state', 'input_reason')
+    if reason is None:
+        return None
+    time_s, vented = reason[0], ~np.isin(reason[1], RUNNING)
+    good = np.flatnonzero(~vented)
+    if not good.size:
+        return None
+    time_s, vented = time_s[good[0]:good[-1] + 1], vented[good[0]:good[-1] + 1]
+    begins = np.flatnonzero(vented & ~np.roll(vented, 1))
+    return int(begins.size), float(np.sum(np.diff(time_s)[vented[:-1]]))
+
+
 def loop_timing(run, topic):
     """Return the LoopTiming of a topic's header stamps, or None with under 3 messages."""
     stamps = signals.stamps_s(run, topic)
@@ -318,4 +339,5 @@ def run_metrics(run, cycles=None, volume_m3=None):
             run, cycles[1], cycles[0], cycles[2]),
         steps=step_responses(run),
         saturation_low=saturation[0], saturation_high=saturation[1],
-        air_use_kg=used, timing=tuple(t for t in timing if t is not None))
+        air_use_kg=used, timing=tuple(t for t in timing if t is not None),
+        interruptions=interruptions(run))

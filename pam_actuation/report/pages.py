@@ -140,6 +140,7 @@ def summary(m):
             'max_error_m': m.max_error_m,
             'cycle_rmse_m': [float(v) for v in m.cycle_rmse_m],
             'settling_s': [s.settling_s for s in m.steps],
+            'interruptions': m.interruptions and m.interruptions[0],
             'saturation_high': m.saturation_high, 'air_use_kg': m.air_use_kg,
             'loop_period_s': {t.topic: t.median_s for t in m.timing},
             'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}

@@ -17,6 +17,7 @@
 import numpy as np
 from pam_actuation.report import metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+from pam_sim.run import Series
 import pytest
 
 from tracking_runs import step_run, tracking_run
@@ -108,6 +109,22 @@ def test_loop_timing_counts_late_ticks():
     assert timing.median_s == pytest.approx(0.005)
     assert timing.max_s == pytest.approx(0.025)
     assert timing.late_share == pytest.approx(1.0 / (stamp.size - 1))
+
+
+def test_interruptions_count_between_good_ticks_only():
+    run = tracking_run(AMPLITUDES)
+    assert metrics.interruptions(run) is None
+    stamp = run.topics['pressure_command'].stamp_ns
+    reason = np.zeros(stamp.size)
+    reason[:50] = 1.0            # before the first measurement: no interruption
+    reason[500:520] = 2.0
+    reason[900:901] = 4.0
+    reason[1000:1100] = 8.0      # holding the last reference: running
+    reason[-30:] = 7.0           # the end of the experiment
+    run.topics['controller_state'] = Series(stamp, {'input_reason': reason})
+    count, seconds = metrics.interruptions(run)
+    assert count == 2
+    assert seconds == pytest.approx(0.105)
 
 
 def test_air_use_counts_fillings_and_not_noise():

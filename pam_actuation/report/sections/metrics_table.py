@@ -46,6 +46,7 @@ def metrics(named, key='metrics', title='Figures of merit'):
                                    for _, m in named)),
         ('Valve at its upper limit', [_percent(m.saturation_high) for _, m in named]),
         ('Valve at its lower limit', [_percent(m.saturation_low) for _, m in named]),
+        ('Vented for missing or old input', [_interrupted(m) for _, m in named]),
         ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
     ]
     rows = [[name, *cells] for name, cells in rows if any(c is not None for c in cells)]
@@ -81,6 +82,13 @@ def _settling(m):
         return None
     return ', '.join('not settled' if s.settling_s is None else f'{s.settling_s:.2f} s'
                      for s in m.steps)
+
+
+def _interrupted(m):
+    if m.interruptions is None:
+        return None
+    count, seconds = m.interruptions
+    return 'never' if not count else f'{count} times, {seconds:.2f} s in all'
 
 
 def _air(value):
