@@ -93,34 +93,57 @@ class RigClient:
                 return
             self._executor.spin_once(timeout_sec=left_s)
 
-    def change_state(self, full_name, transition, timeout_s, alive=lambda: True):
+    def change_states(self, full_names, transition, timeout_s, alive=lambda name: True):
         """
-        Ask a node for a transition and wait for the answer.
+        Ask nodes for a transition at the same time and wait for the answers.
+
+        Parameters
+        ----------
+        full_names : iterable of str
+            Full names of the nodes.
+        transition : str
+            A key of ``TRANSITIONS``.
+        timeout_s : float
+            Longest wait [s].
+        alive : callable
+            Tells of a full name whether it is worth waiting for.
 
         Returns
         -------
-        bool
-            Whether it was made; False also if ``alive()`` turned false or time ran out.
+        list of str
+            Full names of the nodes that did not make it.
 
         """
+        deadline = time.monotonic() + timeout_s
+        waiting = {name: None for name in full_names}
+        refused = []
+        while waiting and time.monotonic() < deadline:
+            for name, future in list(waiting.items()):
+                if future is None:
+                    waiting[name] = self._request(name, transition)
+                elif future.done():
+                    del waiting[name]
+                    if not future.result().success:
+                        refused.append(name)
+                    continue
+                if not alive(name):
+                    del waiting[name]
+                    refused.append(name)
+            if waiting:
+                self._executor.spin_once(timeout_sec=0.02)
+        return refused + list(waiting)
+
+    def _request(self, full_name, transition):
+        """Return the future of a request, None while the node offers no service yet."""
         client = self._clients.get(full_name)
         if client is None:
             client = self._clients[full_name] = self.node.create_client(
                 ChangeState, f'{full_name}/change_state')
-        deadline = time.monotonic() + timeout_s
-        while not client.service_is_ready():
-            if time.monotonic() > deadline or not alive():
-                return False
-            self.spin(0.02)
+        if not client.service_is_ready():
+            return None
         request = ChangeState.Request()
         request.transition.id = TRANSITIONS[transition]
-        future = client.call_async(request)
-        while not future.done():
-            if time.monotonic() > deadline or not alive():
-                future.cancel()
-                return False
-            self._executor.spin_once(timeout_sec=0.05)
-        return bool(future.result().success)
+        return client.call_async(request)
 
     def published(self):
         """Return full topic name to messages published, by the last status of every node."""

@@ -117,6 +117,7 @@ class RigSession:
         self.domain_id = self._lock.domain_id
         self.client = None
         self._cpu = {}
+        self._active = set()
         self._active_since = None
         self.ended_at = None
 
@@ -147,23 +148,26 @@ class RigSession:
                 name, self.namespace, parameters, environment, self.plan.folder)
         # Only now: a process with the threads of the middleware does not fork safely.
         self.client = self._new_client(self.domain_id)
+        self.change(self.processes, 'configure', START_TIMEOUT_S)
         for name in self.processes:
-            self.change(name, 'configure', START_TIMEOUT_S)
-        for name in self.processes:
-            self.change(name, 'activate', TRANSITION_TIMEOUT_S)
+            self.change([name], 'activate')
+            self._active.add(name)
         self._active_since = time.monotonic()
         self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
 
-    def change(self, name, transition, timeout_s=TRANSITION_TIMEOUT_S):
-        """Ask a node for a transition; SessionFailed if it is not made."""
-        process = self.processes[name]
-        if self.client.change_state(
-                process.full_name, transition, timeout_s, lambda: process.running):
-            return
-        if not process.running:
-            raise SessionFailed(process.how_it_ended())
-        last = process.last_line()
-        raise SessionFailed(f'{name} did not {transition}' + (f': {last}' if last else ''))
+    def change(self, names, transition, timeout_s=TRANSITION_TIMEOUT_S):
+        """Ask nodes for a transition at the same time; SessionFailed if one does not make it."""
+        processes = {self.processes[name].full_name: self.processes[name] for name in names}
+        refused = self.client.change_states(
+            processes, transition, timeout_s, lambda full_name: processes[full_name].running)
+        # A node that ended explains more than one that only did not answer.
+        for full_name in sorted(refused, key=lambda name: processes[name].running):
+            process = processes[full_name]
+            if not process.running:
+                raise SessionFailed(process.how_it_ended())
+            last = process.last_line()
+            raise SessionFailed(
+                f'{process.name} did not {transition}' + (f': {last}' if last else ''))
 
     def run(self, progress=None):
         """
@@ -223,7 +227,8 @@ class RigSession:
         if self.client is None:
             return problems
         problems += self._deactivate([REFERENCE, self.plan.controller_node, DRIVER])
-        self.client.spin(VENT_S)
+        if DRIVER in self._active:
+            self.client.spin(VENT_S)
         problems += self._deactivate([PLANT])
         problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
         self.client.spin(0.1)
@@ -233,9 +238,9 @@ class RigSession:
     def _deactivate(self, names, timeout_s=TRANSITION_TIMEOUT_S):
         problems = []
         for name in names:
-            if name in self.processes and self.processes[name].running:
+            if name in self._active and self.processes[name].running:
                 try:
-                    self.change(name, 'deactivate', timeout_s)
+                    self.change([name], 'deactivate', timeout_s)
                 except SessionFailed as error:
                     problems.append(str(error))
         return problems

@@ -113,6 +113,17 @@ def test_the_user_may_stop_it(tmp_path):
     assert load_run(result.bag).topics['valve_signal'].values['ppr_voltage'][-1] == 0.0
 
 
+def test_without_recorder_and_stopped_during_the_start(tmp_path, monkeypatch):
+    def stop(self, name, transition, *_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session.RigSession, 'change', stop)
+    result = session.run_experiment(PRESSURE, with_recorder=False)
+    assert result.failure == 'stopped by the user' and result.bag == ''
+    assert set(result.exit_codes) == {'plant_simulator', 'valve_driver', 'reference_generator'}
+    assert None not in result.exit_codes.values()
+
+
 def test_mistakes_are_told_before_anything_starts(tmp_path):
     with pytest.raises(InputError, match='dmsp_99'):
         session.run_experiment(SHORT, 'dmsp_99', out_dir=tmp_path / 'bag')
