@@ -16,6 +16,7 @@
 
 import math
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.errors import InputError
@@ -40,7 +41,7 @@ def _pack(values, numbers):
 
 def _initial(values, numbers):
     signal = tuple(numbers.signal) + (0.0, 0.0)
-    return (0.0,) + (float(signal[0]),) * SLOTS + (float(signal[1]),) * SLOTS
+    return np.repeat([0.0, signal[0], signal[1]], (1, SLOTS, SLOTS))
 
 
 EFFECT = Effect(
