@@ -22,6 +22,7 @@ from pathlib import Path
 import tempfile
 
 from pam_actuation.report.assets import CSS, SCRIPT
+from pam_sim.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,11 @@ def render(title, lead, sections, numbers=(), footer=''):
 
 def plotly_script():
     """Return plotly's bundled JavaScript, licence comment included."""
-    from plotly.offline import get_plotlyjs
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise InputError(
+            'a page needs the Python package plotly: pip install "plotly>=5.15"') from error
     return get_plotlyjs().replace('</script', '<\\/script')
 
 
