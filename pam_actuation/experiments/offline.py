@@ -27,6 +27,7 @@ from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.messages import Status
@@ -107,7 +108,7 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
     """Call every loop at its rate, in order of time, until the experiment is over."""
     plant = PlantLoop(rig, seed=seed)
     reference = ReferenceLoop(experiment)
-    driver = DriverLoop(rig.valve)
+    driver = DriverLoop(rig.valve, driver_config(rig))
     control = None
     if experiment.domain == 'contraction':
         control = ControllerLoop(controller)

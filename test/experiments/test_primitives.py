@@ -101,7 +101,7 @@ def test_named_experiments_load_and_round_trip(name):
 
 def test_sine_experiment_states_its_cycles():
     start, period, count = load_experiment('sine_quarter_hz').cycles
-    assert (start, period, count) == (3.0, 4.0, 10)
+    assert (start, period, count) == (6.0, 4.0, 10)
 
 
 def test_experiment_is_continuous_but_for_steps():

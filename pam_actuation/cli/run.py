@@ -1,0 +1,73 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam run``: an experiment on live nodes, recorded."""
+
+import os
+import time
+
+from pam_actuation.cli.common import (
+    add_controller_options, add_rig_options, default_controller, emit, EXIT_DONE, EXIT_FINDING,
+    progress)
+
+HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
+EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('experiment', help='experiment name or YAML file')
+    add_rig_options(parser)
+    add_controller_options(parser)
+    parser.add_argument('--out', default=None, metavar='DIR',
+                        help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
+    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+                        help='ROS domain (default: a free one, this machine only)')
+    parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
+
+
+def run(args):
+    """Run, then say what was recorded; exit code 1 if it did not end as planned."""
+    from pam_actuation.control.config import load_controller
+    from pam_actuation.experiments import load_experiment
+    from pam_actuation.rigging.session import run_experiment
+    from pam_sim import load_rig
+    experiment = load_experiment(args.experiment)
+    rig = load_rig(args.rig, valve=args.valve)
+    controller = None
+    if experiment.domain == 'contraction':
+        controller = load_controller(
+            default_controller(args, rig.valve), rig, rules_file=args.rules)
+    out = args.out or os.path.join(
+        'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
+    with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
+        result = run_experiment(
+            experiment, rig, controller, rig.valve, out, learning=not args.freeze,
+            seed=args.seed, domain_id=args.domain_id, namespace=args.namespace,
+            overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n))
+    published, recorded = sum(result.published.values()), sum(result.recorded.values())
+    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {published} messages '
+             f'published, {recorded} recorded', f'bag: {result.bag}']
+    if result.failure:
+        lines.append(f'not completed: {result.failure}')
+    lines += [f'finding: {text}' for text in result.findings]
+    lines.append(f'next: pam report {result.bag}')
+    emit(args, {
+        'bag': result.bag, 'complete': result.complete, 'failure': result.failure,
+        'findings': result.findings, 'published': result.published,
+        'recorded': result.recorded, 'exit_codes': result.exit_codes,
+        'cpu_share': result.cpu_share}, '\n'.join(lines))
+    return EXIT_DONE if result.complete and not result.findings else EXIT_FINDING

@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Step the recorded rig's model on the recorded valve signal and compare the signals."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.gap.free_run import free_run, Recording
+from pam_sim.gap.health import check_health
+
+# What people read of a difference: factor, unit, digits.
+SHOWN = {'pressure': (1e-3, 'kPa', 2), 'contraction': (1e3, 'mm', 3), 'force': (1.0, 'N', 2)}
+
+
+@dataclass(frozen=True)
+class PlantReplay:
+    """
+    Recorded and simulated signals at the recorded stamps.
+
+    ``time_s``, ``recorded`` and ``simulated`` map signal name to arrays of equal length, SI.
+    """
+
+    rig: str
+    time_s: dict
+    recorded: dict
+    simulated: dict
+
+    def rmse(self, signal):
+        """Return the RMS difference of one signal, SI."""
+        return float(np.sqrt(np.mean((self.recorded[signal] - self.simulated[signal]) ** 2)))
+
+    def to_dict(self):
+        """Return plain data for ``--json``."""
+        return {'rig': self.rig, 'rmse': {s: self.rmse(s) for s in self.recorded}}
+
+    def lines(self):
+        """Return one line a signal, for people."""
+        out = [f'plant: {self.rig} on the recorded valve signal, RMS difference from recorded']
+        for signal in self.recorded:
+            factor, unit, digits = SHOWN[signal]
+            spread = float(np.ptp(self.recorded[signal]))
+            out.append(f'  {signal}: {factor * self.rmse(signal):.{digits}f} {unit} '
+                       f'(range recorded {factor * spread:.{digits}f} {unit})')
+        return out
+
+    def arrays(self):
+        """Return all arrays by name, for saving."""
+        out = {}
+        for signal in self.recorded:
+            out[f'{signal}_time_s'] = self.time_s[signal]
+            out[f'{signal}_recorded'] = self.recorded[signal]
+            out[f'{signal}_simulated'] = self.simulated[signal]
+        return out
+
+
+def replay_plant(run):
+    """
+    Run the model named in a recording's metadata on its valve signal.
+
+    Raises
+    ------
+    InputError
+        The recording does not say which rig it is, or cannot be used; says why.
+
+    """
+    text = run.metadata.get('rig')
+    if not text:
+        raise InputError('the recording does not say which rig it is', str(run.path))
+    rig = load_rig(text)
+    health = check_health(run, rig.valve)
+    if not health.usable:
+        raise InputError('; '.join(health.problems), str(run.path))
+    recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
+    simulated = free_run(rig, recording)
+    return PlantReplay(
+        rig.name, {s: recording.time_s[s] for s in recording.signals},
+        {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated)
