@@ -15,6 +15,7 @@
 """Test all nodes together, each started as ``ros2 run`` does: topics, services, a kill."""
 
 import signal
+import statistics
 import time
 
 import pytest
@@ -32,11 +33,11 @@ from std_srvs.srv import SetBool, Trigger                                   # no
 pytestmark = pytest.mark.ros
 
 NODES = ('plant_simulator', 'valve_driver', 'sofc_controller', 'reference_generator')
-# topic: lowest and highest rate [Hz] that is right, on a busy machine too
+# topic: lowest and highest rate [Hz] that is right
 RATES = {
-    'pressure': (200, 260), 'contraction': (200, 260), 'force': (200, 260),
-    'valve_signal': (100, 420), 'pressure_command': (160, 210), 'controller_state': (160, 210),
-    'reference': (90, 105), 'reference_trajectory': (5, 12)}
+    'pressure': (200, 300), 'contraction': (200, 300), 'force': (200, 300),
+    'valve_signal': (100, 1000), 'pressure_command': (180, 220), 'controller_state': (180, 220),
+    'reference': (90, 110), 'reference_trajectory': (5, 12)}
 
 
 @pytest.fixture(scope='module')
@@ -59,12 +60,12 @@ def rig(tmp_path_factory, rules_file):
 
 
 def test_every_topic_comes_at_its_rate(rig):
-    begin_s = time.monotonic() + 0.2
-    time.sleep(3.2)
-    end_s = begin_s + 3.0
-    rates = {
-        topic: sum(begin_s <= heard.time_s < end_s for heard in rig.heard[topic]) / 3.0
-        for topic in RATES}
+    time.sleep(3.0)
+    rates = {}
+    for topic in RATES:
+        stamps = [heard.plain.stamp_ns for heard in rig.heard[topic]]
+        # The median: a moment without the processor is not a wrong rate.
+        rates[topic] = 1e9 / statistics.median(b - a for a, b in zip(stamps, stamps[1:]))
     wrong = {topic: rate for topic, rate in rates.items()
              if not RATES[topic][0] <= rate <= RATES[topic][1]}
     assert not wrong
