@@ -25,6 +25,7 @@ Ctrl-C and when a node dies.
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
+import re
 import signal
 import threading
 import time
@@ -42,6 +43,7 @@ VENT_S = 0.6                  # after the end, so that the recording shows the v
 OVERDUE_S = 5.0               # the reference may finish this much late
 FINISHED = 'finished'
 LEVEL_ERROR = 2
+NAMESPACE = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 class SessionFailed(Exception):
@@ -322,6 +324,11 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
 
     """
+    namespace = '/' + namespace.strip('/')
+    if not NAMESPACE.fullmatch(namespace):
+        raise InputError(
+            f'{namespace!r} is not allowed, it must be names of letters, digits and _ '
+            'joined by /', 'namespace')
     bag = None
     if with_recorder:
         if out_dir is None:

@@ -69,12 +69,14 @@ def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
 
 
 def test_pressure_experiments_need_no_controller(tmp_path):
-    result = session.run_experiment(PRESSURE, valve='hsv', out_dir=tmp_path / 'bag')
+    result = session.run_experiment(
+        PRESSURE, valve='hsv', out_dir=tmp_path / 'bag', namespace='left_knee/flexor')
     assert result.complete, result
     assert 'sofc_controller' not in result.exit_codes
     run = load_run(result.bag)
     assert run.topics['pressure'].values['pressure_pa'].max() > 280e3
     assert 'supply_pressure' in run.topics
+    assert result.recorded['/left_knee/flexor/valve_signal'] > 50
 
 
 def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(tmp_path):
@@ -130,6 +132,8 @@ def test_mistakes_are_told_before_anything_starts(tmp_path):
     (tmp_path / 'bag').mkdir()
     with pytest.raises(InputError, match='exists'):
         session.run_experiment(SHORT, out_dir=tmp_path / 'bag')
+    with pytest.raises(InputError, match='namespace'):
+        session.run_experiment(SHORT, out_dir=tmp_path / 'other', namespace='/left knee')
     with pytest.raises(InputError, match='domain id'):
         DomainLock(999)
 
