@@ -90,7 +90,7 @@ setup(
     python_requires='>=3.11,<3.13',
     install_requires=RUN_REQUIRES,
     extras_require={'ros': ROS_REQUIRES, 'test': TEST_REQUIRES},
-    zip_safe=True,
+    zip_safe=False,
     maintainer='pam_actuation developers',
     maintainer_email='pam_actuation@example.org',
     description='Control, simulation and model correction of pneumatic artificial muscles',

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 import os
 import time
 
+import joblib
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
@@ -155,17 +156,19 @@ class Demo:
 
     def _check(self, progress):
         """Open every bag with readers this project did not write, and count."""
-        for k, (name, bag) in enumerate(self.result.bags.items()):
+        bags = self.result.bags
+        read_by_others = joblib.Parallel(n_jobs=2)(
+            joblib.delayed(independent_readers)(bag) for bag in bags.values())
+        for (name, bag), readers in zip(bags.items(), read_by_others):
             info = bag_info(bag)
             counts = {topic.name: topic.count for topic in info.topics}
             self._checks.append([name, 'published = recorded', 'yes' if info.complete else 'no'])
-            for reader, read in independent_readers(bag).items():
+            for reader, read in readers.items():
                 same = read == counts
                 self._checks.append([name, f'decoded by {reader}', (
                     f'{sum(read.values())} messages' if same else 'counts differ')])
                 if not same:
                     self.result.findings.append(f'{name}: {reader} reads other counts')
-            progress((k + 1) / len(self.result.bags))
 
     def _replay(self, progress):
         """Replay every recorded controller."""

@@ -78,3 +78,10 @@ def add_controller_options(parser):
 def default_controller(args, valve):
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'
+
+
+def add_recover_option(parser):
+    """Add the option that reads what a broken-off recording still holds."""
+    parser.add_argument(
+        '--recover', action='store_true',
+        help='of a recording that broke off, read the messages that are whole')

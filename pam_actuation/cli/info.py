@@ -14,7 +14,7 @@
 
 """``pam info``: what is in a bag, and whether it can be trusted."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
 
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
@@ -23,11 +23,12 @@ EXAMPLE = 'pam info runs/first'
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', help='bag directory, or a lone .mcap file')
+    add_recover_option(parser)
 
 
 def run(args):
     """Print the facts; exit code 1 where messages were lost or remarks were made."""
     from pam_actuation.bags.info import bag_info, render_text
-    info = bag_info(args.bag)
+    info = bag_info(args.bag, recover=args.recover)
     emit(args, info.to_dict(), render_text(info))
     return EXIT_FINDING if info.has_findings else EXIT_DONE

@@ -41,7 +41,7 @@ def build_parser():
         sub.add_argument(
             '--json', action='store_true', help='print the result as JSON, for programs')
         module.add_arguments(sub)
-        sub.set_defaults(run=module.run)
+        sub.set_defaults(call=module.run)
     return parser
 
 
@@ -59,7 +59,7 @@ def main(argv=None):
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     args = build_parser().parse_args(argv)
     try:
-        return args.run(args)
+        return args.call(args)
     except InputError as mistake:
         print(f'pam {args.verb}: {mistake}', file=sys.stderr)
         return EXIT_BAD_INPUT

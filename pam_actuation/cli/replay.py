@@ -14,7 +14,7 @@
 
 """``pam replay``: step controller and plant offline on what was recorded."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
 
 HELP = 'Step controller and plant offline on the recorded inputs and compare with the recording.'
 EXAMPLE = 'pam replay runs/first'
@@ -29,13 +29,15 @@ def add_arguments(parser):
         help='another controller YAML: what would this tuning have commanded')
     parser.add_argument(
         '--out', default=None, metavar='FILE', help='write the replayed signals as an .npz file')
+    add_recover_option(parser)
 
 
 def run(args):
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.replay.compare import replay_run
-    result = replay_run(load_run(args.bag, namespace=args.namespace), controller=args.controller)
+    recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
+    result = replay_run(recorded, controller=args.controller)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

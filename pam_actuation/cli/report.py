@@ -16,7 +16,7 @@
 
 import os
 
-from pam_actuation.cli.common import emit, EXIT_DONE
+from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
 EXAMPLE = 'pam report runs/first --out first.html'
@@ -28,13 +28,14 @@ def add_arguments(parser):
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
     parser.add_argument('--out', default=None, metavar='FILE',
                         help='page to write (default: report.html beside the first bag)')
+    add_recover_option(parser)
 
 
 def run(args):
     """Load the bags and write the page."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.pages import bag_report
-    runs = [load_run(bag, namespace=args.namespace) for bag in args.bag]
+    runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
     first = os.path.abspath(args.bag[0]).rstrip(os.sep)
     out = args.out or os.path.join(os.path.dirname(first), 'report.html')
     summary = bag_report(runs, out)

@@ -82,7 +82,7 @@ class Experiment:
                     f'{self.domain} is {self._lower:g} to {self._upper:g} {suffix}', where)
 
     def at(self, t_s):
-        """Return (value, rate) at t_s since the start; before and after: the end values at rest."""
+        """Return (value, rate) at t_s since the start; outside, the end values at rest."""
         if t_s < 0.0:
             return self.segments[0].at(0.0)[0], 0.0
         if t_s >= self.duration_s:

@@ -75,8 +75,12 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
         Seed of sensor noise and stamp jitter.
     learning : bool
         False keeps the rules frozen.
+    overwrite : bool
+        Replace an existing bag.
     progress : callable, optional
         Called with simulated seconds done.
+    namespace : str
+        Namespace of the topics.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from pam_sim.gap.noise import noise_floor, STAMP_SD_S
 from pam_sim.gap.nominal import calibrate, LATENCY_MAX_S, REFERENCE_PULL
 from pam_sim.gap.result import GapResult, READABLE, SignalGap, Trace, UNIT
 
-BLOCK_S = 2.0
+BLOCK_S = 2.0                # length of a time block, shorter in a short recording
 PATTERN = (True, True, True, False, False)    # of the blocks: fit, fit, fit, certify, certify
 INPUT_DRAWS = 4
 # A gap smaller than this many noise floors, noise taken out, is not worth a cause.
@@ -62,7 +62,8 @@ def gap_first_look(run, rig, seconds=20.0, seed=0):
     recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
     before = free_run(rig, recording)
     floor = floors(run, rig, recording, before, seed)
-    fit_part = {s: in_fit_part(recording.time_s[s]) for s in recording.signals}
+    block_s = min(BLOCK_S, recording.grid_s[-1] / (2 * len(PATTERN)))
+    fit_part = {s: in_fit_part(recording.time_s[s], block_s) for s in recording.signals}
     fit = calibrate(rig, recording, floor, fit_part, seconds)
     refit = free_run(fit.rig, recording, fit.latency_s, start_error_pa=fit.start_error_pa)
     signals = {}
@@ -107,9 +108,9 @@ def floors(run, rig, recording, simulated, seed):
     return {s: noise_floor(run, s, np.sqrt(squares[s])) for s in recording.signals}
 
 
-def in_fit_part(time_s):
+def in_fit_part(time_s, block_s=BLOCK_S):
     """Return which samples are fitted; the other time blocks judge the result."""
-    return np.array(PATTERN)[(np.asarray(time_s) // BLOCK_S).astype(int) % len(PATTERN)]
+    return np.array(PATTERN)[(np.asarray(time_s) // block_s).astype(int) % len(PATTERN)]
 
 
 def decide(result):

@@ -1,0 +1,200 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line as a user sees it: real processes, exit codes, one sentence per mistake."""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+
+from pam_actuation.cli.main import VERBS
+import pytest
+
+
+def pam(*arguments, cwd=None, timeout=120):
+    """Run ``pam`` as a process and return the finished process."""
+    return subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', *map(str, arguments)],
+        capture_output=True, text=True, cwd=cwd, timeout=timeout, check=False)
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """Return the folder of two simulated bags, PPR and HSV."""
+    folder = tmp_path_factory.mktemp('bags')
+    for valve in ('ppr', 'hsv'):
+        done = pam('simulate', 'short_sine', '--valve', valve, '--out', folder / valve)
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.parametrize('verb', VERBS)
+def test_help_has_an_example(verb):
+    done = pam(verb, '--help')
+    assert done.returncode == 0
+    assert f'pam {verb}' in done.stdout and 'Example:' in done.stdout and '--json' in done.stdout
+
+
+def test_simulate_gives_the_same_bytes_twice(bags, tmp_path):
+    assert pam('simulate', 'short_sine', '--valve', 'hsv', '--out', tmp_path / 'hsv'
+               ).returncode == 0
+    digests = []
+    for folder in (bags, tmp_path):
+        content = next((folder / 'hsv').glob('*.mcap')).read_bytes()
+        digests.append(hashlib.sha256(content).hexdigest())
+    assert digests[0] == digests[1]
+
+
+def test_simulate_follows_the_seed(bags, tmp_path):
+    assert pam('simulate', 'short_sine', '--valve', 'ppr', '--seed', 1, '--out', tmp_path / 'b'
+               ).returncode == 0
+    first, other = (next(f.glob('*.mcap')).read_bytes() for f in (bags / 'ppr', tmp_path / 'b'))
+    assert first != other
+
+
+def test_simulate_refuses_an_existing_bag(bags):
+    before = next((bags / 'ppr').glob('*.mcap')).read_bytes()
+    done = pam('simulate', 'short_sine', '--out', bags / 'ppr')
+    assert done.returncode == 2 and done.stderr.count('\n') == 1
+    assert next((bags / 'ppr').glob('*.mcap')).read_bytes() == before
+
+
+@pytest.mark.parametrize('valve', ('ppr', 'hsv'))
+def test_info_finds_nothing_wrong(bags, valve):
+    done = pam('info', bags / valve, '--json')
+    assert done.returncode == 0, done.stdout
+    topics = {t['name']: t for t in json.loads(done.stdout)['topics']}
+    wanted = ['pressure', 'contraction', 'force', 'valve_signal', 'pressure_command',
+              'controller_state', 'reference', 'reference_trajectory']
+    assert {f'/muscle/{name}' for name in wanted} <= set(topics)
+    assert topics['/muscle/pressure']['rate_hz'] >= 200
+
+
+@pytest.mark.parametrize('valve', ('ppr', 'hsv'))
+def test_replay_is_identical_to_the_bit_twice(bags, valve):
+    outputs = [pam('replay', bags / valve, '--json') for _ in range(2)]
+    assert [done.returncode for done in outputs] == [0, 0]
+    assert outputs[0].stdout == outputs[1].stdout
+    found = json.loads(outputs[0].stdout)
+    assert found['controller']['identical'] and found['controller']['ticks'] == 1201
+    assert found['plant']['rmse']['contraction'] < 1e-3
+
+
+def test_replay_with_another_tuning_tells_the_difference(bags, tmp_path):
+    done = pam('replay', bags / 'ppr', '--set', 'sofc_untuned', '--json',
+               '--out', tmp_path / 'signals.npz')
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found['counterfactual'] and found['controller']['max_abs_difference_pa'] > 1e3
+    assert (tmp_path / 'signals.npz').stat().st_size > 10_000
+
+
+def test_report_is_one_file_without_network(bags, tmp_path):
+    done = pam('report', bags / 'ppr', bags / 'hsv', '--out', tmp_path / 'page.html')
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / 'page.html').read_text()
+    assert not re.search(r'<(script|link|img|iframe)\b[^>]*(src|href)=', page)
+    assert 'Tracking RMSE' in page and 'kPa' in page
+
+
+def test_gap_writes_its_folder(bags, tmp_path):
+    done = pam('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--out',
+               tmp_path / 'gap', '--json')
+    assert done.returncode == 1, done.stderr          # the realistic rig differs: a finding
+    assert json.loads(done.stdout)['signals']['contraction']['rmse_before'] > 1e-4
+    made = {path.name for path in (tmp_path / 'gap').iterdir()}
+    assert made == {'gap.json', 'model.yaml', 'compare.mcap', 'report.html'}
+
+
+def test_tune_writes_a_controller_that_runs(bags, tmp_path):
+    done = pam('tune', bags / 'ppr', '--controller', 'sofc_untuned', '--rollouts', 60,
+               '--out', tmp_path / 'tuned.yaml', '--json')
+    assert done.returncode in (0, 1), done.stderr
+    found = json.loads(done.stdout)
+    assert found['improved'] == (found['held_out_after_mm'] < found['held_out_before_mm'])
+    assert (done.returncode == 0) == found['improved']
+    again = pam('simulate', 'short_sine', '--controller', tmp_path / 'tuned.yaml',
+                '--out', tmp_path / 'bag')
+    assert again.returncode == 0, again.stderr
+
+
+def _mistakes(folder, bags):
+    """Return (arguments, words of the sentence) of things users get wrong."""
+    key = folder / 'key.yaml'
+    key.write_text('rig: dmsp_5_300_hanging_mass\nvalve: ppr\nparameters: {mass: 5.0}\n')
+    valve = folder / 'valve.yaml'
+    valve.write_text('rig: dmsp_5_300_hanging_mass\nvalve: xyz\n')
+    text = folder / 'text.mcap'
+    text.write_text('this is no recording\n' * 50)
+    whole = next((bags / 'ppr').glob('*.mcap')).read_bytes()
+    cut = folder / 'cut.mcap'
+    cut.write_bytes(whole[:len(whole) // 2])
+    out = ['--out', folder / 'out']
+    return {
+        'unknown key': (['simulate', 'short_sine', '--rig', key, *out],
+                        ['key.yaml:3', 'mass', 'mass_kg']),
+        'valve type in a file': (['simulate', 'short_sine', '--rig', valve, *out],
+                                 ['valve.yaml:2', 'xyz', 'ppr', 'hsv']),
+        'valve type': (['simulate', 'short_sine', '--valve', 'xyz', *out], ['xyz', 'ppr', 'hsv']),
+        'experiment': (['simulate', 'nothing_such', *out], ['nothing_such', 'short_sine']),
+        'controller': (['simulate', 'short_sine', '--controller', 'nothing_such', *out],
+                       ['nothing_such', 'sofc_ppr']),
+        'text as mcap': (['info', text], ['text.mcap']),
+        'text replayed': (['replay', text], ['text.mcap']),
+        'truncated bag': (['replay', cut], ['cut.mcap', 'recover']),
+        'truncated report': (['report', cut, *out], ['cut.mcap']),
+        'no bag': (['info', folder / 'missing'], ['missing']),
+        'gap of a text': (['gap', text, '--model', 'dmsp_5_300_hanging_mass', *out],
+                          ['text.mcap']),
+        'no model': (['gap', bags / 'ppr', '--model', 'nothing_such', *out], ['nothing_such']),
+        'budget': (['tune', bags / 'ppr', '--rollouts', 2, *out], ['2', '10']),
+    }
+
+
+def test_mistakes_get_one_sentence_and_exit_code_2(bags, tmp_path):
+    for what, (arguments, words) in _mistakes(tmp_path, bags).items():
+        done = pam(*arguments)
+        assert done.returncode == 2, (what, done.stdout, done.stderr)
+        assert done.stderr.count('\n') == 1 and 'Traceback' not in done.stderr, (what, done.stderr)
+        assert all(word in done.stderr for word in words), (what, done.stderr)
+        assert not (tmp_path / 'out').exists(), what
+
+
+def test_a_broken_off_recording_can_still_be_read(bags, tmp_path):
+    whole = next((bags / 'ppr').glob('*.mcap')).read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(whole[:2 * len(whole) // 3])
+    done = pam('info', tmp_path / 'cut.mcap', '--recover', '--json')
+    assert done.returncode == 1, done.stderr
+    assert sum(t['count'] for t in json.loads(done.stdout)['topics']) > 500
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_the_whole_demo_in_short(tmp_path):
+    pytest.importorskip('rclpy')
+    environment = dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'demo', '--quick', '--json', '--out',
+         str(tmp_path / 'demo')],
+        capture_output=True, text=True, timeout=280, env=environment, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads(done.stdout)
+    assert os.path.getsize(found['page']) > 1e6
+    assert set(found['bags']) == {'ppr_learning', 'ppr_frozen', 'hsv_learning'}
+    for bag in found['bags'].values():
+        assert os.path.isfile(os.path.join(bag, 'metadata.yaml'))
+    assert not found['findings']
