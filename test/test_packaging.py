@@ -39,10 +39,11 @@ EXECUTABLES = (
     'reference_generator', 'experiment_recorder')
 
 # Import name -> name in setup.py, where they differ.
-DISTRIBUTIONS = {'yaml': 'pyyaml'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
 ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
+    'mcap_ros2': 'mcap-ros2-support',
     'numba': 'python3-numba', 'numpy': 'python3-numpy', 'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy',
     'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml', 'zstandard': 'mcap-ros2-support',

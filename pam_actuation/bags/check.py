@@ -17,6 +17,8 @@
 from collections import Counter
 from pathlib import Path
 
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 
@@ -26,8 +28,8 @@ def independent_readers(bag):
     Return messages decoded per topic, by reader.
 
     ``rosbags`` reads the folder and decodes with its own message definitions,
-    ``mcap_ros2`` (where installed) reads each file and decodes with the definitions
-    embedded in it, which checks them.
+    ``mcap_ros2`` reads each file and decodes with the definitions embedded in it,
+    which checks them.
 
     Parameters
     ----------
@@ -46,11 +48,6 @@ def independent_readers(bag):
         for connection, _, raw in reader.messages():
             reader.deserialize(raw, connection.msgtype)
             out['rosbags'][connection.topic] += 1
-    try:
-        from mcap.reader import make_reader
-        from mcap_ros2.decoder import DecoderFactory
-    except ImportError:
-        return {name: dict(counts) for name, counts in out.items()}
     counts = out['mcap_ros2'] = Counter()
     for path in sorted(bag.glob('*.mcap')):
         with open(path, 'rb') as stream:

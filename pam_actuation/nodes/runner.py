@@ -34,6 +34,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
+SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
 
 
@@ -107,7 +109,9 @@ def run(node_class, args=None):
         raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    serving = threading.Thread(target=_serve, args=(executor,), daemon=True, name='services')
+    ended = threading.Event()
+    serving = threading.Thread(
+        target=_serve, args=(executor, ended), daemon=True, name='services')
     stopper.node = node
     stopper.start()
     serving.start()
@@ -120,18 +124,31 @@ def run(node_class, args=None):
         why = stopper.reason or 'ended'
         node.finish(why)
         stopper.safe.set()
-        executor.shutdown(timeout_sec=1.0)
-        serving.join(timeout=1.0)
+        ended.set()
+        executor.wake()
+        serving.join(timeout=SERVICE_END_S)
+        signal.set_wakeup_fd(-1)
+        if serving.is_alive():
+            # Everything is safe and sent; what is left is memory the system takes back. To
+            # destroy the services of a node while another thread waits on them would crash.
+            sys.stderr.flush()
+            os._exit(node.exit_code or node.result_code)
+        executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-        signal.set_wakeup_fd(-1)
     return node.exit_code or node.result_code
 
 
-def _serve(executor):
-    """Answer services and parameter requests until the executor is shut down."""
+def _serve(executor, ended):
+    """
+    Answer services and parameter requests until ``ended`` is set.
+
+    Not ``executor.spin``: its shutdown takes away what wakes it, and a thread that was just
+    about to wait would then still be waiting when the node is destroyed.
+    """
     try:
-        executor.spin()
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=SERVICE_WAIT_S)
     except ExternalShutdownException:
         pass
 
