@@ -107,6 +107,12 @@ def apply_valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state
 
 
 @inlined
+def valve_flow_active(par):
+    """Return whether any effect changes the flows through the valves."""
+    return False
+
+
+@inlined
 def apply_mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, par):
     """Return the net air flow into the muscle [kg/s], HSV."""
     return flow_kg_per_s
@@ -129,6 +135,12 @@ def apply_air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressu
     that holds.
     """
     return rt_j_per_kg
+
+
+@inlined
+def air_rt_active(par):
+    """Return whether any effect changes the air temperature (else it is constant)."""
+    return False
 
 
 @inlined

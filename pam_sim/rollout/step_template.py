@@ -34,11 +34,11 @@ from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.sarosi import tension_n
 from pam_sim.rollout.hooks import (
-    apply_air_rt, apply_clock_shift, apply_command, apply_commit, apply_flow_opening,
-    apply_load_force, apply_load_friction, apply_map_input, apply_map_output, apply_mass_flow,
-    apply_muscle_force, apply_muscle_friction, apply_opening, apply_pressure_rate, apply_sensor,
-    apply_sensor_commit, apply_set_point, apply_supply, apply_switch_times, apply_valve_flow,
-    apply_volume, pressure_rate_active)
+    air_rt_active, apply_air_rt, apply_clock_shift, apply_command, apply_commit,
+    apply_flow_opening, apply_load_force, apply_load_friction, apply_map_input,
+    apply_map_output, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
+    apply_pressure_rate, apply_sensor, apply_sensor_commit, apply_set_point, apply_supply,
+    apply_switch_times, apply_valve_flow, apply_volume, pressure_rate_active, valve_flow_active)
 from pam_sim.rollout.layout import (
     INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
     OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
@@ -89,7 +89,7 @@ def load_force(x, v, dx, elapsed, external, state, par):
 
 
 @inlined
-def valve_flows(fill, vent, p, supply, state, par):
+def valve_flows(fill, vent, p, supply, altered, state, par):
     """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
     flow_in = 0.0
     flow_out = 0.0
@@ -99,7 +99,9 @@ def valve_flows(fill, vent, p, supply, state, par):
     if vent > 0.0:
         flow_out = vent * mass_flow_kg_per_s(
             p, par[PAR_ATMOSPHERE], par[PAR_CONDUCTANCE], par[PAR_CRITICAL_RATIO])
-    return apply_valve_flow(flow_in, flow_out, p, supply, state, par)
+    if altered:
+        return apply_valve_flow(flow_in, flow_out, p, supply, state, par)
+    return flow_in, flow_out
 
 
 @inlined
@@ -229,6 +231,8 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     p_end = p0
     fill = 0.0
     vent = 0.0
+    altered = False
+    warm = False
     mass0 = 0.0
     gained = 0.0
     filled = 0.0
@@ -247,14 +251,21 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     else:
         fill, vent = openings(signal_0, signal_1, time_s, h, state, par)
         mass0 = state[S_AIR_MASS]
-        in1, out1 = valve_flows(fill, vent, p0, supply, state, par)
+        altered = valve_flow_active(par)
+        warm = air_rt_active(par)
+        in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
         q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
         volume = air_volume(p0, x_mid, state, par)
-        p_mid = (mass0 + g * q1) * pressure_per_kg(mass0, in1, q1, p0, volume, g, state, par)
-        in2, out2 = valve_flows(fill, vent, p_mid, supply, state, par)
+        density = par[PAR_RT] / volume                                 # Pa/kg
+        if warm:
+            density = pressure_per_kg(mass0, in1, q1, p0, volume, g, state, par)
+        p_mid = (mass0 + g * q1) * density
+        in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
-        p_mid = (mass0 + g * q2) * pressure_per_kg(mass0, in2, q2, p0, volume, g, state, par)
-        in3, out3 = valve_flows(fill, vent, p_mid, supply, state, par)
+        if warm:
+            density = pressure_per_kg(mass0, in2, q2, p0, volume, g, state, par)
+        p_mid = (mass0 + g * q2) * density
+        in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
     a_mid = 0.0
     if moving:
@@ -282,8 +293,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         x1 = min(max(x1, 0.0), top)
     if not is_ppr:
         volume = air_volume(p_mid, x1, state, par)
-        p_end = (mass0 + h * q3) * pressure_per_kg(mass0, in3, q3, p0, volume, h, state, par)
-        in4, out4 = valve_flows(fill, vent, p_end, supply, state, par)
+        density = par[PAR_RT] / volume
+        if warm:
+            density = pressure_per_kg(mass0, in3, q3, p0, volume, h, state, par)
+        p_end = (mass0 + h * q3) * density
+        in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
         q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
         gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
         filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
@@ -291,8 +305,10 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         state[S_AIR_MASS] = mass1
         state[S_FILLED] += filled
         state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
-        p_end = mass1 * pressure_per_kg(
-            mass0, filled / h, gained / h, p0, volume, h, state, par)
+        if warm:
+            density = pressure_per_kg(
+                mass0, filled / h, gained / h, p0, volume, h, state, par)
+        p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
         dx = x1 - x0
@@ -325,8 +341,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
                 tension = map_tension(p_end, x1, state, par)
             if not is_ppr:
                 volume = air_volume(p_end, x1, state, par)
-                p_end = state[S_AIR_MASS] * pressure_per_kg(
-                    mass0, filled / h, gained / h, p0, volume, h, state, par)
+                density = par[PAR_RT] / volume
+                if warm:
+                    density = pressure_per_kg(
+                        mass0, filled / h, gained / h, p0, volume, h, state, par)
+                p_end = state[S_AIR_MASS] * density
     state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
     state[S_VELOCITY] = v1
