@@ -18,7 +18,8 @@ Choked flow caps the pressure rate of a regulator, fill and vent apart.
     -r_v g(p, p_atm) V400 / (g400 V(x))  <=  dp/dt  <=  r_f g(p_s, p) V400 / (g400 V(x))
 
 with g(p1, p2) = p1 psi(p2 / p1) of ISO 6358, b = 0.3, and V400, g400 at 400 kPa
-gauge, x = 10 mm and the rig's supply, so that r_f and r_v are the caps there.
+gauge, x = 10 mm and nominal supply, so that r_f and r_v are the caps there; p_s
+is the rig's own supply.
 """
 
 from pam_sim.compiled import compiled
@@ -30,7 +31,7 @@ from pam_sim.units import P_ATM_PA
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
 CRITICAL_RATIO = 0.3
-_GAUGE_PA, _CONTRACTION_M = 400e3, 0.010
+_GAUGE_PA, _CONTRACTION_M, _NOMINAL_SUPPLY_PA = 400e3, 0.010, 801_325.0
 _NO_LIMIT = 1e30
 _FILL, _VENT, _SUPPLY, _ATMOSPHERE, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(8)
 
@@ -43,8 +44,8 @@ def _pack(values, numbers):
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
     if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:
-        flow = mass_flow_kg_per_s(supply, p, 1.0, CRITICAL_RATIO)
-        fill = values['fill_rate_at_400kpa_pa_per_s'] * volume / flow if flow > 0.0 else 0.0
+        flow = mass_flow_kg_per_s(_NOMINAL_SUPPLY_PA, p, 1.0, CRITICAL_RATIO)
+        fill = values['fill_rate_at_400kpa_pa_per_s'] * volume / flow
     if values['vent_rate_at_400kpa_pa_per_s'] > 0.0:
         flow = mass_flow_kg_per_s(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
         vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow

@@ -18,10 +18,10 @@ The air in the muscle is not isothermal; it exchanges heat with the wall.
     d(m cv T)/dt = m_in cp T_0 - m_out cp T - p dV/dt + hA (T_0 - T)
 
 with p V = m R T, wall and supply at T_0 = 293.15 K, hA = m_ref cv / tau and
-m_ref = 8e-5 kg, so that tau is the time constant at that mass. Linear in the
-energy m cv T, hence solved by an exponential with the coefficients of the
-middle of the step. The vent flow grows with sqrt(T_0 / T) (ISO 6358). A time
-constant of zero is the isothermal rig, a very long one the adiabatic one.
+m_ref = 8e-5 kg, so that tau is the time constant at that mass. Linear in T,
+hence solved by an exponential with the coefficients of the middle of the step.
+The vent flow grows with sqrt(T_0 / T) (ISO 6358). A time constant of zero is
+the isothermal rig, a very long one the adiabatic one.
 """
 
 import math
@@ -77,17 +77,18 @@ def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
     """Return R T of the air ``elapsed_s`` into the step."""
     before = state[i + _RT]
     start_m3 = mass_kg * before / pressure_pa
-    gain = elapsed_s * (inflow_kg_per_s - outflow_kg_per_s)
-    middle = mass_kg + 0.5 * gain
-    # Everything divided by cv: the energy is m R T, its exchange rate hA / cv.
-    loss = (GAMMA * outflow_kg_per_s + par[k + _CONDUCTANCE]) / middle * elapsed_s + (
+    # The balance of energy less that of mass, divided by m cv: dT/dt = a - b T.
+    middle = mass_kg + 0.5 * elapsed_s * (inflow_kg_per_s - outflow_kg_per_s)
+    share = elapsed_s / middle
+    loss = share * (
+        inflow_kg_per_s + (GAMMA - 1.0) * outflow_kg_per_s + par[k + _CONDUCTANCE]) + (
         GAMMA - 1.0) * 2.0 * (volume_m3 - start_m3) / (volume_m3 + start_m3)
-    source = (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT] * elapsed_s
+    source = share * (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT]
     decay = math.exp(-loss)
-    share = 1.0 - 0.5 * loss
+    mean = 1.0 - 0.5 * loss
     if abs(loss) > 1e-6:
-        share = (1.0 - decay) / loss
-    state[i + _STAGE] = (mass_kg * before * decay + source * share) / (mass_kg + gain)
+        mean = (1.0 - decay) / loss
+    state[i + _STAGE] = before * decay + source * mean
     return state[i + _STAGE]
 
 
