@@ -23,17 +23,22 @@ and stops at the nominal supply. Isothermal; at the start the reservoir is full.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 from pam_sim.rollout.layout import S_FILLED, S_SUPPLY
 from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 
+_SMALLEST_M3 = 1e-6         # below, one step would empty it
 _PA_PER_KG, _COMPRESSOR, _LOW, _HIGH = range(4)
 _PRESSURE, _CHANGE, _FILLED, _RUNS = range(4)
 
 
 def _pack(values, numbers):
-    full = numbers.parameters['supply_pa']
-    return (GAS_CONSTANT_AIR * TEMPERATURE_K / values['reservoir_volume_m3'],
+    volume, full = values['reservoir_volume_m3'], numbers.parameters['supply_pa']
+    if volume < _SMALLEST_M3:
+        raise InputError(f'`reservoir_volume_m3` is {volume:g}; allowed 0 (no reservoir) or at '
+                         f'least {_SMALLEST_M3:g} m3', 'supply_droop')
+    return (GAS_CONSTANT_AIR * TEMPERATURE_K / volume,
             values['compressor_flow_kg_per_s'], full - values['band_pa'], full)
 
 
@@ -63,7 +68,6 @@ EFFECT = Effect(
     pack=_pack,
     initial=_initial,
     valves=('hsv',),
-    active=lambda values, numbers: values['reservoir_volume_m3'] >= 1e-6,
 )
 
 

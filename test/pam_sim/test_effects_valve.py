@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from profiles import duties
 import pytest
@@ -129,6 +130,11 @@ def test_the_compressor_works_within_its_band():
     rate = np.gradient(response.supply_pa, 1e-3)[1000:]
     running = (rate > 0.0) & (np.roll(rate, 2) > 0.0) & (np.roll(rate, -2) > 0.0)
     assert np.allclose((rate * 2e-5 / RT + used)[running], 2e-4, rtol=1e-3)
+
+
+def test_a_reservoir_one_step_would_empty_is_refused():
+    with pytest.raises(InputError, match='at least'):
+        held('hsv', ('supply_droop', {'reservoir_volume_m3': 1e-7})).simulate(pulse())
 
 
 def test_dead_volume_is_the_parameter_by_another_name():
