@@ -122,3 +122,18 @@ def test_all_effects_at_once_interpreted_and_compiled(tmp_path):
         results.append(np.load(path))
     assert np.isfinite(results[0]).all()
     assert np.array_equal(*results)
+
+
+@pytest.mark.parametrize('valve, fidelity', [
+    ('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching')])
+def test_a_plant_with_all_effects_steps_as_simulate_does(valve, fidelity):
+    rig = load_rig('dmsp_5_300_hanging_mass', valve=valve, fidelity=fidelity).with_(
+        effects=sorted(effects()))
+    signal = profile('random', 300) / 100.0 if valve == 'ppr' else duties('random', 300)
+    start = {'initial_pressure_pa': P_ATM_PA + 300e3}
+    response = rig.simulate(signal, **start)
+    plant = rig.plant(**start)
+    for row, outputs in zip(signal, response.outputs):
+        assert np.array_equal(plant.outputs, outputs)
+        plant.step(np.atleast_1d(row))
+    assert load_rig(rig.to_yaml()).effects == rig.effects

@@ -176,7 +176,7 @@ def test_thermal_limits_and_time_constant():
     assert np.allclose(quick.pressure_pa, nominal.pressure_pa, rtol=1e-4)
 
 
-@pytest.mark.parametrize('fidelity, tolerance', [('averaged', 2e-4), ('switching', 2e-4)])
+@pytest.mark.parametrize('fidelity, tolerance', [('averaged', 1e-6), ('switching', 1e-4)])
 def test_thermal_closes_the_balances_of_mass_and_energy(fidelity, tolerance):
     tau_s, gamma = 0.2, 1.4
     rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv', fidelity=fidelity).with_(effects=[
