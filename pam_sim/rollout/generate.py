@@ -145,8 +145,9 @@ def _dispatchers():
                       f'        {give_back}_run_{hook}({given})']
         if returned or not users:
             lines.append(f'    return {result}' if returned else '    pass')
-    lines += ['', '', '@inlined', 'def pressure_rate_active(par):',
-              f"    return par[{hook_flag('pressure_rate')}] != 0.0"]
+    for hook in ('pressure_rate', 'valve_flow', 'air_rt'):
+        lines += ['', '', '@inlined', f'def {hook}_active(par):',
+                  f'    return par[{hook_flag(hook)}] != 0.0']
     return '\n'.join(lines) + '\n'
 
 

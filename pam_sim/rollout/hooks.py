@@ -31,9 +31,10 @@ from pam_sim.compiled import inlined
 # Hook name -> how many leading arguments it returns, changed or not.
 HOOKS = {
     'command': 2, 'clock_shift': 1, 'set_point': 2, 'pressure_rate': 1, 'opening': 2,
-    'switch_times': 2, 'supply': 1, 'mass_flow': 1, 'volume': 1, 'map_input': 2,
-    'muscle_force': 1, 'muscle_friction': 1, 'load_force': 1, 'load_friction': 1,
-    'commit': 0, 'sensor_commit': 0, 'sensor': 3,
+    'switch_times': 2, 'flow_opening': 2, 'supply': 1, 'valve_flow': 2, 'mass_flow': 1,
+    'volume': 1, 'air_rt': 1, 'map_input': 2, 'map_output': 1, 'muscle_force': 1,
+    'muscle_friction': 1, 'load_force': 1, 'load_friction': 1, 'commit': 0,
+    'sensor_commit': 0, 'sensor': 3,
 }
 
 
@@ -51,7 +52,11 @@ def apply_clock_shift(shift_s, state, par):
 
 @inlined
 def apply_set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, par):
-    """Return (set point [Pa], time constant [s]) of the PPR for this physics step."""
+    """
+    Return (set point [Pa], time constant [s]) of the PPR for this physics step.
+
+    Called once a physics step, may advance state.
+    """
     return set_point_pa, time_constant_s
 
 
@@ -80,9 +85,31 @@ def apply_switch_times(open_s, close_s, state, par):
 
 
 @inlined
+def apply_flow_opening(fill, vent, step_s, state, par):
+    """
+    Return the mean openings of either HSV pair over the physics step of ``step_s``.
+
+    Called once a physics step, may advance state.
+    """
+    return fill, vent
+
+
+@inlined
 def apply_supply(supply_pa, state, par):
     """Return the supply pressure [Pa absolute]."""
     return supply_pa
+
+
+@inlined
+def apply_valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, par):
+    """Return the mass flows [kg/s] through the fill and the vent valve, HSV."""
+    return fill_kg_per_s, vent_kg_per_s
+
+
+@inlined
+def valve_flow_active(par):
+    """Return whether any effect changes the flows through the valves."""
+    return False
 
 
 @inlined
@@ -98,9 +125,34 @@ def apply_volume(volume_m3, pressure_pa, contraction_m, state, par):
 
 
 @inlined
+def apply_air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
+                 volume_m3, elapsed_s, state, par):
+    """
+    Return R T [J/kg] of the air in the muscle ``elapsed_s`` into the physics step, HSV.
+
+    Mass and pressure are those at the start of the step, the flows means over
+    ``elapsed_s``, the volume that at its end. The last call of a step is the one
+    that holds.
+    """
+    return rt_j_per_kg
+
+
+@inlined
+def air_rt_active(par):
+    """Return whether any effect changes the air temperature (else it is constant)."""
+    return False
+
+
+@inlined
 def apply_map_input(gauge_pa, strain, state, par):
     """Return gauge pressure [Pa] and strain [-] at which the force map is read."""
     return gauge_pa, strain
+
+
+@inlined
+def apply_map_output(tension_n, pressure_pa, contraction_m, state, par):
+    """Return the static tension [N] of the force map, gain included."""
+    return tension_n
 
 
 @inlined

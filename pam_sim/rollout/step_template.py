@@ -34,10 +34,11 @@ from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.sarosi import tension_n
 from pam_sim.rollout.hooks import (
-    apply_clock_shift, apply_command, apply_commit, apply_load_force, apply_load_friction,
-    apply_map_input, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
+    air_rt_active, apply_air_rt, apply_clock_shift, apply_command, apply_commit,
+    apply_flow_opening, apply_load_force, apply_load_friction, apply_map_input,
+    apply_map_output, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
     apply_pressure_rate, apply_sensor, apply_sensor_commit, apply_set_point, apply_supply,
-    apply_switch_times, apply_volume, pressure_rate_active)
+    apply_switch_times, apply_valve_flow, apply_volume, pressure_rate_active, valve_flow_active)
 from pam_sim.rollout.layout import (
     INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
     OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
@@ -70,7 +71,7 @@ def map_tension(p, x, state, par):
     """Return the static tension [N] at pressure p [Pa] and contraction x [m]."""
     gauge, strain = apply_map_input(
         p - par[PAR_ATMOSPHERE], x * par[PAR_INVERSE_LENGTH], state, par)
-    return par[PAR_FORCE_GAIN] * tension_n(gauge, strain)
+    return apply_map_output(par[PAR_FORCE_GAIN] * tension_n(gauge, strain), p, x, state, par)
 
 
 @inlined
@@ -88,7 +89,7 @@ def load_force(x, v, dx, elapsed, external, state, par):
 
 
 @inlined
-def valve_flows(fill, vent, p, supply, par):
+def valve_flows(fill, vent, p, supply, altered, state, par):
     """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
     flow_in = 0.0
     flow_out = 0.0
@@ -98,7 +99,16 @@ def valve_flows(fill, vent, p, supply, par):
     if vent > 0.0:
         flow_out = vent * mass_flow_kg_per_s(
             p, par[PAR_ATMOSPHERE], par[PAR_CONDUCTANCE], par[PAR_CRITICAL_RATIO])
+    if altered:
+        return apply_valve_flow(flow_in, flow_out, p, supply, state, par)
     return flow_in, flow_out
+
+
+@inlined
+def pressure_per_kg(mass, inflow, net, p, volume, elapsed, state, par):
+    """Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p."""
+    return apply_air_rt(
+        par[PAR_RT], mass, inflow, inflow - net, p, volume, elapsed, state, par) / volume
 
 
 @inlined
@@ -151,7 +161,8 @@ def openings(fill, vent, time_s, h, state, par):
     """Return the mean openings of both valves over one physics step."""
     period = par[PAR_PWM_PERIOD]
     if par[PAR_VALVE] == VALVE_HSV_AVERAGED:
-        return apply_opening(clip_duty(fill), clip_duty(vent), period, state, par)
+        fill, vent = apply_opening(clip_duty(fill), clip_duty(vent), period, state, par)
+        return apply_flow_opening(fill, vent, h, state, par)
     clock = time_s - apply_clock_shift(0.0, state, par)
     index = math.floor(clock / period + 1e-9)
     start = max(clock - index * period, 0.0)
@@ -167,7 +178,7 @@ def openings(fill, vent, time_s, h, state, par):
         state[S_PERIOD] = index + 1.0
         fill_s += open_time_in(0.0, end - period, state[S_FILL_ON], state[S_FILL_OFF])
         vent_s += open_time_in(0.0, end - period, state[S_VENT_ON], state[S_VENT_OFF])
-    return fill_s / h, vent_s / h
+    return apply_flow_opening(fill_s / h, vent_s / h, h, state, par)
 
 
 @inlined
@@ -220,7 +231,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     p_end = p0
     fill = 0.0
     vent = 0.0
+    altered = False
+    warm = False
     mass0 = 0.0
+    gained = 0.0
+    filled = 0.0
     q1 = 0.0
     q2 = 0.0
     q3 = 0.0
@@ -236,14 +251,21 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     else:
         fill, vent = openings(signal_0, signal_1, time_s, h, state, par)
         mass0 = state[S_AIR_MASS]
-        in1, out1 = valve_flows(fill, vent, p0, supply, par)
+        altered = valve_flow_active(par)
+        warm = air_rt_active(par)
+        in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
         q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
-        density = par[PAR_RT] / air_volume(p0, x_mid, state, par)      # Pa/kg
+        volume = air_volume(p0, x_mid, state, par)
+        density = par[PAR_RT] / volume                                 # Pa/kg
+        if warm:
+            density = pressure_per_kg(mass0, in1, q1, p0, volume, g, state, par)
         p_mid = (mass0 + g * q1) * density
-        in2, out2 = valve_flows(fill, vent, p_mid, supply, par)
+        in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
+        if warm:
+            density = pressure_per_kg(mass0, in2, q2, p0, volume, g, state, par)
         p_mid = (mass0 + g * q2) * density
-        in3, out3 = valve_flows(fill, vent, p_mid, supply, par)
+        in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
     a_mid = 0.0
     if moving:
@@ -270,14 +292,22 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     if moving:
         x1 = min(max(x1, 0.0), top)
     if not is_ppr:
-        density = par[PAR_RT] / air_volume(p_mid, x1, state, par)
+        volume = air_volume(p_mid, x1, state, par)
+        density = par[PAR_RT] / volume
+        if warm:
+            density = pressure_per_kg(mass0, in3, q3, p0, volume, h, state, par)
         p_end = (mass0 + h * q3) * density
-        in4, out4 = valve_flows(fill, vent, p_end, supply, par)
+        in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
         q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
-        mass1 = mass0 + sixth * (q1 + 2.0 * (q2 + q3) + q4)
+        gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
+        filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
+        mass1 = mass0 + gained
         state[S_AIR_MASS] = mass1
-        state[S_FILLED] += sixth * (in1 + 2.0 * (in2 + in3) + in4)
+        state[S_FILLED] += filled
         state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
+        if warm:
+            density = pressure_per_kg(
+                mass0, filled / h, gained / h, p0, volume, h, state, par)
         p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
@@ -310,7 +340,12 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
                 x1 = min(max(x1 + 0.5 * v1 * rest, 0.0), top)
                 tension = map_tension(p_end, x1, state, par)
             if not is_ppr:
-                p_end = state[S_AIR_MASS] * par[PAR_RT] / air_volume(p_end, x1, state, par)
+                volume = air_volume(p_end, x1, state, par)
+                density = par[PAR_RT] / volume
+                if warm:
+                    density = pressure_per_kg(
+                        mass0, filled / h, gained / h, p0, volume, h, state, par)
+                p_end = state[S_AIR_MASS] * density
     state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
     state[S_VELOCITY] = v1

@@ -1,0 +1,41 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parallel elastic force of the tube: F -> F - k x."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+EFFECT = Effect(
+    name='bladder_stiffness',
+    family='static_map',
+    subsystem='muscle',
+    sentence='The rubber tube resists contraction like a spring beside the braid.',
+    source='Linear parallel spring; size: design choice.',
+    parameters=(
+        Parameter('stiffness_n_per_m', 'N/m', 200.0, -2e3, 1e4,
+                  description='Parallel stiffness, relaxed at zero contraction.'),
+    ),
+    amplitude=('stiffness_n_per_m',),
+    reported=(Reported(
+        'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m']),),
+)
+
+
+@compiled
+def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
+                 state, i, par, k):
+    """Return the force less that of the tube."""
+    return force_n - par[k] * contraction_m

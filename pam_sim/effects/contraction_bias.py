@@ -1,0 +1,39 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Offset of the contraction sensor: the reading is x + b."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+EFFECT = Effect(
+    name='contraction_bias',
+    family='sensor',
+    subsystem='sensor',
+    sentence='The contraction reading is off by a constant.',
+    source='Zero error of a sensor; size: design choice.',
+    parameters=(
+        Parameter('bias_m', 'm', 0.2e-3, -0.02, 0.02, description='Offset of the reading.'),
+    ),
+    amplitude=('bias_m',),
+    reported=(Reported('bias_m', 'm', lambda values, rig: values['bias_m']),),
+    order=60,               # after lag and scale
+)
+
+
+@compiled
+def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+    """Return the readings with the offset."""
+    return pressure_pa, contraction_m + par[k], force_n

@@ -1,0 +1,72 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The contraction sensor is slower than the others: tau dy/dt = x - y.
+
+Exact for a signal that is linear between samples.
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+_DECAY, _STEPS = range(2)           # exp(-dt / tau); tau / dt
+_READING, _TRUE = range(2)
+
+
+def _pack(values, numbers):
+    steps = values['time_constant_s'] / numbers.dt_s
+    return math.exp(-1.0 / steps), steps
+
+
+def _initial(values, numbers):
+    return numbers.contraction_m, numbers.contraction_m
+
+
+EFFECT = Effect(
+    name='contraction_lag',
+    family='sensor',
+    subsystem='sensor',
+    sentence='The contraction sensor follows its signal with a lag of its own.',
+    source='First order filter of a sensor; size: design choice.',
+    parameters=(
+        Parameter('time_constant_s', 's', 0.010, 0.0, 1.0, description='Lag of the sensor.'),
+    ),
+    amplitude=('time_constant_s',),
+    reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
+    states=2,
+    slots=2,
+    pack=_pack,
+    initial=_initial,
+    active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
+    order=30,               # before scale and offset
+)
+
+
+@compiled
+def sensor_commit(pressure_pa, contraction_m, force_n, dt_s, state, i, par, k):
+    """Advance the lagged reading by one step."""
+    slope = (contraction_m - state[i + _TRUE]) * par[k + _STEPS]
+    state[i + _READING] = contraction_m - slope + (
+        state[i + _READING] - state[i + _TRUE] + slope) * par[k + _DECAY]
+    state[i + _TRUE] = contraction_m
+
+
+@compiled
+def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+    """Return the readings with the lag."""
+    return pressure_pa, state[i + _READING], force_n

@@ -1,0 +1,92 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Choked flow caps the pressure rate of a regulator, fill and vent apart.
+
+    -r_v g(p, p_atm) V400 / (g400 V(x))  <=  dp/dt  <=  r_f g(p_s, p) V400 / (g400 V(x))
+
+with g(p1, p2) = p1 psi(p2 / p1) of ISO 6358, b = 0.3, and V400, g400 at 400 kPa
+gauge, x = 10 mm and nominal supply, so that r_f and r_v are the caps there; p_s
+is the rig's own supply.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.muscle import geometry
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.parameters import Parameter
+from pam_sim.units import P_ATM_PA
+from pam_sim.valve.flow import mass_flow_kg_per_s
+
+CRITICAL_RATIO = 0.3
+_GAUGE_PA, _CONTRACTION_M, _NOMINAL_SUPPLY_PA = 400e3, 0.010, 801_325.0
+_NO_LIMIT = 1e30
+_FILL, _VENT, _SUPPLY, _ATMOSPHERE, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(8)
+
+
+def _pack(values, numbers):
+    thread, turns = geometry.braid()
+    shape = (geometry.LENGTH_M, thread * thread, 1.0 / (12.566370614359172 * turns * turns))
+    dead, supply = numbers.parameters['V_dead'], numbers.parameters['supply_pa']
+    volume = dead + geometry.volume_of(_CONTRACTION_M, *shape)
+    p = P_ATM_PA + _GAUGE_PA
+    fill = vent = _NO_LIMIT
+    if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:
+        flow = mass_flow_kg_per_s(_NOMINAL_SUPPLY_PA, p, 1.0, CRITICAL_RATIO)
+        fill = values['fill_rate_at_400kpa_pa_per_s'] * volume / flow
+    if values['vent_rate_at_400kpa_pa_per_s'] > 0.0:
+        flow = mass_flow_kg_per_s(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
+        vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow
+    return fill, vent, supply, P_ATM_PA, dead, *shape
+
+
+EFFECT = Effect(
+    name='flow_limit',
+    family='valve_nonlinearity',
+    subsystem='valve',
+    sentence='The regulator cannot fill or vent faster than choked flow allows.',
+    source='ISO 6358, b = 0.3; model of an electro-pneumatic regulator with orifice flow caps.',
+    parameters=(
+        Parameter('fill_rate_at_400kpa_pa_per_s', 'Pa/s', 1.5e6, 0.0, 1e9,
+                  description='Highest filling rate at 400 kPa gauge and 10 mm; 0 for no limit.'),
+        Parameter('vent_rate_at_400kpa_pa_per_s', 'Pa/s', 1.0e6, 0.0, 1e9,
+                  description='Highest venting rate at 400 kPa gauge and 10 mm; 0 for no limit.'),
+    ),
+    amplitude=('fill_rate_at_400kpa_pa_per_s', 'vent_rate_at_400kpa_pa_per_s'),
+    reported=(
+        Reported('fill_rate_at_400kpa_pa_per_s', 'Pa/s',
+                 lambda values, rig: values['fill_rate_at_400kpa_pa_per_s']),
+        Reported('vent_rate_at_400kpa_pa_per_s', 'Pa/s',
+                 lambda values, rig: values['vent_rate_at_400kpa_pa_per_s']),
+    ),
+    slots=8,
+    pack=_pack,
+    valves=('ppr',),
+    order=40,               # the regulator's own rate: before what leaks behind it
+)
+
+
+@compiled
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the pressure rate within what the orifices let through."""
+    volume = par[k + _DEAD] + volume_m3(
+        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
+    if rate_pa_per_s > 0.0:
+        cap = par[k + _FILL] / volume
+        return min(rate_pa_per_s, mass_flow_kg_per_s(
+            par[k + _SUPPLY], pressure_pa, cap, CRITICAL_RATIO))
+    cap = par[k + _VENT] / volume
+    return max(rate_pa_per_s, -mass_flow_kg_per_s(
+        pressure_pa, par[k + _ATMOSPHERE], cap, CRITICAL_RATIO))

@@ -1,0 +1,94 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A reservoir feeds the fill valve; a compressor refills it within a band.
+
+    V_r dp_s/dt = R T (m_compressor - m_fill)
+
+The compressor starts when p_s has fallen to the nominal supply less the band
+and stops at the nominal supply. Isothermal; at the start the reservoir is full.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
+from pam_sim.rollout.layout import S_FILLED, S_SUPPLY
+from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
+
+_SMALLEST_M3 = 1e-6         # below, one step would empty it
+_PA_PER_KG, _COMPRESSOR, _LOW, _HIGH = range(4)
+_PRESSURE, _CHANGE, _FILLED, _RUNS = range(4)
+
+
+def _pack(values, numbers):
+    volume, full = values['reservoir_volume_m3'], numbers.parameters['supply_pa']
+    if volume < _SMALLEST_M3:
+        raise InputError(f'`reservoir_volume_m3` is {volume:g}; allowed 0 (no reservoir) or at '
+                         f'least {_SMALLEST_M3:g} m3', 'supply_droop')
+    return (GAS_CONSTANT_AIR * TEMPERATURE_K / volume,
+            values['compressor_flow_kg_per_s'], full - values['band_pa'], full)
+
+
+def _initial(values, numbers):
+    return numbers.parameters['supply_pa'], 0.0, 0.0, 0.0
+
+
+EFFECT = Effect(
+    name='supply_droop',
+    family='loss',
+    subsystem='valve',
+    sentence='The supply pressure falls with use until a compressor refills the reservoir.',
+    source='Mass balance of the reservoir; two-point control of the compressor (design values).',
+    parameters=(
+        Parameter('reservoir_volume_m3', 'm3', 1e-3, 0.0, 10.0,
+                  description='Volume of the reservoir; 0 for a supply that does not fall.'),
+        Parameter('band_pa', 'Pa', 100e3, 1e3, 500e3,
+                  description='Fall of the supply pressure at which the compressor starts.'),
+        Parameter('compressor_flow_kg_per_s', 'kg/s', 2e-4, 0.0, 0.1,
+                  description='Air the running compressor delivers.'),
+    ),
+    amplitude=('reservoir_volume_m3',),
+    reported=(Reported(
+        'reservoir_volume_m3', 'm3', lambda values, rig: values['reservoir_volume_m3']),),
+    states=4,
+    slots=4,
+    pack=_pack,
+    initial=_initial,
+    valves=('hsv',),
+)
+
+
+@compiled
+def supply(supply_pa, state, i, par, k):
+    """Return the pressure of the reservoir at the middle of the step, by the last change."""
+    return state[i + _PRESSURE] + 0.5 * state[i + _CHANGE]
+
+
+@compiled
+def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Take what the fill valve let through out of the reservoir."""
+    used = state[S_FILLED] - state[i + _FILLED]
+    given = par[k + _COMPRESSOR] * elapsed_s if state[i + _RUNS] != 0.0 else 0.0
+    change = par[k + _PA_PER_KG] * (given - used)
+    now = state[i + _PRESSURE] + change
+    state[i + _PRESSURE] = now
+    state[i + _CHANGE] = change
+    state[i + _FILLED] = state[S_FILLED]
+    if now <= par[k + _LOW]:
+        state[i + _RUNS] = 1.0
+    elif now >= par[k + _HIGH]:
+        state[i + _RUNS] = 0.0
+    state[S_SUPPLY] = now

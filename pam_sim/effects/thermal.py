@@ -1,0 +1,107 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The air in the muscle is not isothermal; it exchanges heat with the wall.
+
+    d(m cv T)/dt = m_in cp T_0 - m_out cp T - p dV/dt + hA (T_0 - T)
+
+with p V = m R T, wall and supply at T_0 = 293.15 K, hA = m_ref cv / tau and
+m_ref = 8e-5 kg, so that tau is the time constant at that mass. Linear in T,
+hence solved by an exponential with the coefficients of the middle of the step.
+The vent flow grows with sqrt(T_0 / T) (ISO 6358). A time constant of zero is
+the isothermal rig, a very long one the adiabatic one.
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
+
+GAMMA = 1.4
+REFERENCE_MASS_KG = 8e-5
+CV = GAS_CONSTANT_AIR / (GAMMA - 1.0)
+_CONDUCTANCE, _AMBIENT_RT = range(2)        # hA / cv [kg/s]; R T_0 [J/kg]
+_RT, _STAGE = range(2)                      # R T at the start and at a stage of the step
+
+
+def _pack(values, numbers):
+    return (REFERENCE_MASS_KG / values['heat_exchange_time_s'], GAS_CONSTANT_AIR * TEMPERATURE_K)
+
+
+def _initial(values, numbers):
+    return (GAS_CONSTANT_AIR * TEMPERATURE_K,) * 2
+
+
+EFFECT = Effect(
+    name='thermal',
+    family='volume',
+    subsystem='valve',
+    sentence='The air warms when compressed and cools when vented, and takes time to exchange '
+             'heat.',
+    source='First law for an open volume, e.g. Richer and Hurmuzlu (2000), ASME J. Dynamic '
+           'Systems, Measurement, and Control 122(3).',
+    parameters=(
+        Parameter('heat_exchange_time_s', 's', 0.2, 0.0, 1e3,
+                  description='Time constant of the heat exchange at 8e-5 kg; 0 is isothermal.'),
+    ),
+    amplitude=('heat_exchange_time_s',),
+    reported=(Reported(
+        'heat_exchange_time_s', 's', lambda values, rig: values['heat_exchange_time_s']),),
+    states=2,
+    slots=2,
+    pack=_pack,
+    initial=_initial,
+    valves=('hsv',),
+    active=lambda values, numbers: values['heat_exchange_time_s'] >= 1e-9,
+    order=70,               # scales the flows that the other effects leave
+)
+
+
+@compiled
+def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa, volume_m3,
+           elapsed_s, state, i, par, k):
+    """Return R T of the air ``elapsed_s`` into the step."""
+    before = state[i + _RT]
+    start_m3 = mass_kg * before / pressure_pa
+    # The balance of energy less that of mass, divided by m cv: dT/dt = a - b T.
+    middle = mass_kg + 0.5 * elapsed_s * (inflow_kg_per_s - outflow_kg_per_s)
+    share = elapsed_s / middle
+    loss = share * (
+        inflow_kg_per_s + (GAMMA - 1.0) * outflow_kg_per_s + par[k + _CONDUCTANCE]) + (
+        GAMMA - 1.0) * 2.0 * (volume_m3 - start_m3) / (volume_m3 + start_m3)
+    source = share * (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT]
+    decay = math.exp(-loss)
+    mean = 1.0 - 0.5 * loss
+    if abs(loss) > 1e-6:
+        mean = (1.0 - decay) / loss
+    state[i + _STAGE] = before * decay + source * mean
+    return state[i + _STAGE]
+
+
+@compiled
+def valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, i, par, k):
+    """Return the vent flow of air at its temperature."""
+    if vent_kg_per_s > 0.0:
+        return fill_kg_per_s, vent_kg_per_s * math.sqrt(
+            par[k + _AMBIENT_RT] / state[i + _STAGE])
+    return fill_kg_per_s, vent_kg_per_s
+
+
+@compiled
+def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Keep the temperature of the end of the step."""
+    state[i + _RT] = state[i + _STAGE]

@@ -1,0 +1,86 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+An extra first order lag of the line or of a pilot stage.
+
+    tau dy/dt = u - y
+
+PPR: y is the set point that reaches the regulator. HSV: y is the opening of
+each valve. The mean of y over a physics step is used, exact for a held u.
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+from pam_sim.valve.hsv import clip_duty
+from pam_sim.valve.ppr import set_point_pa
+
+_DECAY, _MEAN = range(2)
+
+
+def _pack(values, numbers):
+    ratio = numbers.substep_s / values['time_constant_s']
+    decay = math.exp(-ratio)
+    return decay, -math.expm1(-ratio) / ratio
+
+
+def _initial(values, numbers):
+    if numbers.valve == 'ppr':
+        return (set_point_pa(
+            numbers.signal[0], numbers.parameters['K_m'], numbers.parameters['p_atm']), 0.0)
+    return clip_duty(numbers.signal[0]), clip_duty(numbers.signal[1])
+
+
+EFFECT = Effect(
+    name='tube_lag',
+    family='transport',
+    subsystem='valve',
+    sentence='Line or pilot stage add a lag of their own between command and flow.',
+    source='First order lag; pilot stage of an electro-pneumatic regulator, tube of 1-2 m '
+           '(design value).',
+    parameters=(
+        Parameter('time_constant_s', 's', 0.020, 0.0, 1.0, description='Extra time constant.'),
+    ),
+    amplitude=('time_constant_s',),
+    reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
+    states=2,
+    slots=2,
+    pack=_pack,
+    initial=_initial,
+    order=40,               # before the threshold of the main stage
+)
+
+
+@compiled
+def mean_of_lag(u, state, i, decay, mean):
+    """Return the mean of the lagged value over a physics step and advance it."""
+    distance = state[i] - u
+    state[i] = u + distance * decay
+    return u + distance * mean
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the lagged set point of the PPR."""
+    return mean_of_lag(set_point_pa, state, i, par[k + _DECAY], par[k + _MEAN]), time_constant_s
+
+
+@compiled
+def flow_opening(fill, vent, step_s, state, i, par, k):
+    """Return the lagged openings of the HSV pair."""
+    return (mean_of_lag(fill, state, i, par[k + _DECAY], par[k + _MEAN]),
+            mean_of_lag(vent, state, i + 1, par[k + _DECAY], par[k + _MEAN]))

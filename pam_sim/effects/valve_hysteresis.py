@@ -1,0 +1,52 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Play of a regulator: the output follows the command only after the play is used up."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+from pam_sim.valve.ppr import set_point_pa
+
+
+def _initial(values, numbers):
+    return (set_point_pa(
+        numbers.signal[0], numbers.parameters['K_m'], numbers.parameters['p_atm']),)
+
+
+EFFECT = Effect(
+    name='valve_hysteresis',
+    family='valve_nonlinearity',
+    subsystem='valve',
+    sentence='The pressure of the regulator depends on the direction from which the command '
+             'came.',
+    source='Play operator, e.g. Visintin (1994), Differential Models of Hysteresis; size: design '
+           'value, below 0.5 % of full scale.',
+    parameters=(
+        Parameter('half_width_pa', 'Pa', 2e3, 0.0, 100e3, description='Half of the play.'),
+    ),
+    amplitude=('half_width_pa',),
+    reported=(Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),),
+    states=1,
+    initial=_initial,
+    valves=('ppr',),
+    order=30,               # the command's side of every lag
+)
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the set point behind the play."""
+    state[i] = min(max(state[i], set_point_pa - par[k]), set_point_pa + par[k])
+    return state[i], time_constant_s

@@ -1,0 +1,55 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Venting is slower than filling by a ratio.
+
+PPR: the time constant is longer by the ratio while the pressure falls towards
+its set point. HSV: the flow through the vent valve is smaller by the ratio.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+EFFECT = Effect(
+    name='vent_asymmetry',
+    family='valve_nonlinearity',
+    subsystem='valve',
+    sentence='Venting takes longer than filling.',
+    source='Design choice of form; measured on proportional valves with muscles: falling steps '
+           '1.5 to 2 times slower than rising ones.',
+    parameters=(
+        Parameter('ratio_minus_1', '-', 0.4, -0.5, 9.0,
+                  description='Time of venting over time of filling, less one.'),
+    ),
+    amplitude=('ratio_minus_1',),
+    reported=(Reported(
+        'vent_to_fill_time_ratio', '-', lambda values, rig: 1.0 + values['ratio_minus_1']),),
+    order=60,               # after what changes the set point
+)
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the time constant longer while venting."""
+    if set_point_pa < pressure_pa:
+        return set_point_pa, time_constant_s * (1.0 + par[k])
+    return set_point_pa, time_constant_s
+
+
+@compiled
+def valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, i, par, k):
+    """Return the vent flow smaller."""
+    return fill_kg_per_s, vent_kg_per_s / (1.0 + par[k])

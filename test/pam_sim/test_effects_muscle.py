@@ -1,0 +1,123 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Effects of muscle and load: each against what its equation says."""
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import pytest
+
+TRIANGLE_M = 0.005 + 0.010 * np.abs((np.arange(8001) / 500.0 + 1.0) % 2.0 - 1.0)   # 20 mm/s
+
+
+def driven(*effects, gauge_pa=400e3, path_m=TRIANGLE_M):
+    """Return the response of a driven rig without damping at constant pressure."""
+    rig = load_rig('dmsp_5_300_driven').with_(
+        parameters={'damping_n_s_per_m': 0.0},
+        effects=[{'name': name, 'parameters': values} for name, values in effects])
+    return rig.simulate(np.full(len(path_m) - 1, gauge_pa / 100e3), contraction_m=path_m,
+                        initial_pressure_pa=P_ATM_PA + gauge_pa)
+
+
+def hanging(*effects, seconds=3.0, voltage=None):
+    """Return rig and response of the hanging mass, by default on a sine about 350 kPa."""
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(
+        effects=[{'name': name, 'parameters': values} for name, values in effects])
+    time_s = np.arange(int(seconds * 1000)) * 1e-3
+    if voltage is None:
+        voltage = 3.5 + 1.2 * np.sin(2.0 * np.pi * 0.7 * time_s)
+    return rig, rig.simulate(np.broadcast_to(voltage, time_s.shape),
+                             initial_pressure_pa=P_ATM_PA + 350e3)
+
+
+@pytest.mark.parametrize('gauge_pa', [200e3, 400e3])
+def test_pressure_friction_grows_with_pressure(gauge_pa):
+    nominal = driven(gauge_pa=gauge_pa)
+    response = driven(('pressure_friction', {'force_at_400kpa_n': 3.0}), gauge_pa=gauge_pa)
+    change = (response.force_n - nominal.force_n)[1:]
+    level = 3.0 * gauge_pa / 400e3
+    up = np.diff(TRIANGLE_M) > 0.0
+    assert np.allclose(change, np.where(up, -level, level), atol=1e-6)
+
+
+def test_pressure_friction_holds_the_mass():
+    effect = ('pressure_friction', {'force_at_400kpa_n': 3.0})
+    _, still = hanging(effect, seconds=2.0, voltage=3.52)       # 2 kPa more moves nothing
+    assert np.ptp(still.contraction_m) == 0.0
+    _, moved = hanging(effect, seconds=2.0, voltage=3.90)
+    _, free = hanging(seconds=2.0, voltage=3.90)
+    assert 1e-4 < moved.contraction_m[-1] - moved.contraction_m[0] < (
+        free.contraction_m[-1] - free.contraction_m[0])
+
+
+def test_bladder_stiffness_takes_its_force():
+    response = driven(('bladder_stiffness', {'stiffness_n_per_m': 500.0}))
+    nominal = driven()
+    assert np.allclose(response.force_n, nominal.force_n - 500.0 * nominal.contraction_m,
+                       atol=1e-9)
+    _, soft = hanging(seconds=6.0, voltage=4.0)
+    _, stiff = hanging(('bladder_stiffness', {'stiffness_n_per_m': 500.0}), seconds=6.0,
+                       voltage=4.0)
+    assert stiff.contraction_m[-1] < soft.contraction_m[-1] - 0.5e-3
+    assert stiff.force_n[-1] == pytest.approx(soft.force_n[-1], abs=0.02)   # inside the muscle
+
+
+def test_thermal_softening_loses_force_with_work():
+    effect = ('thermal_softening', {'gain_loss_at_20mm_per_s': 0.05, 'time_constant_s': 2.0})
+    response, nominal = driven(effect), driven()
+    loss = 1.0 - response.force_n / nominal.force_n
+    expected = 0.05 * (1.0 - np.exp(-response.time_s / 2.0))
+    assert np.max(np.abs(loss - expected)) < 1e-4
+    # At half the speed half the loss; at rest it recovers.
+    path = np.interp(np.arange(8001) * 0.5, np.arange(8001), TRIANGLE_M)
+    half = 1.0 - driven(effect, path_m=path).force_n / driven(path_m=path).force_n
+    assert half[-1] == pytest.approx(0.5 * loss[-1], rel=1e-3)
+    rest = np.concatenate([TRIANGLE_M[:4001], np.full(4000, TRIANGLE_M[4000])])
+    cooled = 1.0 - driven(effect, path_m=rest).force_n / driven(path_m=rest).force_n
+    assert cooled[8000] == pytest.approx(cooled[4001] * np.exp(-2.0), rel=1e-2)
+
+
+def test_guide_friction_is_on_the_load_side_of_the_cell():
+    for name, in_cell in (('guide_friction', 2.0), ('coulomb_friction', 0.0)):
+        rig, response = hanging((name, {'force_n': 2.0}))
+        mass = rig.parameters['mass_kg']
+        load = mass * (response.acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+        moving = (response.velocity_m_per_s != 0.0) & (response.contraction_m > 1e-6)
+        extra = (response.force_n - load) * np.sign(response.velocity_m_per_s)
+        assert np.sum(moving) > 1000
+        assert np.allclose(extra[moving], in_cell, atol=1e-9)
+
+
+def test_guide_friction_moves_like_friction_inside_the_muscle():
+    (_, guide), (_, inside) = (hanging((name, {'force_n': 2.0}))
+                               for name in ('guide_friction', 'coulomb_friction'))
+    assert np.array_equal(guide.contraction_m, inside.contraction_m)
+    # Stuck, the cell reads what the muscle holds beyond the weight, up to the friction.
+    _, stuck = hanging(('guide_friction', {'force_n': 4.0}), seconds=2.0, voltage=3.55)
+    assert np.ptp(stuck.contraction_m) == 0.0
+    assert 0.5 < stuck.force_n[-1] - stuck.force_n[0] < 4.0
+
+
+def test_parallel_spring_loads_the_cell():
+    rig, response = hanging(('parallel_spring', {'stiffness_n_per_m': 400.0}))
+    load = rig.parameters['mass_kg'] * (response.acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+    inside = response.contraction_m > 1e-6
+    assert np.allclose((response.force_n - load)[inside],
+                       400.0 * response.contraction_m[inside], atol=1e-9)
+    _, free = hanging(seconds=6.0, voltage=4.5)
+    _, sprung = hanging(('parallel_spring', {'stiffness_n_per_m': 400.0}), seconds=6.0,
+                        voltage=4.5)
+    assert sprung.contraction_m[-1] < free.contraction_m[-1] - 0.5e-3
+    assert sprung.force_n[-1] > free.force_n[-1] + 3.0

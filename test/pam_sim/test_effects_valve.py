@@ -1,0 +1,215 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Effects of valve and air: each against what its equation says."""
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
+from profiles import duties
+import pytest
+
+RT = GAS_CONSTANT_AIR * TEMPERATURE_K
+HELD_M = 0.010
+
+
+def held(valve, *effects, fidelity='averaged', **parameters):
+    """Return an isometric rig at 10 mm with effects, each (name, parameters)."""
+    return load_rig('dmsp_5_300_isometric').with_(
+        valve=valve, fidelity=fidelity, parameters={'contraction_m': HELD_M, **parameters},
+        effects=[{'name': name, 'parameters': values} for name, values in effects])
+
+
+def pulse(fill=0.0, vent=0.0, first=0, last=None, count=1000):
+    """Return duties that are on from step ``first`` to ``last``."""
+    signal = np.zeros((count, 2))
+    signal[first:last] = fill, vent
+    return signal
+
+
+@pytest.mark.parametrize('tau_s', [0.005, 0.020])
+def test_tube_lag_of_the_regulator_is_a_second_lag(tau_s):
+    start = P_ATM_PA + 300e3
+    response = held('ppr', ('tube_lag', {'time_constant_s': tau_s})).simulate(
+        np.full(400, 4.0), initial_pressure_pa=start, initial_signal=3.0)
+    t, slow = response.time_s, 0.060
+    expected = start + 100e3 * (
+        1.0 - (slow * np.exp(-t / slow) - tau_s * np.exp(-t / tau_s)) / (slow - tau_s))
+    assert np.max(np.abs(response.pressure_pa - expected)) < 20.0
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_tube_lag_of_the_switching_valves_delays_the_air_and_loses_none(fidelity):
+    signal = pulse(fill=0.3, last=200)
+    tau_s = 0.020
+    prompt = held('hsv', fidelity=fidelity).simulate(signal)
+    late = held('hsv', ('tube_lag', {'time_constant_s': tau_s}), fidelity=fidelity).simulate(
+        signal)
+    choked = 0.3 * 2.0e-10 * 1.185 * 801_325.0          # kg/s at this low pressure
+    missing = np.mean((prompt.filled_kg - late.filled_kg)[190:200])     # one PWM period
+    assert missing == pytest.approx(choked * tau_s, rel=0.05)
+    assert late.filled_kg[-1] == pytest.approx(prompt.filled_kg[-1], rel=1e-6)
+    gained = late.air_mass_kg - late.air_mass_kg[0]
+    assert np.max(np.abs(gained - late.filled_kg + late.vented_kg)) < 1e-14
+
+
+def test_valve_hysteresis_ends_apart_by_its_width():
+    rig = held('ppr', ('valve_hysteresis', {'half_width_pa': 4e3}))
+    for start_v, end_pa in ((3.0, 396e3), (5.0, 404e3), (4.03, 403e3)):
+        response = rig.simulate(np.full(1500, 4.0), initial_signal=start_v,
+                                initial_pressure_pa=P_ATM_PA + 1e5 * start_v)
+        assert response.pressure_pa[-1] - P_ATM_PA == pytest.approx(end_pa, abs=1.0)
+
+
+def test_flow_limit_caps_the_rates_it_states():
+    given = {'fill_rate_at_400kpa_pa_per_s': 0.5e6, 'vent_rate_at_400kpa_pa_per_s': 0.3e6}
+    rig = held('ppr', ('flow_limit', given))
+    for end_v, start_pa, rate in ((6.0, 100e3, 0.5e6), (0.0, 600e3, -0.3e6)):
+        response = rig.simulate(np.full(9000, end_v), initial_pressure_pa=P_ATM_PA + start_pa)
+        p = response.pressure_pa - P_ATM_PA
+        near = np.argmin(np.abs(p - 400e3))
+        assert np.gradient(p, 1e-3)[near] == pytest.approx(rate, rel=0.01)
+        assert p[-1] == pytest.approx(1e5 * end_v, abs=2e3)
+    only_fill = held('ppr', ('flow_limit', {**given, 'vent_rate_at_400kpa_pa_per_s': 0.0}))
+    fall = only_fill.simulate(np.zeros(200), initial_pressure_pa=P_ATM_PA + 600e3)
+    lag = P_ATM_PA + 600e3 * np.exp(-fall.time_s / 0.060)
+    assert np.max(np.abs(fall.pressure_pa - lag)) < 1.0
+
+
+def test_vent_asymmetry_slows_venting_only():
+    effect = ('vent_asymmetry', {'ratio_minus_1': 0.5})
+    for end_v, tau_s in ((5.0, 0.060), (3.0, 0.090)):
+        response = held('ppr', effect).simulate(
+            np.full(300, end_v), initial_pressure_pa=P_ATM_PA + 400e3)
+        expected = P_ATM_PA + 1e5 * (end_v + (4.0 - end_v) * np.exp(-response.time_s / tau_s))
+        assert np.max(np.abs(response.pressure_pa - expected)) < 1e-3
+    start = {'initial_pressure_pa': P_ATM_PA + 400e3}
+    fast = held('hsv').simulate(pulse(vent=0.2), **start)
+    slow = held('hsv', effect).simulate(pulse(vent=0.2), **start)
+    # The same path of pressure, run through in 1.5 times the time.
+    assert np.max(np.abs(slow.pressure_pa[:900:3] - fast.pressure_pa[:600:2])) < 20.0
+    filling = [rig.simulate(pulse(fill=0.2, last=300), **start).pressure_pa
+               for rig in (held('hsv'), held('hsv', effect))]
+    assert np.array_equal(*filling)
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_supply_droop_keeps_the_air(fidelity):
+    volume = 2e-4
+    rig = held('hsv', ('supply_droop', {'reservoir_volume_m3': volume}), fidelity=fidelity)
+    response = rig.simulate(pulse(fill=0.3, last=300))
+    air = response.supply_pa * volume / RT + response.air_mass_kg + response.vented_kg
+    assert np.ptp(air) < 1e-9 * air[0]
+    drop = response.supply_pa[0] - response.supply_pa[-1]
+    assert drop == pytest.approx(RT / volume * response.filled_kg[-1], rel=1e-9)
+    assert drop > 5e3
+    nominal = held('hsv', fidelity=fidelity).simulate(pulse(fill=0.3, last=300))
+    assert response.pressure_pa[-1] < nominal.pressure_pa[-1] - 100.0
+
+
+def test_the_compressor_works_within_its_band():
+    rig = held('hsv', ('supply_droop', {'reservoir_volume_m3': 2e-5, 'band_pa': 60e3}))
+    response = rig.simulate(pulse(fill=0.3, vent=0.3, count=4000))
+    low, high = response.supply_pa.min(), response.supply_pa.max()
+    assert 740e3 - 1e3 < low - 1_325.0 < 740e3 + 10.0 and 800e3 < high < 802.5e3
+    rises = np.diff(response.supply_pa) > 0.0
+    assert 2 <= np.sum(np.diff(rises.astype(int)) > 0) <= 20
+    used = np.gradient(response.filled_kg, 1e-3)[1000:]
+    rate = np.gradient(response.supply_pa, 1e-3)[1000:]
+    running = (rate > 0.0) & (np.roll(rate, 2) > 0.0) & (np.roll(rate, -2) > 0.0)
+    assert np.allclose((rate * 2e-5 / RT + used)[running], 2e-4, rtol=1e-3)
+
+
+def test_a_reservoir_one_step_would_empty_is_refused():
+    with pytest.raises(InputError, match='at least'):
+        held('hsv', ('supply_droop', {'reservoir_volume_m3': 1e-7})).simulate(pulse())
+
+
+def test_dead_volume_is_the_parameter_by_another_name():
+    rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv')
+    start = {'initial_pressure_pa': P_ATM_PA + 300e3}
+    effect = rig.with_(effects=[
+        {'name': 'dead_volume', 'parameters': {'extra_volume_m3': 2e-6}}])
+    parameter = rig.with_(parameters={'V_dead': 5e-6})
+    ours, theirs = (one.simulate(duties('random', 2000), **start) for one in (effect, parameter))
+    assert np.allclose(ours.outputs, theirs.outputs, rtol=1e-7, atol=1e-9)
+    gained = ours.air_mass_kg - ours.air_mass_kg[0]
+    assert np.max(np.abs(gained - ours.filled_kg + ours.vented_kg)) < 1e-14
+    air = ours.pressure_pa * (rig.volume_m3(ours.contraction_m) + 2e-6)
+    assert np.allclose(air, ours.air_mass_kg * RT, rtol=1e-9)
+    step = held('hsv', ('dead_volume', {'extra_volume_m3': 2e-6})).simulate(
+        pulse(fill=0.2, last=20))
+    nominal = held('hsv').simulate(pulse(fill=0.2, last=20))
+    ratio = (step.pressure_pa[-1] - P_ATM_PA) / (nominal.pressure_pa[-1] - P_ATM_PA)
+    volume = held('hsv').volume_m3(HELD_M)
+    assert ratio == pytest.approx(volume / (volume + 2e-6), rel=1e-6)
+
+
+def test_thermal_limits_and_time_constant():
+    volume = held('hsv').volume_m3(HELD_M)
+    signal = pulse(fill=0.5, last=50, count=3000)
+    start = {'initial_pressure_pa': P_ATM_PA + 100e3}
+    adiabatic = held('hsv', ('thermal', {'heat_exchange_time_s': 1e3})).simulate(signal, **start)
+    gained = adiabatic.air_mass_kg - adiabatic.air_mass_kg[0]
+    rise = adiabatic.pressure_pa - adiabatic.pressure_pa[0]
+    assert rise[50] == pytest.approx(1.4 * RT / volume * gained[50], rel=1e-3)
+    real = held('hsv', ('thermal', {'heat_exchange_time_s': 0.2})).simulate(signal, **start)
+    warm = real.pressure_pa * volume / real.air_mass_kg / RT - 1.0
+    assert warm[50] > 0.04 and abs(warm[-1]) < 1e-4
+    tau_s = 0.2 * real.air_mass_kg[-1] / 8e-5
+    expected = warm[50] * np.exp(-(real.time_s[50:] - real.time_s[50]) / tau_s)
+    assert np.max(np.abs(warm[50:] - expected)) < 1e-4
+    quick = held('hsv', ('thermal', {'heat_exchange_time_s': 1e-6})).simulate(signal, **start)
+    nominal = held('hsv').simulate(signal, **start)
+    assert np.allclose(quick.pressure_pa, nominal.pressure_pa, rtol=1e-4)
+
+
+@pytest.mark.parametrize('fidelity, tolerance', [('averaged', 1e-6), ('switching', 1e-4)])
+def test_thermal_closes_the_balances_of_mass_and_energy(fidelity, tolerance):
+    tau_s, gamma = 0.2, 1.4
+    rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv', fidelity=fidelity).with_(effects=[
+        {'name': 'thermal', 'parameters': {'heat_exchange_time_s': tau_s}}])
+    dt_s = 2e-4
+    signal = np.repeat(duties('sine', 2000), 5, axis=0)
+    r = rig.simulate(signal, initial_pressure_pa=P_ATM_PA + 350e3, dt_s=dt_s)
+    gained = r.air_mass_kg - r.air_mass_kg[0]
+    assert np.max(np.abs(gained - r.filled_kg + r.vented_kg)) < 1e-14
+    volume = rig.volume_m3(r.contraction_m)
+    rt = r.pressure_pa * volume / r.air_mass_kg
+    assert rt.max() > 1.01 * RT and rt.min() < 0.99 * RT
+
+    def middle(signal):
+        return 0.5 * (signal[1:] + signal[:-1])
+    enthalpy = gamma * (RT * np.diff(r.filled_kg) - middle(rt) * np.diff(r.vented_kg))
+    work = (gamma - 1.0) * middle(r.pressure_pa) * np.diff(volume)
+    heat = 8e-5 / tau_s * (RT - middle(rt)) * dt_s
+    energy = r.pressure_pa * volume                        # times 1 / (gamma - 1)
+    left = np.diff(energy) - enthalpy + work - heat
+    turned_over = np.sum(np.abs(enthalpy)) + np.sum(np.abs(work))
+    assert abs(np.sum(left)) < tolerance * turned_over
+
+
+@pytest.mark.parametrize('name', ['flow_limit', 'valve_hysteresis'])
+def test_effects_of_the_regulator_leave_the_switching_valves_alone(name):
+    signal = duties('random', 300)
+    ours = held('hsv', (name, {})).simulate(signal)
+    assert np.array_equal(ours.outputs, held('hsv').simulate(signal).outputs)
+
+
+@pytest.mark.parametrize('name', ['supply_droop', 'dead_volume', 'thermal'])
+def test_effects_of_the_switching_valves_leave_the_regulator_alone(name):
+    signal = np.full(300, 4.0)
+    ours = held('ppr', (name, {})).simulate(signal)
+    assert np.array_equal(ours.outputs, held('ppr').simulate(signal).outputs)
