@@ -77,21 +77,16 @@ class Repperger(MuscleLaw):
 
     def _check(self, where):
         low, high = self.validity.pressure_gauge_pa
-        value = self.values
-        pressure = np.unique([low, high, np.clip(value['k_pressure_pa'], low, high)])
-        limit = self.validity.strain[1] * value['length_m']
-        for x in (0.0, limit):
-            if np.any(self.spring_n_per_m(pressure, x)
-                      + np.minimum(0.0, value['k_x_n_per_m2'] * x) <= 0.0):
-                raise InputError('the spring K must make force fall with contraction over the '
-                                 'whole range of pressure and contraction', where)
+        pressure = np.array([low, high])
         if np.any(self.damper_n_s_per_m(pressure, 1.0) < 0.0) or np.any(
                 self.damper_n_s_per_m(pressure, -1.0) < 0.0):
             raise InputError('the damper B must not be negative in the pressure range', where)
-        grid = np.linspace(low, high, 25)[:, None]
-        strain = np.linspace(0.0, self.validity.strain[1], 25)
-        rise = np.diff(self._tension_n(grid, strain), axis=0)
-        if np.any((rise <= 0.0) & (self._tension_n(grid[1:], strain) > 0.0)):
+        tension = self._tension_n(np.linspace(low, high, 49)[:, None],
+                                  np.linspace(0.0, self.validity.strain[1], 49))
+        if np.any((np.diff(tension, axis=1) >= 0.0) & (tension[:, 1:] > 0.0)):
+            raise InputError('the spring K must make force fall with contraction wherever the '
+                             'muscle pulls', where)
+        if np.any((np.diff(tension, axis=0) <= 0.0) & (tension[1:] > 0.0)):
             raise InputError('these coefficients let force fall with pressure while the muscle '
                              'pulls; raise `f1_n_per_pa` or lower the slopes of K', where)
 
