@@ -69,7 +69,8 @@ def test_bore_and_braid_angle_alone_give_half_the_force():
 
 
 @pytest.mark.parametrize('name, muscle', [
-    ('chou_hannaford', 'dmsp_5'), ('tondu_lopez', 'dmsp_5'), ('tondu_lopez', 'dmsp_10_constant_k')])
+    ('chou_hannaford', 'dmsp_5'), ('tondu_lopez', 'dmsp_5'),
+    ('tondu_lopez', 'dmsp_10_constant_k')])
 def test_force_is_the_virtual_work_of_the_volume(name, muscle):
     law = make_law(name, muscle=muscle)
     strain, pressure, step = np.linspace(0.01, 0.15, 15), 500e3, 1e-5
