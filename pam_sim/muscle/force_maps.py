@@ -16,7 +16,7 @@
 Measured static force maps of a DMSP-10-250 and a DMSP-20-300.
 
 M. Martens and I. Boblan (2017), Actuators 6(4), 33, doi 10.3390/act6040033,
-CC BY. Where the force is zero the muscle did not pull: such a point says that
+CC BY expected. Where the force is zero the muscle did not pull: such a point says that
 the force is at most zero, not that it was measured.
 """
 
