@@ -104,6 +104,7 @@ def fit_law(name, points, muscle=None, fixed=None, free=None):
     name : str
         Law with an entry in ``FREE``, or any law with ``free`` given.
     points : ForceMap
+        What to fit to.
     muscle : str, optional
         Set to start from.
     fixed : dict, optional

@@ -139,6 +139,7 @@ def table_from_law(law, volume_m3, pressure_gauge_pa, load_n, dead_volume_m3=0.0
     Parameters
     ----------
     law : MuscleLaw
+        Gives the contraction.
     volume_m3 : callable
         Strain array to inner volume [m^3].
     pressure_gauge_pa, load_n : ndarray
