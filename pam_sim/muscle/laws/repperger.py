@@ -62,8 +62,8 @@ class Repperger(MuscleLaw):
     )
     SETS = {
         'reynolds_2003': ParameterSet(
-            {}, 'unverified: recalled coefficients attributed to Reynolds et al. 2003, no source at '
-            'hand; only the pressure range is confirmed, by the abstract; a hand-made muscle, '
+            {}, 'unverified: recalled coefficients attributed to Reynolds et al. 2003, no source '
+            'at hand; only the pressure range is confirmed, by the abstract; a hand-made muscle, '
             'length assumed', Validity((207e3, 621e3), (0.0, 0.25))),
         'two_slopes': ParameterSet(
             {'length_m': 0.200, 'f0_n': 44.6, 'f1_n_per_pa': 2.91 * _KPA,
