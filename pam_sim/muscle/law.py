@@ -1,0 +1,208 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every muscle law has in common: parameters, named sets, ranges, static inverses."""
+
+from dataclasses import dataclass, field
+import warnings
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.parameters import check_parameters
+
+# The chapter's rules of PAM behaviour (section 4.1, after Daerden and Lefeber).
+RULES = {
+    1: 'Contraction goes with an increasing volume.',
+    2: 'At constant load, more pressure means more contraction.',
+    3: 'At constant pressure, less load means more contraction.',
+    4: 'Contraction has an upper limit, where the muscle pulls with zero force.',
+}
+OUTSIDE = ('warn', 'refuse', 'allow')
+MIN_STRAIN, MAX_STRAIN = -0.1, 0.9      # beyond these a length is a mistake, not a muscle
+
+
+class ExtrapolationWarning(UserWarning):
+    """A law was asked outside the range in which its numbers are known."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """
+    Range in which the numbers of a set are known.
+
+    Parameters
+    ----------
+    pressure_gauge_pa, strain : tuple of float
+        Lower and upper end, inclusive.
+
+    """
+
+    pressure_gauge_pa: tuple = (0.0, 600e3)
+    strain: tuple = (0.0, 0.25)
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """
+    Named numbers of one muscle.
+
+    Parameters
+    ----------
+    values : dict
+        Parameter name to SI value.
+    rests_on : str
+        Where the numbers come from and how far to trust them.
+    validity : Validity
+
+    """
+
+    values: dict = field(default_factory=dict)
+    rests_on: str = ''
+    validity: Validity = Validity()
+
+
+class MuscleLaw:
+    """
+    Static force of a muscle against gauge pressure and contraction.
+
+    A subclass states the class attributes and ``_tension_n``.
+
+    Parameters
+    ----------
+    values : mapping, optional
+        Parameters that differ from the set; SI.
+    muscle : str, optional
+        Name of a parameter set; the first one by default.
+    where : str
+        Place for error messages.
+
+    Attributes
+    ----------
+    NAME, EQUATION, FORMULA, SOURCE : str
+        Name, number in the chapter, formula as text, paper.
+    PARAMETERS : tuple of Parameter
+    SETS : dict
+        Set name to ParameterSet.
+    CLAIMS : tuple of int
+        Which of ``RULES`` the law claims.
+
+    Raises
+    ------
+    InputError
+        Unknown set or parameter, value out of bounds, or numbers that break a
+        claimed rule.
+
+    """
+
+    NAME = ''
+    EQUATION = ''
+    FORMULA = ''
+    SOURCE = ''
+    PARAMETERS = ()
+    SETS = {'default': ParameterSet()}
+    CLAIMS = ()
+
+    def __init__(self, values=None, muscle=None, where=''):
+        muscle = next(iter(self.SETS)) if muscle is None else muscle
+        if muscle not in self.SETS:
+            raise InputError(f'law `{self.NAME}` has no set `{muscle}`; '
+                             f'allowed: {", ".join(self.SETS)}', where)
+        self.muscle = muscle
+        self.validity = self.SETS[muscle].validity
+        own = {} if values is None else values
+        check_parameters(self.PARAMETERS, own, f'parameter of `{self.NAME}`', where)
+        self.values = check_parameters(
+            self.PARAMETERS, {**self.SETS[muscle].values, **own}, where=where)
+        self._check(where)
+
+    def _check(self, where):
+        """Raise InputError where the parameters together make no muscle."""
+
+    def _tension_n(self, pressure, strain):
+        """Return the formula's value [N], negative where the muscle would push."""
+        raise NotImplementedError(f'{type(self).__name__} states no force')
+
+    def outside(self, pressure_gauge_pa, strain):
+        """Return True where the point is outside the range of the numbers; arrays broadcast."""
+        low_p, high_p = self.validity.pressure_gauge_pa
+        low_e, high_e = self.validity.strain
+        pressure, strain = np.asarray(pressure_gauge_pa, float), np.asarray(strain, float)
+        return ((pressure < low_p * (1 - 1e-9)) | (pressure > high_p * (1 + 1e-9))
+                | (strain < low_e - 1e-9) | (strain > high_e + 1e-9))
+
+    def _judged(self, pressure_gauge_pa, strain, outside):
+        pressure = np.asarray(pressure_gauge_pa, dtype=float)
+        strain = np.asarray(strain, dtype=float)
+        if outside not in OUTSIDE:
+            raise InputError(f'is {outside!r}; allowed: {", ".join(OUTSIDE)}', 'outside')
+        if not np.all(np.isfinite(pressure)) or np.any(pressure < 0.0):
+            raise InputError('gauge pressure must be finite and not negative',
+                             'pressure_gauge_pa')
+        if not np.all((strain >= MIN_STRAIN) & (strain <= MAX_STRAIN)):
+            raise InputError(
+                f'contraction must be a number from {MIN_STRAIN} to {MAX_STRAIN}', 'strain')
+        beyond = np.zeros(()) if outside == 'allow' else self.outside(pressure, strain)
+        if np.any(beyond):
+            low_p, high_p = self.validity.pressure_gauge_pa
+            low_e, high_e = self.validity.strain
+            text = (f'law `{self.NAME}` ({self.muscle}) is known from {low_p / 1e3:g} to '
+                    f'{high_p / 1e3:g} kPa and from {100 * low_e:g} to {100 * high_e:g} % '
+                    f'contraction; {np.count_nonzero(beyond)} point(s) lie outside')
+            if outside == 'refuse':
+                raise InputError(text, 'force_n')
+            warnings.warn(text, ExtrapolationWarning, stacklevel=3)
+        return pressure, strain
+
+    def formula_n(self, pressure_gauge_pa, strain):
+        """Return the unclipped value [N] of the formula, for fits; checked, never warned."""
+        return self._tension_n(*self._judged(pressure_gauge_pa, strain, 'allow'))
+
+    def force_n(self, pressure_gauge_pa, strain, outside='warn'):
+        """
+        Return the static tension [N], never negative; arrays broadcast.
+
+        Parameters
+        ----------
+        pressure_gauge_pa : float or ndarray
+            Gauge pressure, Pa.
+        strain : float or ndarray
+            Contraction over length at rest.
+        outside : str
+            ``warn``, ``refuse`` or ``allow`` points outside ``validity``.
+
+        Raises
+        ------
+        InputError
+            Not finite, negative pressure, impossible contraction, or a point
+            outside the range with ``outside='refuse'``.
+
+        """
+        force = self._tension_n(*self._judged(pressure_gauge_pa, strain, outside))
+        return np.maximum(0.0, force)[()]
+
+    def max_strain(self, pressure_gauge_pa, load_n=0.0):
+        """
+        Return the contraction at which the tension has fallen to a load; arrays broadcast.
+
+        Bisection on the formula, from rest to full contraction; 0 where the
+        load is not lifted. Points outside the range are not flagged here.
+        """
+        pressure, load = np.broadcast_arrays(
+            np.asarray(pressure_gauge_pa, float), np.asarray(load_n, float))
+        low, high = np.zeros(pressure.shape), np.full(pressure.shape, MAX_STRAIN)
+        for _ in range(52):
+            middle = 0.5 * (low + high)
+            pulls = self.formula_n(pressure, middle) > load
+            low, high = np.where(pulls, middle, low), np.where(pulls, high, middle)
+        return np.where(self.formula_n(pressure, 0.0 * low) > load, 0.5 * (low + high), 0.0)[()]

@@ -1,0 +1,104 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Six coefficients in pressure and contraction, after Sarosi.
+
+J. Sarosi (2012), "New approximation algorithm for the force of fluidic
+muscles", IEEE SACI. The chapter does not have it; the rig's force map does.
+"""
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.muscle import sarosi as kernel
+from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
+from pam_sim.parameters import Parameter
+
+_NAMES = ('a1_n_per_pa', 'a2_n', 'a3', 'a4_n_per_pa', 'a5_n_per_pa', 'a6_n')
+_SOURCE = 'Sarosi 2012, New approximation algorithm for the force of fluidic muscles'
+_PUBLISHED = 'published fit as quoted in a public model comparison; original paper not seen'
+
+
+def _si(coefficients, pressure_unit_pa):
+    """Return the SI values of coefficients stated for a pressure unit and percent."""
+    a1, a2, a3, a4, a5, a6 = coefficients
+    return dict(zip(_NAMES, (a1 / pressure_unit_pa, a2, 100.0 * a3,
+                             100.0 * a4 / pressure_unit_pa, a5 / pressure_unit_pa, a6)))
+
+
+class Sarosi(MuscleLaw):
+    """F = (a1 p + a2) exp(a3 eps) + a4 eps p + a5 p + a6; p gauge, SI."""
+
+    NAME = 'sarosi'
+    EQUATION = 'none in the chapter'
+    FORMULA = 'F = (a1 p + a2) exp(a3 eps) + a4 eps p + a5 p + a6'
+    SOURCE = _SOURCE
+    PARAMETERS = tuple(
+        Parameter(name, unit, nominal, lower, upper, 0.02, text, _SOURCE)
+        for name, unit, nominal, lower, upper, text in (
+            ('a1_n_per_pa', 'N/Pa', kernel.A1 / 1e3, -0.01, 0.01,
+             'Pressure part of the decaying term.'),
+            ('a2_n', 'N', kernel.A2, 0.0, 5000.0, 'Force of the decaying term.'),
+            ('a3', '-', 100.0 * kernel.A3, -500.0, -1.0, 'Decay with contraction.'),
+            ('a4_n_per_pa', 'N/Pa', kernel.A4 / 10.0, -1.0, 0.0,
+             'Loss of pressure gain with contraction.'),
+            ('a5_n_per_pa', 'N/Pa', kernel.A5 / 1e3, 1e-6, 0.1, 'Pressure gain at rest.'),
+            ('a6_n', 'N', kernel.A6, -5000.0, 1000.0, 'Offset.'),
+        ))
+    SETS = {
+        'dmsp_5': ParameterSet(
+            _si((kernel.A1, kernel.A2, kernel.A3, kernel.A4, kernel.A5, kernel.A6), 1e3),
+            'the force map of the rig: measured map of a DMSP-10-250 fitted and scaled to 140 N '
+            'at 600 kPa; no DMSP-5 force data exist, good to 15 %',
+            Validity((50e3, 600e3), (0.0, 0.25))),
+        'dmsp_10': ParameterSet(
+            _si((-9.2194029, 203.7012413, -0.34221042, -3.2255991, 109.2038216, -208.372034),
+                1e5), _PUBLISHED, Validity((0.0, 600e3), (0.0, 0.25))),
+        'dmsp_20_200n': ParameterSet(
+            _si((-4.00180705, 292.4620246, -0.32930845, -9.33564098, 294.0538256, -280.498151),
+                1e5), _PUBLISHED + '; named for 200 N', Validity((0.0, 600e3), (0.0, 0.27))),
+        'dmsp_20_400n': ParameterSet(
+            _si((-4.35573, 281.2237, -0.32866, -9.27035, 302.20107, -263.69185), 1e5),
+            _PUBLISHED + '; named for 400 N', Validity((0.0, 600e3), (0.0, 0.28))),
+    }
+    CLAIMS = (2, 3, 4)
+
+    def _check(self, where):
+        # The rules hold where force rises with pressure and falls with contraction.
+        a1, a2, a3, a4, a5, _ = self.values.values()
+        top = self.validity.pressure_gauge_pa[1]
+        if min(a2, a1 * top + a2) < 0.0:
+            raise InputError(
+                f'`a1_n_per_pa` and `a2_n` let force rise with contraction below {top:g} Pa; '
+                f'a1 p + a2 must not be negative', where)
+        strain = np.linspace(0.0, self.validity.strain[1], 101)
+        pulls = self._tension_n(top, strain) > 0.0
+        if np.any((a1 * np.exp(a3 * strain) + a4 * strain + a5)[pulls] <= 0.0):
+            raise InputError('these coefficients let force fall with pressure while the muscle '
+                             'pulls; raise `a5_n_per_pa` or `a1_n_per_pa`', where)
+
+    def _tension_n(self, pressure, strain):
+        a1, a2, a3, a4, a5, a6 = self.values.values()
+        return ((a1 * pressure + a2) * np.exp(a3 * strain)
+                + (a4 * strain + a5) * pressure + a6)
+
+    def pressure_gauge_pa(self, force_n, strain):
+        """Return the gauge pressure [Pa] that gives a force; the law is linear in pressure."""
+        a1, a2, a3, a4, a5, a6 = self.values.values()
+        strain = np.asarray(strain, dtype=float)
+        decay = np.exp(a3 * strain)
+        return (np.asarray(force_n, float) - a2 * decay - a6) / (a1 * decay + a4 * strain + a5)
+
+
+LAW = Sarosi
