@@ -75,6 +75,30 @@ def add_controller_options(parser):
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
 
 
+def load_setup(args):
+    """
+    Return (experiment, rig, controller) that the options name.
+
+    The controller is None for an experiment in the pressure domain.
+
+    Raises
+    ------
+    InputError
+        In any of the three.
+
+    """
+    # Here and not above: --help must not wait for the simulator to load.
+    from pam_actuation.control.config import load_controller
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    experiment = load_experiment(args.experiment)
+    rig = load_rig(args.rig, valve=args.valve)
+    if experiment.domain != 'contraction':
+        return experiment, rig, None
+    return experiment, rig, load_controller(
+        default_controller(args, rig.valve), rig, rules_file=args.rules)
+
+
 def default_controller(args, valve):
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'

@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_rig_options, default_controller, emit, EXIT_DONE, EXIT_FINDING,
+    add_controller_options, add_rig_options, emit, EXIT_DONE, EXIT_FINDING, load_setup,
     progress)
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
@@ -41,16 +41,8 @@ def add_arguments(parser):
 
 def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
-    from pam_actuation.control.config import load_controller
-    from pam_actuation.experiments import load_experiment
     from pam_actuation.rigging.session import run_experiment
-    from pam_sim import load_rig
-    experiment = load_experiment(args.experiment)
-    rig = load_rig(args.rig, valve=args.valve)
-    controller = None
-    if experiment.domain == 'contraction':
-        controller = load_controller(
-            default_controller(args, rig.valve), rig, rules_file=args.rules)
+    experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:

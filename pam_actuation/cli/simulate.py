@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_rig_options, default_controller, emit, EXIT_DONE, progress)
+    add_controller_options, add_rig_options, emit, EXIT_DONE, load_setup, progress)
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
@@ -37,16 +37,8 @@ def add_arguments(parser):
 
 def run(args):
     """Simulate and say what was recorded."""
-    from pam_actuation.control.config import load_controller
-    from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.offline import simulate_experiment
-    from pam_sim import load_rig
-    experiment = load_experiment(args.experiment)
-    rig = load_rig(args.rig, valve=args.valve)
-    controller = None
-    if experiment.domain == 'contraction':
-        controller = load_controller(
-            default_controller(args, rig.valve), rig, rules_file=args.rules)
+    experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
     started = time.perf_counter()
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:

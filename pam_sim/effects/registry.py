@@ -14,41 +14,21 @@
 
 """Find the effects: every module of this folder, and of ``PAM_EFFECTS_PATH``."""
 
-import difflib
 from functools import lru_cache
-import importlib
-import importlib.util
-import os
 from pathlib import Path
-import sys
 
 from pam_sim.effects.effect import Effect
 from pam_sim.errors import InputError
+from pam_sim.plugins import pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
-_NOT_EFFECTS = ('__init__', 'effect', 'registry')
+_NOT_EFFECTS = ('effect', 'registry')
 
 
 def effect_files():
     """Return the source files of all effects, sorted by effect name."""
-    files = [path for path in _OWN_FOLDER.glob('*.py') if path.stem not in _NOT_EFFECTS]
-    for folder in filter(None, os.environ.get('PAM_EFFECTS_PATH', '').split(os.pathsep)):
-        if not Path(folder).is_dir():
-            raise InputError('is not a folder', f'PAM_EFFECTS_PATH: {folder}')
-        files += [path for path in Path(folder).glob('*.py') if not path.stem.startswith('_')]
-    return sorted(files, key=lambda path: (path.stem, str(path)))
-
-
-def _module_of(path):
-    if path.parent == _OWN_FOLDER:
-        return importlib.import_module(f'pam_sim.effects.{path.stem}')
-    name = f'pam_effect_{path.stem}'
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    return plugin_files(_OWN_FOLDER, 'PAM_EFFECTS_PATH', _NOT_EFFECTS)
 
 
 @lru_cache(maxsize=None)
@@ -64,7 +44,7 @@ def effects():
     """
     found = {}
     for path in effect_files():
-        module = _module_of(path)
+        module = plugin_module(path, _OWN_FOLDER, 'pam_sim.effects', 'pam_effect')
         effect = getattr(module, 'EFFECT', None)
         if not isinstance(effect, Effect):
             raise InputError('defines no EFFECT = Effect(...)', str(path))
@@ -87,10 +67,4 @@ def get_effect(name, where=''):
         Unknown name; the message lists the names there are.
 
     """
-    known = effects()
-    if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f' (did you mean `{near[0]}`?)' if near else ''
-        raise InputError(
-            f'unknown effect `{name}`{hint}; allowed: {", ".join(sorted(known))}', where)
-    return known[name]
+    return pick(effects(), name, 'effect', where)

@@ -14,41 +14,19 @@
 
 """Find the muscle laws: every module of ``laws``, and of ``PAM_MUSCLE_LAWS_PATH``."""
 
-import difflib
 from functools import lru_cache
-import importlib
-import importlib.util
-import os
 from pathlib import Path
-import sys
 
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
+from pam_sim.plugins import pick, plugin_files, plugin_module
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 
 
 def law_files():
     """Return the source files of all laws, sorted by name."""
-    folders = [_OWN_FOLDER]
-    for folder in filter(None, os.environ.get('PAM_MUSCLE_LAWS_PATH', '').split(os.pathsep)):
-        if not Path(folder).is_dir():
-            raise InputError('is not a folder', f'PAM_MUSCLE_LAWS_PATH: {folder}')
-        folders.append(Path(folder))
-    files = [path for folder in folders for path in folder.glob('*.py')
-             if not path.stem.startswith('_')]
-    return sorted(files, key=lambda path: (path.stem, str(path)))
-
-
-def _module_of(path):
-    if path.parent == _OWN_FOLDER:
-        return importlib.import_module(f'pam_sim.muscle.laws.{path.stem}')
-    name = f'pam_muscle_law_{path.stem}'
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    return plugin_files(_OWN_FOLDER, 'PAM_MUSCLE_LAWS_PATH')
 
 
 @lru_cache(maxsize=None)
@@ -64,7 +42,8 @@ def laws():
     """
     found = {}
     for path in law_files():
-        law = getattr(_module_of(path), 'LAW', None)
+        module = plugin_module(path, _OWN_FOLDER, 'pam_sim.muscle.laws', 'pam_muscle_law')
+        law = getattr(module, 'LAW', None)
         if not (isinstance(law, type) and issubclass(law, MuscleLaw)):
             raise InputError('defines no LAW, a subclass of MuscleLaw', str(path))
         if law.NAME in found or law.NAME != path.stem:
@@ -84,13 +63,7 @@ def get_law(name, where=''):
         Unknown name; the message lists the names there are.
 
     """
-    known = laws()
-    if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f' (did you mean `{near[0]}`?)' if near else ''
-        raise InputError(
-            f'unknown muscle law `{name}`{hint}; allowed: {", ".join(known)}', where)
-    return known[name]
+    return pick(laws(), name, 'muscle law', where)
 
 
 def make_law(name, values=None, muscle=None, where=''):

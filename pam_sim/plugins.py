@@ -1,0 +1,89 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Finding things that are registered by standing in a folder: effects, muscle laws.
+
+A folder of this package and the folders an environment variable names are searched;
+a module is a plug-in by being there.
+"""
+
+import difflib
+import importlib
+import importlib.util
+import os
+from pathlib import Path
+import sys
+
+from pam_sim.errors import InputError
+
+
+def plugin_files(own_folder, variable, not_plugins=()):
+    """
+    Return the source files of all plug-ins, sorted by name.
+
+    Parameters
+    ----------
+    own_folder : Path
+        Folder inside this package.
+    variable : str
+        Environment variable with further folders, separated as in PATH.
+    not_plugins : tuple of str
+        Modules of the own folder that are something else.
+
+    Raises
+    ------
+    InputError
+        The variable names something that is not a folder.
+
+    """
+    folders = [Path(own_folder)]
+    for folder in filter(None, os.environ.get(variable, '').split(os.pathsep)):
+        if not Path(folder).is_dir():
+            raise InputError('is not a folder', f'{variable}: {folder}')
+        folders.append(Path(folder))
+    files = [path for folder in folders for path in folder.glob('*.py')
+             if not path.stem.startswith('_')
+             and not (folder == folders[0] and path.stem in not_plugins)]
+    return sorted(files, key=lambda path: (path.stem, str(path)))
+
+
+def plugin_module(path, own_folder, package, prefix):
+    """Return the imported module of a plug-in file, of the package or from elsewhere."""
+    if path.parent == Path(own_folder):
+        return importlib.import_module(f'{package}.{path.stem}')
+    name = f'{prefix}_{path.stem}'
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def pick(known, name, what, where=''):
+    """
+    Return ``known[name]``.
+
+    Raises
+    ------
+    InputError
+        Unknown name; the message lists the names there are.
+
+    """
+    if name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        hint = f' (did you mean `{near[0]}`?)' if near else ''
+        raise InputError(
+            f'unknown {what} `{name}`{hint}; allowed: {", ".join(sorted(known))}', where)
+    return known[name]
