@@ -51,8 +51,10 @@ def run(args):
             seed=args.seed, domain_id=args.domain_id, namespace=args.namespace,
             overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n))
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
-    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {published} messages '
-             f'published, {recorded} recorded', f'bag: {result.bag}']
+    # A node that was killed could not report its last count.
+    counted = '' if result.failure else f', {published} published'
+    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {recorded} messages '
+             f'recorded{counted}', f'bag: {result.bag}']
     if result.failure:
         lines.append(f'not completed: {result.failure}')
     lines += [f'finding: {text}' for text in result.findings]
