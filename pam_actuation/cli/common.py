@@ -75,6 +75,15 @@ def add_controller_options(parser):
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
 
 
+def add_experiment_options(parser):
+    """Add what ``run`` and ``simulate`` both need: experiment, rig, controller, seed."""
+    parser.add_argument('experiment', help='experiment name or YAML file')
+    add_rig_options(parser)
+    add_controller_options(parser)
+    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
+
+
 def load_setup(args):
     """
     Return (experiment, rig, controller) that the options name.

@@ -18,8 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_rig_options, emit, EXIT_DONE, EXIT_FINDING, load_setup,
-    progress)
+    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress)
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
@@ -27,16 +26,12 @@ EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('experiment', help='experiment name or YAML file')
-    add_rig_options(parser)
-    add_controller_options(parser)
+    add_experiment_options(parser)
     parser.add_argument('--out', default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
-    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
     parser.add_argument('--domain-id', type=int, default=None, metavar='N',
                         help='ROS domain (default: a free one, this machine only)')
     parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
 
 
 def run(args):

@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_rig_options, emit, EXIT_DONE, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, load_setup, progress)
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
@@ -26,13 +26,9 @@ EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('experiment', help='experiment name or YAML file')
-    add_rig_options(parser)
-    add_controller_options(parser)
+    add_experiment_options(parser)
     parser.add_argument('--out', default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE)')
-    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
 
 
 def run(args):

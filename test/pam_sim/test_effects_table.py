@@ -14,10 +14,7 @@
 
 """The effects there are, as a result names them; all of them at once."""
 
-import os
-import subprocess
-import sys
-
+from both_ways import compiled_and_not
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
@@ -113,13 +110,7 @@ def test_all_effects_at_once_interpreted_and_compiled(tmp_path):
         '        s = np.stack([np.clip(s, 0, 1), np.clip(-s, 0, 1)], axis=1)\n'
         '    rows.append(rig.simulate(s, initial_pressure_pa=501325.0).outputs)\n'
         'np.save(sys.argv[1], np.array(rows))\n')
-    results = []
-    for disabled in ('0', '1'):
-        path = tmp_path / f'{disabled}.npy'
-        subprocess.run([sys.executable, '-c', script, str(path)], check=True, timeout=200,
-                       env={**os.environ, 'NUMBA_DISABLE_JIT': disabled,
-                            'PYTHONPATH': os.pathsep.join(sys.path)})
-        results.append(np.load(path))
+    results = compiled_and_not(script, tmp_path)
     assert np.isfinite(results[0]).all()
     assert np.array_equal(*results)
 

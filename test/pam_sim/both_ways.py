@@ -1,0 +1,37 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Run a script with the compiler on and off, for tests that want equal bits."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+
+def compiled_and_not(script, folder):
+    """
+    Return the arrays a script saves to its first argument, [compiled, not compiled].
+
+    Each runs in a process of its own, since the compiler is switched at import.
+    """
+    results = []
+    for disabled in ('0', '1'):
+        path = folder / f'{disabled}.npy'
+        subprocess.run([sys.executable, '-c', script, str(path)], check=True, timeout=200,
+                       env={**os.environ, 'NUMBA_DISABLE_JIT': disabled,
+                            'PYTHONPATH': os.pathsep.join(sys.path)})
+        results.append(np.load(path))
+    return results
