@@ -85,6 +85,10 @@ class Effect:
         What it is, for people.
     source : str
         Where the equation comes from.
+    equation : str
+        What it adds to the nominal rig, one line of plain text.
+    variant_of : str
+        Name of the effect of which this is another formulation; results name that one.
     parameters : tuple of Parameter
         Nominal values are typical sizes, used where a model file gives none.
     amplitude : tuple of str
@@ -115,6 +119,8 @@ class Effect:
     parameters: tuple
     amplitude: tuple
     reported: tuple = ()
+    equation: str = ''
+    variant_of: str = ''
     states: int = 0
     slots: int = None
     pack: object = _pack_in_order
