@@ -105,10 +105,14 @@ def valve_flows(fill, vent, p, supply, altered, state, par):
 
 
 @inlined
-def pressure_per_kg(mass, inflow, net, p, volume, elapsed, state, par):
-    """Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p."""
+def pressure_per_kg(mass, inflow, net, p, volume, per_m3, elapsed, state, par):
+    """
+    Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p.
+
+    ``per_m3`` is 1 / V, which is known before the flows are.
+    """
     return apply_air_rt(
-        par[PAR_RT], mass, inflow, inflow - net, p, volume, elapsed, state, par) / volume
+        par[PAR_RT], mass, inflow, inflow - net, p, volume, elapsed, state, par) * per_m3
 
 
 @inlined
@@ -256,14 +260,15 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
         q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
         volume = air_volume(p0, x_mid, state, par)
-        density = par[PAR_RT] / volume                                 # Pa/kg
+        per_m3 = 1.0 / volume
+        density = par[PAR_RT] * per_m3                                 # Pa/kg
         if warm:
-            density = pressure_per_kg(mass0, in1, q1, p0, volume, g, state, par)
+            density = pressure_per_kg(mass0, in1, q1, p0, volume, per_m3, g, state, par)
         p_mid = (mass0 + g * q1) * density
         in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
         if warm:
-            density = pressure_per_kg(mass0, in2, q2, p0, volume, g, state, par)
+            density = pressure_per_kg(mass0, in2, q2, p0, volume, per_m3, g, state, par)
         p_mid = (mass0 + g * q2) * density
         in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
         q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
@@ -293,9 +298,10 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         x1 = min(max(x1, 0.0), top)
     if not is_ppr:
         volume = air_volume(p_mid, x1, state, par)
-        density = par[PAR_RT] / volume
+        per_m3 = 1.0 / volume
+        density = par[PAR_RT] * per_m3
         if warm:
-            density = pressure_per_kg(mass0, in3, q3, p0, volume, h, state, par)
+            density = pressure_per_kg(mass0, in3, q3, p0, volume, per_m3, h, state, par)
         p_end = (mass0 + h * q3) * density
         in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
         q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
@@ -307,7 +313,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
         if warm:
             density = pressure_per_kg(
-                mass0, filled / h, gained / h, p0, volume, h, state, par)
+                mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
         p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
@@ -341,10 +347,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
                 tension = map_tension(p_end, x1, state, par)
             if not is_ppr:
                 volume = air_volume(p_end, x1, state, par)
-                density = par[PAR_RT] / volume
+                per_m3 = 1.0 / volume
+                density = par[PAR_RT] * per_m3
                 if warm:
                     density = pressure_per_kg(
-                        mass0, filled / h, gained / h, p0, volume, h, state, par)
+                        mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
                 p_end = state[S_AIR_MASS] * density
     state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
