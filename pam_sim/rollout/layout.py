@@ -89,7 +89,8 @@ PAR_PWM_PERIOD = 22         # s
 PAR_INVERSE_LENGTH = 23     # 1/m
 PAR_INVERSE_MASS = 24       # 1/kg
 PAR_INVERSE_RT = 25         # kg/J
-PAR_BASE = 26
+PAR_EFFECTS = 26            # 1: any effect acts, 0: the nominal rig
+PAR_BASE = 27
 
 VALVE_PPR = 0
 VALVE_HSV_AVERAGED = 1

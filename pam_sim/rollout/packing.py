@@ -43,6 +43,7 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
         effect = get_effect(setting.name)
         effect.pack_into(setting.parameters, numbers, par, k, state, i)
         if par[k - 1] != 0.0:
+            par[layout.PAR_EFFECTS] = 1.0
             for hook in effect.hooks:
                 par[hook_flag(hook)] = 1.0
     kernel.settle(state, par)

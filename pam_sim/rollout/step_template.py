@@ -38,7 +38,8 @@ from pam_sim.rollout.hooks import (
     apply_flow_opening, apply_load_force, apply_load_friction, apply_map_input,
     apply_map_output, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
     apply_pressure_rate, apply_sensor, apply_sensor_commit, apply_set_point, apply_supply,
-    apply_switch_times, apply_valve_flow, apply_volume, pressure_rate_active, valve_flow_active)
+    apply_switch_times, apply_valve_flow, apply_volume, mass_flow_active, pressure_rate_active,
+    valve_flow_active)
 from pam_sim.rollout.layout import (
     INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
     OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
@@ -200,7 +201,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     x0 = state[S_CONTRACTION]
     v0 = state[S_VELOCITY]
     p0 = state[S_PRESSURE]
-    free = par[PAR_FREE_LOAD] != 0.0
+    free = par[PAR_FREE_LOAD] > 0.0
     inverse_mass = par[PAR_INVERSE_MASS]
     top = par[PAR_MAX_CONTRACTION]
     supply = apply_supply(par[PAR_SUPPLY], state, par)
@@ -236,6 +237,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     fill = 0.0
     vent = 0.0
     altered = False
+    flowing = False
     warm = False
     mass0 = 0.0
     gained = 0.0
@@ -257,21 +259,25 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         mass0 = state[S_AIR_MASS]
         altered = valve_flow_active(par)
         warm = air_rt_active(par)
-        in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
-        q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
+        # Both valves shut and no air lost: the mass stays, and no stage needs a flow.
+        flowing = fill > 0.0 or vent > 0.0 or altered or mass_flow_active(par)
+        if flowing:
+            in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
+            q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
         volume = air_volume(p0, x_mid, state, par)
         per_m3 = 1.0 / volume
         density = par[PAR_RT] * per_m3                                 # Pa/kg
         if warm:
             density = pressure_per_kg(mass0, in1, q1, p0, volume, per_m3, g, state, par)
         p_mid = (mass0 + g * q1) * density
-        in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
-        q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
-        if warm:
-            density = pressure_per_kg(mass0, in2, q2, p0, volume, per_m3, g, state, par)
-        p_mid = (mass0 + g * q2) * density
-        in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
-        q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
+        if flowing:
+            in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
+            q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
+            if warm:
+                density = pressure_per_kg(mass0, in2, q2, p0, volume, per_m3, g, state, par)
+            p_mid = (mass0 + g * q2) * density
+            in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
+            q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
     a_mid = 0.0
     if moving:
         v_mid = v0 + g * a0
@@ -303,18 +309,19 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         if warm:
             density = pressure_per_kg(mass0, in3, q3, p0, volume, per_m3, h, state, par)
         p_end = (mass0 + h * q3) * density
-        in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
-        q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
-        gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
-        filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
-        mass1 = mass0 + gained
-        state[S_AIR_MASS] = mass1
-        state[S_FILLED] += filled
-        state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
-        if warm:
-            density = pressure_per_kg(
-                mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
-        p_end = mass1 * density
+        if flowing:
+            in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
+            q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
+            gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
+            filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
+            mass1 = mass0 + gained
+            state[S_AIR_MASS] = mass1
+            state[S_FILLED] += filled
+            state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
+            if warm:
+                density = pressure_per_kg(
+                    mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
+            p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
         dx = x1 - x0
@@ -388,11 +395,10 @@ def cell_force(external, state, par):
 
 
 @inlined
-def observe(state, par, inp, out):
-    """Fill ``out`` from ``state`` without advancing anything."""
+def observe(force, a, state, par, out):
+    """Fill ``out`` from ``state`` and what ``cell_force`` returned for it."""
     p = state[S_PRESSURE]
     x = state[S_CONTRACTION]
-    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
     out[OUT_TIME] = state[S_TIME]
     out[OUT_VELOCITY] = state[S_VELOCITY]
     if par[PAR_VALVE] == VALVE_PPR:
@@ -430,4 +436,11 @@ def step_body(state, par, inp, out):
     force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
     apply_sensor_commit(
         state[S_PRESSURE], state[S_CONTRACTION], force, dt, state, par)
-    observe(state, par, inp, out)
+    observe(force, a, state, par, out)
+
+
+@inlined
+def look_body(state, par, inp, out):
+    """Fill ``out`` from ``state`` without advancing anything."""
+    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
+    observe(force, a, state, par, out)
