@@ -78,4 +78,5 @@ class Response:
 
     def as_dict(self):
         """Return name -> ndarray of all signals."""
-        return {name: np.ascontiguousarray(self.outputs[:, c]) for name, c in self._columns.items()}
+        return {name: np.ascontiguousarray(self.outputs[:, column])
+                for name, column in self._columns.items()}
