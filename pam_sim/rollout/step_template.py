@@ -56,7 +56,6 @@ from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
 
 
-
 @inlined
 def law_tension(gauge, strain, par):
     """Return the value of the force law [N], negative where it would push."""
