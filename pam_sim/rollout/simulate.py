@@ -60,8 +60,8 @@ def check_outputs(rig, outputs):
     if not math.isfinite(outputs.sum()) or pressure.min() <= 0.0:
         row = int(np.argmax(~np.isfinite(outputs).all(axis=1) | ~(pressure > 0.0)))
         raise InputError(
-            f'the simulation leaves what is physical at step {row}: the model\'s numbers cannot be '
-            'stepped this coarsely; use a smaller `dt_s`, or less extreme numbers',
+            f'the simulation leaves what is physical at step {row}: these numbers cannot be '
+            'stepped so coarsely; use a smaller `dt_s`, or less extreme numbers',
             f'rig {rig.name}')
     law = rig.muscle.law.law
     if not law.EXTRAPOLATES:
