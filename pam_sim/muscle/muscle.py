@@ -24,6 +24,7 @@ from functools import cached_property, lru_cache
 import math
 from pathlib import Path
 
+import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import load_yaml, Located
 from pam_sim.muscle import geometry
@@ -129,6 +130,13 @@ class Muscle:
         """Arguments of :func:`pam_sim.muscle.geometry.volume_of` after the contraction."""
         thread, turns = geometry.braid(self.length_m, self.bore_m, self.braid_angle_rad)
         return self.length_m, thread * thread, 1.0 / (4.0 * math.pi * turns * turns)
+
+    @cached_property
+    def stiffness_n_per_m(self):
+        """Largest fall of the tension with contraction up to 600 kPa, N/m: how short to step."""
+        strain = np.linspace(0.0, self.max_strain, 51)
+        force = self.law.law.force_n(np.array([[200e3], [400e3], [600e3]]), strain, 'allow')
+        return float(np.max(-np.diff(force)) / (strain[1] * self.length_m))
 
     def volume_m3(self, contraction_m):
         """Return the inner volume [m^3] at a contraction [m]; scalar or array."""

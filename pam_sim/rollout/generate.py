@@ -299,5 +299,5 @@ def load_cached_module(name, source, key):
 
 
 def load_kernel():
-    """Return the module with ``step``, ``look``, ``settle``, ``rest_contraction``, ``rollout``."""
+    """Return the kernel module with the functions of :mod:`pam_sim.rollout.kernel`."""
     return load_cached_module('pam_sim_kernel', kernel_source(), kernel_hash())

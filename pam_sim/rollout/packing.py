@@ -26,8 +26,8 @@ from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.generate import effect_layout, hook_flag, law_codes
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
+from pam_sim.valve import hsv, ppr
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
-from pam_sim.valve.hsv import SWITCHING_STEP_S
 
 _PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
 _LAW_CODES = law_codes()
@@ -73,13 +73,22 @@ def _numbers(rig, dt_s, pressure, contraction, signal):
     if contraction is None:
         contraction = value.get('contraction_m', 0.0)
     top = rig.muscle.stroke_m
-    if not 0.0 <= contraction <= top and LOADS[rig.load].MOVES_FREELY:
+    moves = LOADS[rig.load].MOVES_FREELY
+    if not (0.0 <= contraction <= top if moves else math.isfinite(contraction)):
         raise InputError(f'`initial_contraction_m` is {contraction:g}; allowed 0 to {top:g} m')
     if signal is None:
         signal = ((min(max((pressure - P_ATM_PA) / value['K_m'], 0.0), 6.0),)
                   if rig.valve == 'ppr' else (0.0, 0.0))
-    elif np.isscalar(signal):
-        signal = (float(signal),)
+    else:
+        signal = np.atleast_1d(np.asarray(signal, dtype=float))
+        lower, upper, unit = ppr.SIGNAL_RANGE if rig.valve == 'ppr' else hsv.SIGNAL_RANGE
+        if signal.shape != (len(rig.signal_names),):
+            raise InputError(f'`initial_signal` has {signal.size} numbers; valve `{rig.valve}` '
+                             f'takes {len(rig.signal_names)}')
+        for number in signal:
+            if not lower <= number <= upper:
+                raise InputError(f'`initial_signal` is {number:g}; allowed {lower:g} to '
+                                 f'{upper:g} {unit}')
     return Numbers(
         float(dt_s), _substep(rig, dt_s), rig.valve,
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
@@ -89,17 +98,22 @@ def _numbers(rig, dt_s, pressure, contraction, signal):
 
 
 def _substep(rig, dt_s):
-    """Return the physics step: 0.1 ms when switching, shorter where the flow law is steep."""
-    if rig.valve == 'ppr':
-        return float(dt_s)
+    """Return the physics step: 0.1 ms when switching, shorter where something is faster."""
     value = rig.parameters
+    fastest = 0.0                # 1/s, of lag, damping and swing
+    if LOADS[rig.load].MOVES_FREELY:
+        stiffness = value['force_map_gain'] * rig.muscle.stiffness_n_per_m
+        fastest = max(value['damping_n_s_per_m'] / value['mass_kg'],
+                      2.0 * math.sqrt(stiffness / value['mass_kg']))
+    if rig.valve == 'ppr':
+        return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
     smallest = rig.volume_m3(0.0)
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
     slope = flow_function(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
     rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
-    count = max(1, math.ceil(dt_s * rate / 0.5))
+    count = max(1, math.ceil(dt_s * max(rate / 0.5, fastest)))
     if rig.fidelity == 'switching':
-        count = max(count, math.ceil(dt_s / SWITCHING_STEP_S - 1e-9))
+        count = max(count, math.ceil(dt_s / hsv.SWITCHING_STEP_S - 1e-9))
     return dt_s / count
 
 

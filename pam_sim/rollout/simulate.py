@@ -59,14 +59,17 @@ def check_outputs(rig, outputs):
     Raises
     ------
     InputError
-        A number is not finite, with the time and signal at which it began.
+        A number is not finite or an absolute pressure not positive, with the step at which it
+        began.
 
     """
-    if not math.isfinite(outputs.sum()):
-        row, column = np.argwhere(~np.isfinite(outputs))[0]
+    pressure = outputs[:, layout.OUT_TRUE_PRESSURE]
+    if not math.isfinite(outputs.sum()) or pressure.min() <= 0.0:
+        row = int(np.argmax(~np.isfinite(outputs).all(axis=1) | ~(pressure > 0.0)))
         raise InputError(
-            f'the simulation is not finite from {row} steps on (output {column}); the numbers of '
-            'the model make no rig that can be stepped with this `dt_s`', f'rig {rig.name}')
+            f'the simulation leaves what is physical at step {row}: these numbers cannot be '
+            'stepped so coarsely; use a smaller `dt_s`, or less extreme numbers',
+            f'rig {rig.name}')
     law = rig.muscle.law.law
     if not law.EXTRAPOLATES:
         gauge = outputs[:, layout.OUT_TRUE_PRESSURE] - P_ATM_PA
