@@ -86,9 +86,10 @@ def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
         GAMMA - 1.0) * 2.0 * (volume_m3 - start_m3) / (volume_m3 + start_m3)
     source = share * (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT]
     if abs(loss) < _SMALL_LOSS:
-        # (1 - exp(-loss)) / loss as a series, to the last bits.
-        mean = 1.0 - loss * (1.0 / 2.0 - loss * (1.0 / 6.0 - loss * (
-            1.0 / 24.0 - loss * (1.0 / 120.0 - loss * (1.0 / 720.0)))))
+        # (1 - exp(-loss)) / loss as a series, to the last bits; in pairs, which need not wait.
+        square = loss * loss
+        mean = (1.0 - loss * (1.0 / 2.0)) + square * (
+            (1.0 / 6.0 - loss * (1.0 / 24.0)) + square * (1.0 / 120.0 - loss * (1.0 / 720.0)))
     else:
         mean = (1.0 - math.exp(-loss)) / loss
     after = before + (source - loss * before) * mean

@@ -259,8 +259,8 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     flowing = False
     warm = False
     mass0 = 0.0
-    gained = 0.0
-    filled = 0.0
+    net_flow = 0.0
+    inflow = 0.0
     q1 = 0.0
     q2 = 0.0
     q3 = 0.0
@@ -333,15 +333,15 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         if flowing:
             in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
             q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
-            gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
-            filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
-            mass1 = mass0 + gained
+            net_flow = (q1 + 2.0 * (q2 + q3) + q4) * (1.0 / 6.0)
+            inflow = (in1 + 2.0 * (in2 + in3) + in4) * (1.0 / 6.0)
+            mass1 = mass0 + h * net_flow
             state[S_AIR_MASS] = mass1
-            state[S_FILLED] += filled
+            state[S_FILLED] += h * inflow
             state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
             if warm:
                 density = pressure_per_kg(
-                    mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
+                    mass0, inflow, net_flow, p0, volume, per_m3, h, state, par)
             p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
@@ -379,7 +379,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
                 density = par[PAR_RT] * per_m3
                 if warm:
                     density = pressure_per_kg(
-                        mass0, filled / h, gained / h, p0, volume, per_m3, h, state, par)
+                        mass0, inflow, net_flow, p0, volume, per_m3, h, state, par)
                 p_end = state[S_AIR_MASS] * density
     state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
