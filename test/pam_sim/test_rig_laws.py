@@ -233,7 +233,8 @@ LAW = Straight
 USE_OF_LAW = """
 import numpy as np
 from pam_sim import load_rig
-rig = load_rig('rig: dmsp_5_300_hanging_mass\\nlaw: {name: straight, parameters: {a_m2: 3.0e-4}}\\n')
+rig = load_rig('rig: dmsp_5_300_hanging_mass\\n'
+               'law: {name: straight, parameters: {a_m2: 3.0e-4}}\\n')
 response = rig.simulate(np.full(40, 4.0), initial_pressure_pa=501325.0)
 wanted = 0.3 * 0.2 * (1.0 - 5.0 * 9.80665 / (3.0e-4 * 400e3))
 print(abs(response.contraction_m - wanted).max() < 1e-9, load_rig(rig.to_yaml()) == rig)
