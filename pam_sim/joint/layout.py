@@ -38,12 +38,11 @@ OUT_SIZE = 5
 S_STEPS = 0
 S_ANGLE = 1                 # rad
 S_VELOCITY = 2              # rad/s
-S_SHARE = 3                 # -1..1: dry friction in force as a share of its level, by direction
-S_FLEXOR_FORCE = 4          # N, without dry friction
-S_FLEXOR_DRY = 5            # N, level of dry friction
-S_EXTENSOR_FORCE = 6
-S_EXTENSOR_DRY = 7
-STATE_SIZE = 8
+S_FLEXOR_FORCE = 3          # N, without dry friction
+S_FLEXOR_DRY = 4            # N, level of dry friction
+S_EXTENSOR_FORCE = 5
+S_EXTENSOR_DRY = 6
+STATE_SIZE = 7
 
 # -- parameters ------------------------------------------------------------------------------
 PAR_DT = 0                  # s, one step

@@ -99,7 +99,7 @@ def _from_mapping(data, name):
                         parameters={**kept, **dict(given)})
     except InputError as error:
         # The parts are sound; they do not fit each other.
-        raise data.error(error.problem, error.where) from error
+        raise data.error(f'{error.where}: {error.problem}', error.where) from error
 
 
 def _side(data, side, base):

@@ -38,6 +38,7 @@ def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure
     Parameters
     ----------
     joint : JointRig
+        To be packed.
     dt_s : float
         Step, s.
     flexor_pressure_pa, extensor_pressure_pa : float
@@ -45,6 +46,7 @@ def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure
     initial_angle_rad : float, optional
         By default where the joint rests at these pressures.
     initial_velocity_rad_per_s : float
+        Of the joint.
 
     Returns
     -------

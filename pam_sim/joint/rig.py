@@ -108,6 +108,7 @@ class JointRig:
         valve, fidelity : str, optional
             Of both muscles.
         name : str, optional
+            Instead of the present one.
 
         Raises
         ------
@@ -129,9 +130,11 @@ class JointRig:
         Parameters
         ----------
         angle_rad : float
+            Joint angle.
         flexor_pressure_pa, extensor_pressure_pa : float
             Absolute, Pa.
         external_torque_n_m : float
+            Flexion positive.
 
         """
         from pam_sim.joint.statics import static_torque
@@ -151,7 +154,9 @@ class JointRig:
         flexor_pressure_pa, extensor_pressure_pa : float
             Absolute, Pa.
         external_torque_n_m : float
+            Flexion positive.
         near_rad : float, optional
+            Which of several angles to choose.
 
         """
         from pam_sim.joint.statics import static_angle

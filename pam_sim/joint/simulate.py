@@ -19,12 +19,12 @@ from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.response import JointResponse
 from pam_sim.rollout import layout as muscle
-from pam_sim.rollout.simulate import input_array
+from pam_sim.rollout import simulate as one_muscle
 
 
 def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, dt_s, initial):
     """Return the JointResponse; arguments and errors as of ``JointRig.simulate``."""
-    inputs = _inputs(joint, flexor_signal, extensor_signal, external_torque_n_m)
+    inputs = input_array(joint, flexor_signal, extensor_signal, external_torque_n_m)
     plant = joint.plant(dt_s=dt_s, **initial)
     rows = [np.empty((len(inputs) + 1, size))
             for size in (layout.OUT_SIZE, muscle.OUT_SIZE, muscle.OUT_SIZE)]
@@ -32,12 +32,21 @@ def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, d
     return JointResponse(*rows)
 
 
-def _inputs(joint, flexor_signal, extensor_signal, external_torque_n_m):
+def input_array(joint, flexor_signal, extensor_signal, external_torque_n_m=None):
+    """
+    Return the inputs (N, IN_SIZE) of a rollout; arguments as of ``JointRig.simulate``.
+
+    Raises
+    ------
+    InputError
+        Wrong shape or number not finite.
+
+    """
     sides = []
     for rig, signal, name in ((joint.flexor, flexor_signal, 'flexor_signal'),
                               (joint.extensor, extensor_signal, 'extensor_signal')):
         try:
-            sides.append(input_array(rig, signal, contraction_m=0.0)[0])
+            sides.append(one_muscle.input_array(rig, signal, contraction_m=0.0)[0])
         except InputError as error:
             raise InputError(error.problem, name) from error
     if len(sides[0]) != len(sides[1]):

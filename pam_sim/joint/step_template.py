@@ -23,9 +23,9 @@ everything it is compiled from, the muscle's kernel included.
 
 Velocity Verlet: the angle at the end of a step follows from angle, velocity and
 acceleration at its start, both muscles (valve, air, memory) are advanced to the
-contractions that belong to it, and the velocity is corrected with the new
-tensions, twice, so that forces that depend on velocity are second order too.
-A stop hit or a reversal under dry friction is located within the step, and the
+contractions that belong to it, and the velocity follows from the mean of both
+accelerations; the forces that depend on velocity are read at the velocity
+predicted, which keeps the order. A stop hit or a reversal under dry friction is located within the step, and the
 limb starts again from rest there.
 """
 
@@ -34,12 +34,11 @@ import math
 from numba import njit
 from pam_sim.compiled import inlined
 from pam_sim.joint.layout import (
-    IN_EXTENSOR_0, IN_EXTENSOR_1, IN_FLEXOR_0, IN_FLEXOR_1, IN_TORQUE, OUT_ACCELERATION,
-    OUT_ANGLE, OUT_TIME, OUT_TORQUE, OUT_VELOCITY, PAR_DAMPING, PAR_DT, PAR_EXTENSOR_RADIUS,
+    IN_EXTENSOR_0, IN_EXTENSOR_1, IN_FLEXOR_0, IN_FLEXOR_1, IN_TORQUE, OUT_ACCELERATION, OUT_ANGLE,
+    OUT_TIME, OUT_TORQUE, OUT_VELOCITY, PAR_DAMPING, PAR_DT, PAR_EXTENSOR_RADIUS,
     PAR_EXTENSOR_ZERO, PAR_FLEXOR_RADIUS, PAR_FLEXOR_ZERO, PAR_FRICTION, PAR_HANGING,
     PAR_INVERSE_INERTIA, PAR_LOWER, PAR_SUBSTEP, PAR_SUBSTEPS, PAR_UPPER, PAR_WEIGHT_TORQUE,
-    S_ANGLE, S_EXTENSOR_DRY, S_EXTENSOR_FORCE, S_FLEXOR_DRY, S_FLEXOR_FORCE, S_SHARE, S_STEPS,
-    S_VELOCITY)
+    S_ANGLE, S_EXTENSOR_DRY, S_EXTENSOR_FORCE, S_FLEXOR_DRY, S_FLEXOR_FORCE, S_STEPS, S_VELOCITY)
 from pam_sim.rollout import layout as muscle
 from pam_sim.rollout.kernel import driven_force, driven_tension, look, step
 
@@ -172,10 +171,9 @@ def coupling_step(joint, flexor, extensor):
     after = 0.0
     if moving and rest < 0.0:
         after = velocity + h * acceleration
-        for _ in range(2):
-            read_forces(tension_f, tension_e, after, joint, flexor, extensor)
-            torque = net_torque(state[S_ANGLE], after, share, external, state, par)
-            after = velocity + 0.5 * h * (acceleration + torque * par[PAR_INVERSE_INERTIA])
+        read_forces(tension_f, tension_e, after, joint, flexor, extensor)
+        torque = net_torque(state[S_ANGLE], after, share, external, state, par)
+        after = velocity + 0.5 * h * (acceleration + torque * par[PAR_INVERSE_INERTIA])
         if dry and after * share < 0.0:
             after = 0.0
     read_forces(tension_f, tension_e, after, joint, flexor, extensor)
