@@ -19,7 +19,7 @@ import math
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.joint import layout
-from pam_sim.joint.statics import highest_stiffness_n_per_m, static_angle
+from pam_sim.joint.statics import static_angle
 from pam_sim.rollout import layout as muscle
 from pam_sim.units import P_ATM_PA
 
@@ -72,7 +72,7 @@ def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure
             ('initial_velocity_rad_per_s', initial_velocity_rad_per_s, -100.0, 100.0, 'rad/s')):
         if not least <= number <= most:
             raise InputError(f'`{name}` is {number:g}; allowed {least:g} to {most:g} {unit}')
-    substeps = _substeps(joint, dt_s, packed)
+    substeps = _substeps(joint, dt_s)
     state = np.zeros(layout.STATE_SIZE)
     state[layout.S_ANGLE] = initial_angle_rad
     state[layout.S_VELOCITY] = initial_velocity_rad_per_s
@@ -84,14 +84,16 @@ def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure
     return state, _par(joint, dt_s, substeps), sides[0], sides[1]
 
 
-def _substeps(joint, dt_s, packed):
+def _substeps(joint, dt_s):
     """Return how many coupling steps one step needs: the limb may not turn far in one."""
     value = joint.parameters
     stiffness = value['limb_mass_kg'] * value['gravity_m_per_s2'] * value['centre_of_mass_m']
     damping = value['damping_n_m_s']
-    for arm, (state, par) in zip((value['flexor_radius_m'], value['extensor_radius_m']), packed):
-        stiffness += arm * arm * highest_stiffness_n_per_m(state, par)
-        damping += arm * arm * par[muscle.PAR_DAMPING]
+    for arm, rig in ((value['flexor_radius_m'], joint.flexor),
+                     (value['extensor_radius_m'], joint.extensor)):
+        number = rig.parameters
+        stiffness += arm * arm * number['force_map_gain'] * rig.muscle.stiffness_n_per_m
+        damping += arm * arm * number['damping_n_s_per_m']
     inertia = value['inertia_kg_m2']
     count = max(1, math.ceil(dt_s * math.sqrt(stiffness / inertia) / _STEP_PER_PERIOD),
                 math.ceil(dt_s * damping / inertia / _STEP_PER_DECAY))

@@ -94,7 +94,8 @@ class JointPlant:
         Raises
         ------
         InputError
-            The number of signals does not fit the valve, or a number is not finite.
+            The number of signals does not fit the valve, or a number is not finite, given
+            or computed.
 
         """
         inp = self._inp.copy()
@@ -112,6 +113,10 @@ class JointPlant:
             raise InputError('is not finite', 'valve signal or external torque')
         self._inp[:] = inp
         kernel.joint_step(*self.arrays)
+        if not all(np.isfinite(side[-1]).all() for side in self.arrays):
+            raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
+                             'numbers of the model make no joint that can be stepped',
+                             f'joint {self.joint.name}')
 
     @property
     def time_s(self):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Check the inputs of a joint simulation and run the rollout."""
+"""Check the inputs of a joint simulation, run the rollout and check what came out."""
 
 import numpy as np
 from pam_sim.errors import InputError
@@ -20,6 +20,8 @@ from pam_sim.joint import kernel, layout
 from pam_sim.joint.response import JointResponse
 from pam_sim.rollout import layout as muscle
 from pam_sim.rollout import simulate as one_muscle
+
+MAX_TORQUE_N_M = 1e4
 
 
 def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, dt_s, initial):
@@ -29,6 +31,13 @@ def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, d
     rows = [np.empty((len(inputs) + 1, size))
             for size in (layout.OUT_SIZE, muscle.OUT_SIZE, muscle.OUT_SIZE)]
     kernel.joint_rollout(inputs, *plant.arrays, *rows)
+    for rig, outputs in ((joint.flexor, rows[1]), (joint.extensor, rows[2])):
+        one_muscle.check_outputs(rig, outputs)
+    if not np.isfinite(rows[0].sum()):
+        row = int(np.argmax(~np.isfinite(rows[0]).all(axis=1)))
+        raise InputError(
+            f'the motion is not finite from step {row} on; use a smaller `dt_s`, or less extreme '
+            'numbers', f'joint {joint.name}')
     return JointResponse(*rows)
 
 
@@ -48,7 +57,9 @@ def input_array(joint, flexor_signal, extensor_signal, external_torque_n_m=None)
         try:
             sides.append(one_muscle.input_array(rig, signal, contraction_m=0.0)[0])
         except InputError as error:
-            raise InputError(error.problem, name) from error
+            # The muscle's own message names the valve signal; here there are two of them.
+            signal_name = '' if error.where == 'valve_signal' else f'{error.where} '
+            raise InputError(signal_name + error.problem, name) from error
     if len(sides[0]) != len(sides[1]):
         raise InputError(f'has {len(sides[1])} samples, `flexor_signal` {len(sides[0])}',
                          'extensor_signal')
@@ -61,7 +72,11 @@ def input_array(joint, flexor_signal, extensor_signal, external_torque_n_m=None)
         if torque.ndim != 0 and torque.shape != (len(inputs),):
             raise InputError(f'has shape {torque.shape}; one number or {len(inputs)} expected',
                              'external_torque_n_m')
-        if not np.isfinite(torque).all():
-            raise InputError('a number is not finite', 'external_torque_n_m')
+        wrong = ~(np.abs(np.atleast_1d(torque)) <= MAX_TORQUE_N_M)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InputError(
+                f'is {np.atleast_1d(torque)[row]:g} at sample {row}; allowed '
+                f'{-MAX_TORQUE_N_M:g} to {MAX_TORQUE_N_M:g} N m', 'external_torque_n_m')
         inputs[:, layout.IN_TORQUE] = torque
     return inputs

@@ -12,17 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where a joint rests, and how stiff a muscle can be: from the forces at rest of the kernel."""
+"""Where a joint rests: from the forces at rest of the kernel."""
 
 import math
 
 import numpy as np
-from pam_sim.rollout import kernel, layout
-from pam_sim.units import P_ATM_PA
+from pam_sim.rollout import layout
 from scipy.optimize import brentq
 
 _SCAN = 48                     # angles looked at for changes of sign over the whole range
-_HIGH_GAUGE_PA = 600e3         # pressure at which the stiffest point of a muscle is looked for
 
 
 def static_torque(joint, angle_rad, pressures_pa, external_n_m):
@@ -67,15 +65,3 @@ def static_angle(joint, pressures_pa, external_n_m=0.0, near_rad=None):
     if torques[-1] >= 0.0:
         found.append(upper)
     return float(min(found, key=lambda angle: abs(angle - near_rad)))
-
-
-def highest_stiffness_n_per_m(state, par):
-    """Return the steepest fall of the force map over contraction [N/m] at 600 kPa."""
-    probe = state.copy()
-    top = par[layout.PAR_MAX_CONTRACTION]
-    probe[layout.S_PRESSURE] = P_ATM_PA + _HIGH_GAUGE_PA
-    tensions = []
-    for contraction in np.linspace(0.0, top, 101):
-        probe[layout.S_CONTRACTION] = contraction
-        tensions.append(kernel.driven_tension(probe, par))
-    return float(np.max(-np.diff(tensions)) / (0.01 * top))

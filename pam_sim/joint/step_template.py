@@ -25,8 +25,8 @@ Velocity Verlet: the angle at the end of a step follows from angle, velocity and
 acceleration at its start, both muscles (valve, air, memory) are advanced to the
 contractions that belong to it, and the velocity follows from the mean of both
 accelerations; the forces that depend on velocity are read at the velocity
-predicted, which keeps the order. A stop hit or a reversal under dry friction is located within the step, and the
-limb starts again from rest there.
+predicted, which keeps the order. A stop hit or a reversal under dry friction is
+located within the step, and the limb starts again from rest there.
 """
 
 import math

@@ -99,9 +99,9 @@ def test_mistakes_in_a_call():
             ('flexor_signal: has shape', lambda: joint.simulate(np.zeros((10, 2)), ten)),
             ('extensor_signal: has 9 samples', lambda: joint.simulate(ten, ten[1:])),
             ('external_torque_n_m: has shape', lambda: joint.simulate(ten, ten, ten[1:])),
-            ('external_torque_n_m: a number is not finite',
+            ('external_torque_n_m: is nan at sample 0; allowed -10000 to 10000 N m',
              lambda: joint.simulate(ten, ten, np.nan)),
-            ('extensor_signal: a number is not finite',
+            ('extensor_signal: ppr_voltage is inf at sample 0; allowed -1 to 12 V',
              lambda: joint.simulate(ten, ten + np.inf)),
             ('`initial_angle_rad` is 2; allowed -1 to 1 rad',
              lambda: joint.simulate(ten, ten, initial_angle_rad=2.0)),
@@ -123,5 +123,15 @@ def test_shank_and_foot_of_a_person():
     assert limb['limb_mass_kg'] == pytest.approx(4.27)
     assert limb['centre_of_mass_m'] == pytest.approx(0.2609, abs=1e-4)
     assert limb['inertia_kg_m2'] == pytest.approx(4.27 * 0.31642 ** 2, rel=1e-4)
-    heavy = load_joint('joint_dmsp_5_300').with_(limb)
-    assert heavy.parameters['limb_mass_kg'] == pytest.approx(4.27)
+    knee = load_joint('knee_dmsp_20_300')
+    assert {name: knee.parameters[name] for name in limb} == pytest.approx(limb, rel=1e-5)
+
+
+def test_the_knee_bends_and_lifts_the_shank():
+    knee = load_joint('knee_dmsp_20_300')
+    assert knee.static_angle_rad(101325.0, 101325.0) == pytest.approx(np.pi / 2, abs=1e-4)
+    assert knee.static_angle_rad(701325.0, 101325.0) == 1.8
+    assert knee.static_angle_rad(101325.0, 701325.0) == 0.2
+    response = knee.simulate(np.zeros(3000), np.full(3000, 4.5))
+    assert response.angle_rad[-1] == pytest.approx(
+        knee.static_angle_rad(101325.0, 551325.0), abs=0.02)

@@ -16,7 +16,6 @@
 
 import numpy as np
 from pam_sim.joint import load_joint
-from pam_sim.muscle import geometry, sarosi
 from pam_sim.muscle.laws.inoue_pair import InouePair
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -84,14 +83,14 @@ def test_linear_pair_of_inoue_near_a_working_point(level):
     # The linear model with the slopes that the force map has at 300 kPa and 5 %: static gain
     # within 0.5 %, natural frequency of a free swing within 0.5 %, damping ratio within 2 %.
     gauge, strain, small = 300e3, 0.05, 1e-4
-    slope = (sarosi.tension_n(gauge, strain + small)
-             - sarosi.tension_n(gauge, strain - small)) / (2.0 * small)
-    per_pa = (sarosi.tension_n(gauge + 10.0, strain)
-              - sarosi.tension_n(gauge - 10.0, strain)) / 20.0
+    muscle = level.flexor.muscle
+    force = muscle.law.law.force_n
+    slope = (force(gauge, strain + small) - force(gauge, strain - small)) / (2.0 * small)
+    per_pa = (force(gauge + 10.0, strain) - force(gauge - 10.0, strain)) / 20.0
     diameter = 0.0072
     a = -slope / (2.0 * gauge * (1.0 - strain) * diameter ** 2)
     pair = InouePair({
-        'length_m': geometry.LENGTH_M, 'diameter_m': diameter, 'a': a,
+        'length_m': muscle.length_m, 'diameter_m': diameter, 'a': a,
         'b': a * (1.0 - strain) ** 2 - per_pa / diameter ** 2, 'pulley_radius_m': 0.012,
         'inertia_kg_m2': 0.004, 'damping_n_m_s': 0.005 + 2.0 * 0.012 ** 2 * 25.0,
         'middle_pressure_pa': gauge, 'middle_strain': strain})
