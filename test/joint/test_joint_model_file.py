@@ -14,10 +14,14 @@
 
 """Model files of joints: there and back, and every mistake in one sentence."""
 
+from pathlib import Path
+
 import numpy as np
+import pam_sim
 from pam_sim.errors import InputError
 from pam_sim.joint import joint_preset_names, load_joint
 from pam_sim.joint.limbs import shank_and_foot
+from pam_sim.joint.parameters import PARAMETERS
 import pytest
 
 TEXT = """\
@@ -115,6 +119,13 @@ def test_mistakes_in_a_call():
             ('`height_m` is 17', lambda: shank_and_foot(70.0, 17.0))):
         with pytest.raises(InputError, match=sentence):
             call()
+
+
+def test_the_page_and_the_presets_say_every_number():
+    page = (Path(__file__).parents[2] / 'docs' / 'joint.md').read_text(encoding='utf-8')
+    assert [p.name for p in PARAMETERS if f'`{p.name}`' not in page] == []
+    assert [name for name in joint_preset_names() if f'`{name}`' not in page] == []
+    assert pam_sim.load_joint('joint_dmsp_5_300').load == 'antagonistic_joint'
 
 
 def test_shank_and_foot_of_a_person():
