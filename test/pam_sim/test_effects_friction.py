@@ -141,7 +141,7 @@ def hanging(name, amplitude_v, seconds, **parameters):
 
 def test_stiff_bristles_are_stable_and_act_as_dry_friction():
     given = {'force_n': 2.0, 'force_per_pa': 0.0}
-    _, stiff = hanging('hysteresis_lugre', 1.0, 2.0, stiffness_n_per_m=1e6, static_ratio=1.0,
+    _, stiff = hanging('hysteresis_lugre', 1.0, 2.0, stiffness_n_per_m=1e7, static_ratio=1.0,
                        bristle_damping_n_s_per_m=50.0, **given)
     _, dry = hanging('coulomb_friction', 1.0, 2.0, force_n=2.0)
     assert np.max(np.abs(stiff.contraction_m - dry.contraction_m)) < 5e-5
