@@ -73,7 +73,8 @@ def hanging(name, seconds=20):
 def stated_n(name):
     """Return what the effect reports [N] at its nominal numbers."""
     effect = effects()[name]
-    return next(iter(effect.report(effect.values(), None).values()))[0]
+    stated = effect.report(effect.values(), load_rig('dmsp_5_300_hanging_mass'))
+    return next(iter(stated.values()))[0]
 
 
 def main():

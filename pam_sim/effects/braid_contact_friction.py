@@ -39,16 +39,16 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle.geometry import braid, LENGTH_M
+from pam_sim.muscle.geometry import braid
 from pam_sim.parameters import Parameter
 
-_FACTOR, _PATCH, _RADIUS, _ATMOSPHERE = range(4)
-_REFERENCE_PA, _REFERENCE_M = 400e3, 8.86e-3        # 5 kg at rest
+_FACTOR, _PATCH, _RADIUS, _LENGTH, _ATMOSPHERE = range(5)
+_REFERENCE_PA, _REFERENCE_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
-def _constants(values):
+def _constants(values, muscle):
     """Return (friction over a p_g L [1/m], a^3 over p_g [m^3/Pa], strand radius [m])."""
-    thread_m, turns = braid()
+    thread_m, turns = braid(muscle.length_m, muscle.bore_m, muscle.braid_angle_rad)
     radius_m = 0.5 * values['strand_width_m']
     patch = 3.0 * radius_m * thread_m ** 2 / (
         32.0 * values['contact_modulus_pa'] * (values['strands'] * turns) ** 2)
@@ -56,16 +56,17 @@ def _constants(values):
 
 
 def _pack(values, numbers):
-    return (*_constants(values), numbers.parameters['p_atm'])
+    return (*_constants(values, numbers.muscle), numbers.muscle.length_m,
+            numbers.parameters['p_atm'])
 
 
 @compiled
-def friction_n(gauge_pa, contraction_m, factor, patch, radius_m):
-    """Return the friction level [N]; arguments 3 to 5 as packed."""
+def friction_n(gauge_pa, length_m, factor, patch, radius_m):
+    """Return the friction level [N] at a length; arguments 3 to 5 as packed."""
     if gauge_pa <= 0.0:
         return 0.0
     touching_m = min((patch * gauge_pa) ** (1.0 / 3.0), radius_m)
-    return factor * touching_m * gauge_pa * (LENGTH_M - contraction_m)
+    return factor * touching_m * gauge_pa * length_m
 
 
 EFFECT = Effect(
@@ -91,8 +92,9 @@ EFFECT = Effect(
     amplitude=('friction_coefficient',),
     reported=(Reported(
         'force_at_400kpa_n', 'N', lambda values, rig: float(
-            friction_n(_REFERENCE_PA, _REFERENCE_M, *_constants(values)))),),
-    slots=4,
+            friction_n(_REFERENCE_PA, rig.muscle.length_m - _REFERENCE_M,
+                       *_constants(values, rig.muscle)))),),
+    slots=5,
     pack=_pack,
 )
 
@@ -101,5 +103,5 @@ EFFECT = Effect(
 def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
     """Return the friction level with this part added."""
     return level_n + friction_n(
-        pressure_pa - par[k + _ATMOSPHERE], contraction_m, par[k + _FACTOR], par[k + _PATCH],
-        par[k + _RADIUS])
+        pressure_pa - par[k + _ATMOSPHERE], par[k + _LENGTH] - contraction_m, par[k + _FACTOR],
+        par[k + _PATCH], par[k + _RADIUS])

@@ -32,7 +32,6 @@ give the same kind of loop. Both return to the point where a minor loop began.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle.sarosi import tension_n
 from pam_sim.parameters import Parameter
 
 # Half width of each play over that of the loop, and its weight: design values.
@@ -41,7 +40,7 @@ RATIOS = (0.1, 0.4, 1.0, 2.5)
 WEIGHTS = (0.25, 0.25, 0.25, 0.25)
 _PLAYS = len(RATIOS)
 _WIDTH, _PER_PA, _ATMOSPHERE = range(3)
-_AT_PA, _AT_STRAIN = 400e3, 8.86e-3 / 0.300       # 5 kg at rest
+_AT_PA, _AT_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
 def _pack(values, numbers):
@@ -55,9 +54,9 @@ def _initial(values, numbers):
 def _half_width_n(values, rig):
     """Return half the force between the branches at 400 kPa gauge and 8.86 mm."""
     half = values['half_width_pa'] + _AT_PA * values['half_width_per_pa']
-    gain = rig.parameters['force_map_gain'] if rig is not None else 1.0
-    return 0.5 * gain * (float(tension_n(_AT_PA + half, _AT_STRAIN))
-                         - float(tension_n(_AT_PA - half, _AT_STRAIN)))
+    rising, falling = rig.muscle.law.law.force_n(
+        [_AT_PA - half, _AT_PA + half], _AT_M / rig.muscle.length_m, 'allow')
+    return float(0.5 * rig.parameters['force_map_gain'] * (falling - rising))
 
 
 EFFECT = Effect(

@@ -29,6 +29,13 @@ PLAYS = 'hysteresis_prandtl_ishlinskii'
 HALF_WIDTH_N = 2.3
 
 
+def reported(name, **parameters):
+    """Return what a result states for an effect [N]."""
+    effect = effects()[name]
+    stated = effect.report(effect.values(parameters), load_rig('dmsp_5_300_hanging_mass'))
+    return next(iter(stated.values()))[0]
+
+
 def moved(path_m, name=None, **parameters):
     """Return the force [N] of an undamped driven rig at constant pressure."""
     rig = load_rig('dmsp_5_300_driven').with_(
@@ -68,8 +75,7 @@ def test_loop_has_the_stated_width_dissipates_and_closes(name):
     last = slice(2 * per_cycle, None)
     middle = 2 * per_cycle + per_cycle // 4
     half = 0.5 * (added[middle + per_cycle // 2] - added[middle])
-    stated, _ = effects()[name].report(effects()[name].values(), None)[
-        'loop_half_width_at_400kpa_n']
+    stated = reported(name)
     assert half == pytest.approx(stated, rel=0.01) == pytest.approx(HALF_WIDTH_N, rel=0.01)
     # More force extending than contracting: what goes in comes out less this.
     lost_j = -np.trapezoid(force[last], path[last])
@@ -224,8 +230,7 @@ def isometric(gauge_pa, name=None, **parameters):
 
 def test_plays_make_the_isometric_loop_they_state():
     force = isometric((300e3, 500e3, 300e3, 500e3), PLAYS)
-    stated, _ = effects()[PLAYS].report(effects()[PLAYS].values(), None)[
-        'loop_half_width_at_400kpa_n']
+    stated = reported(PLAYS)
     assert stated == pytest.approx(HALF_WIDTH_N, rel=0.01)
     assert 0.5 * (force[299] - force[499]) == pytest.approx(stated, rel=0.01)
     # Travel winds nothing up, and a muscle at rest has no loop of the other kind.
@@ -286,7 +291,6 @@ def test_braid_contact_is_friction_of_the_stated_size():
 
 
 def test_braid_contact_grows_with_pressure_until_the_strands_are_flat():
-    effect = effects()['braid_contact_friction']
     response = []
     for gauge_pa in (200e3, 400e3):
         rig = load_rig('dmsp_5_300_driven').with_(
@@ -299,7 +303,7 @@ def test_braid_contact_grows_with_pressure_until_the_strands_are_flat():
     assert response[1] == pytest.approx(response[0] * 2.0 ** (4.0 / 3.0), rel=1e-9)
 
     def stated(**given):
-        return effect.report(effect.values(given), None)['force_at_400kpa_n'][0]
+        return reported('braid_contact_friction', **given)
     assert stated(contact_modulus_pa=1e5) == stated(contact_modulus_pa=1.1e5)    # as wide as it is
     assert stated(contact_modulus_pa=1e9) < 0.5 * stated()
 
