@@ -79,8 +79,8 @@ def stated_n(name):
 
 def main():
     """Print the two tables."""
-    print('| effect | states, N | half width, N | 0.1 Hz: lost, mJ | 1 Hz: lost, mJ | '
-          'stroke 1 mm: half width, N | lost, mJ |\n|---|---|---|---|---|---|---|')
+    print('| effect | states, N | 20 mm: half width, N | 0.1 Hz: lost, mJ | 1 Hz: lost, mJ | '
+          '1 mm: half width, N | 1 Hz: lost, mJ |\n|---|---|---|---|---|---|---|')
     for name in NAMES:
         slow, fast, small = moved(name, 10_000), moved(name, 1000), moved(name, 1000, 0.012, 5e-4)
         print(f'| `{name}` | {stated_n(name):.2f} | {half_width_n(*slow):.2f} | '
@@ -89,7 +89,7 @@ def main():
     print('\n| effect | half width, kPa | lost, mJ |\n|---|---|---|')
     for name in (None, *NAMES):
         width_kpa, energy_mj = hanging(name)
-        label = f'`{name}`' if name else 'nominal rig'
+        label = f'`{name}`' if name else 'nominal rig (damping alone)'
         print(f'| {label} | {width_kpa:.1f} | {energy_mj:.1f} |')
 
 
