@@ -82,7 +82,9 @@ def rigs():
     """Return label -> rig: nominal, realistic, every effect at once."""
     nominal = load_rig('dmsp_5_300_hanging_mass')
     every = [{'name': name, 'parameters': SIZES.get(name, {})} for name in effects()]
+    one_each = [item for item in every if not effects()[item['name']].variant_of]
     return {'nominal': nominal, 'realistic': load_rig('dmsp_5_300_realistic'),
+            f'{len(one_each)} effects, no variants': nominal.with_(effects=one_each),
             f'all {len(every)} effects': nominal.with_(effects=every)}
 
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 import math
 
 import numpy as np
+from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
@@ -109,7 +110,7 @@ def _substep(rig, dt_s):
         return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
     smallest = rig.volume_m3(0.0)
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
-    slope = flow_function(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
+    slope = interpreted(flow_function)(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
     rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
     count = max(1, math.ceil(dt_s * max(rate / 0.5, fastest)))
     if rig.fidelity == 'switching':
