@@ -41,7 +41,10 @@ def _pack(values, numbers):
 
 def _initial(values, numbers):
     signal = tuple(numbers.signal) + (0.0, 0.0)
-    return np.repeat([0.0, signal[0], signal[1]], (1, SLOTS, SLOTS))
+    remembered = np.zeros(1 + 2 * SLOTS)
+    remembered[1:1 + SLOTS] = signal[0]
+    remembered[1 + SLOTS:] = signal[1]
+    return remembered
 
 
 EFFECT = Effect(

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.rollout import kernel, layout
@@ -32,6 +32,7 @@ from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
 _PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
 _LAW_CODES = law_codes()
+_FLAGS = {name: [hook_flag(hook) for hook in effect.hooks] for name, effect in effects().items()}
 
 
 def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
@@ -56,12 +57,11 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
 def _pack_effects(rig, numbers, state, par):
     for setting in rig.effects:
         k, i = _PLACES[setting.name]
-        effect = get_effect(setting.name)
-        effect.pack_into(setting.parameters, numbers, par, k, state, i)
+        effects()[setting.name].pack_into(setting.parameters, numbers, par, k, state, i)
         if par[k - 1] != 0.0:
             par[layout.PAR_BEYOND_NOMINAL] = 1.0
-            for hook in effect.hooks:
-                par[hook_flag(hook)] = 1.0
+            for place in _FLAGS[setting.name]:
+                par[place] = 1.0
 
 
 def _numbers(rig, dt_s, pressure, contraction, signal):

@@ -47,7 +47,7 @@ def prepare(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
     if start is not None and initial.get('initial_contraction_m') is None:
         initial = {**initial, 'initial_contraction_m': start}
     state, par = rig.pack(dt_s=dt_s, **initial)
-    if start is None:
+    if start is None and not LOADS[rig.load].MOVES_FREELY:
         inputs[:, layout.INP_CONTRACTION] = state[layout.S_CONTRACTION]
     return state, par, inputs
 
