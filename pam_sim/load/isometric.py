@@ -18,6 +18,9 @@ from pam_sim.muscle.geometry import LENGTH_M, MAX_STRAIN
 from pam_sim.parameters import Parameter
 
 NAME = 'isometric'
+SENTENCE = 'Both ends are held: the contraction is constant and the muscle only pulls.'
+EQUATION = 'x = contraction_m, v = 0, F_cell = F'
+SOURCE = 'Prescribed length; the cell reads what the muscle transmits.'
 MOVES_FREELY = False
 NEEDS_CONTRACTION = False
 
