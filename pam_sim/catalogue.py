@@ -13,17 +13,20 @@
 # limitations under the License.
 
 """
-Everything the simulator knows, as plain data: laws, valves, loads, effects, sensors, presets.
+Everything the simulator knows, as plain data: laws, muscles, valves, loads, effects, rigs.
 
 Read from the registries when asked, so that what is added there is listed here.
 """
 
+from dataclasses import replace
 import sys
 
 from pam_sim.effects.registry import effects
+from pam_sim.joint import joint_preset_names, load_joint, parameters as joint
 from pam_sim.load import LOADS
 from pam_sim.model_file import load_rig, preset_names
 from pam_sim.muscle.law import RULES
+from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names, MUSCLE_PARAMETERS
 from pam_sim.muscle.registry import laws
 from pam_sim.plugins import pick
 from pam_sim.rig import Rig
@@ -31,7 +34,7 @@ from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import hsv, ppr
 
 KINDS = {
-    'law': 'Muscle laws', 'valve': 'Valves', 'load': 'Loads', 'effect': 'Effects',
+    'law': 'Muscle laws', 'muscle': 'Muscles', 'valve': 'Valves', 'load': 'Loads', 'effect': 'Effects',
     'sensors': 'Sensors', 'rig': 'Rigs'}
 
 
@@ -46,7 +49,7 @@ def catalogue():
         ``parameters`` (list of dict: name, unit, nominal, lower, upper, description,
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
         ``subsystem``, ``family``, ``valves``, ``variant_of``, ``reported``; valves
-        ``signals``; rigs ``yaml``. Plain data, fit for JSON.
+        ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data, fit for JSON.
 
     Raises
     ------
@@ -56,11 +59,13 @@ def catalogue():
     """
     return [
         *(_law(law) for law in laws().values()),
+        *(_muscle(name) for name in muscle_names()),
         *(_module('valve', module, signals=list(module.SIGNAL_NAMES)) for module in (ppr, hsv)),
-        *(_module('load', module) for module in LOADS.values()),
+        *(_module('load', module) for module in (*LOADS.values(), joint)),
         *(_effect(effect) for effect in _by_subsystem(effects())),
         _sensors(),
         *(_rig(name) for name in preset_names()),
+        *(_joint_rig(name) for name in joint_preset_names()),
     ]
 
 
@@ -98,6 +103,17 @@ def _law(law):
         claims={str(number): RULES[number] for number in law.CLAIMS})
 
 
+def _muscle(name):
+    muscle = get_muscle(name)
+    law = f'law {muscle.law.name}, set {muscle.law.law.muscle}'
+    own = [replace(item, nominal=getattr(muscle, item.name), source='') for item in DIMENSIONS]
+    return _entry(
+        'muscle', name, f'{1e3 * muscle.bore_m:g} mm bore, {1e3 * muscle.length_m:g} mm long; '
+        f'{law}.', 'F = force_map_gain F_law(p_g, x / L0) - damping_n_s_per_m v, '
+        'V = L (Lf^2 - L^2) / (4 pi n^2), L = L0 - x', ' '.join(muscle.rests_on.split()),
+        (*own, *MUSCLE_PARAMETERS))
+
+
 def _module(kind, module, **more):
     return _entry(
         kind, module.NAME, getattr(module, 'SENTENCE', '') or _first_sentence(module),
@@ -131,9 +147,16 @@ def _rig(name):
     rig = load_rig(name)
     effect_names = ', '.join(setting.name for setting in rig.effects)
     return _entry(
-        'rig', name, f'Load {rig.load}, valve {rig.valve}, '
+        'rig', name, f'Muscle {rig.muscle.name}, load {rig.load}, valve {rig.valve}, '
         + (f'with {effect_names}.' if effect_names else 'no effect added.'),
         '', '', rig.parameter_list, yaml=rig.to_yaml())
+
+
+def _joint_rig(name):
+    rig = load_joint(name)
+    return _entry(
+        'rig', name, f'Load {rig.load}, flexor {rig.flexor.muscle.name}, extensor '
+        f'{rig.extensor.muscle.name}.', '', '', joint.PARAMETERS, yaml=rig.to_yaml())
 
 
 def _first_sentence(module):

@@ -20,7 +20,10 @@ import math
 from pam_sim.catalogue import catalogue, find, KINDS
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
+from pam_sim.joint import joint_preset_names
 from pam_sim.load import LOADS
+from pam_sim.model_file import preset_names
+from pam_sim.muscle.muscle import muscle_names
 from pam_sim.muscle.registry import laws
 import pytest
 
@@ -34,7 +37,9 @@ def of_kind(kind):
 def test_everything_registered_is_listed_once():
     assert set(of_kind('effect')) == set(effects())
     assert set(of_kind('law')) == set(laws())
-    assert set(of_kind('load')) == set(LOADS)
+    assert set(of_kind('load')) == {*LOADS, 'antagonistic_joint'}
+    assert set(of_kind('muscle')) == set(muscle_names())
+    assert set(of_kind('rig')) == {*preset_names(), *joint_preset_names()}
     assert set(of_kind('valve')) == {'ppr', 'hsv'}
     places = [(entry['kind'], entry['name']) for entry in ENTRIES]
     assert len(set(places)) == len(places) and {kind for kind, _ in places} == set(KINDS)

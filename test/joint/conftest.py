@@ -12,15 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Muscle DMSP-5-300: 5 mm bore, 300 mm; the numbers a model file may change."""
+"""Helpers of the tests of pam_sim serve here, too."""
 
-from pam_sim.parameters import Parameter
+from pathlib import Path
+import sys
 
-NAME = 'dmsp_5_300'
-
-PARAMETERS = (
-    Parameter('force_map_gain', '-', 1.0, 0.2, 5.0, 0.02,
-              'Factor on the force map.', 'scaled map of a measured DMSP-10-250'),
-    Parameter('damping_n_s_per_m', 'N s/m', 25.0, 0.0, 1000.0, 0.02,
-              'Viscous damping of the muscle.', 'design value'),
-)
+sys.path.append(str(Path(__file__).parent.parent / 'pam_sim'))
