@@ -34,8 +34,8 @@ from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import hsv, ppr
 
 KINDS = {
-    'law': 'Muscle laws', 'muscle': 'Muscles', 'valve': 'Valves', 'load': 'Loads', 'effect': 'Effects',
-    'sensors': 'Sensors', 'rig': 'Rigs'}
+    'law': 'Muscle laws', 'muscle': 'Muscles', 'valve': 'Valves', 'load': 'Loads',
+    'effect': 'Effects', 'sensors': 'Sensors', 'rig': 'Rigs'}
 
 
 def catalogue():
@@ -49,7 +49,7 @@ def catalogue():
         ``parameters`` (list of dict: name, unit, nominal, lower, upper, description,
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
         ``subsystem``, ``family``, ``valves``, ``variant_of``, ``reported``; valves
-        ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data, fit for JSON.
+        ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
 
     Raises
     ------

@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_actuation.valves import measure
+from pam_actuation.valves.chain import Bench
 from pam_actuation.valves.energy import power_values
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
@@ -71,22 +72,23 @@ def compare(rig, seed=0, power=None, hold_s=HOLD_S, progress=None):
 
 
 def _measure(rig, seed, power, hold_s, done):
-    steps, _ = measure.measure_steps(rig, seed)
+    bench = Bench(rig, seed)
+    steps = measure.measure_steps(bench)
     done()
-    accuracy, sine, late = measure.measure_accuracy(rig, seed)
+    accuracy, signal = measure.measure_accuracy(bench)
     done()
-    moving = measure.signal_use(rig, sine.signal[late], power)
-    sines = measure.measure_bandwidth(rig, seed)
+    moving = measure.signal_use(rig, signal, power)
+    sines = measure.measure_bandwidth(bench)
     done()
-    cycle = measure.measure_cycle(rig, seed)
+    cycle = measure.measure_cycle(bench)
     done()
-    hold = measure.measure_hold(rig, hold_s, power, seed)
+    hold = measure.measure_hold(bench, hold_s, power)
     done()
     leaking = rig.with_(effects=[
         *(item for item in rig.effects if item.name != 'leakage'), measure.LEAK])
-    leak = measure.measure_hold(leaking, hold_s, power, seed)
+    leak = measure.measure_hold(Bench(leaking, seed), hold_s, power)
     done()
-    loss = measure.measure_power_loss(rig, seed)
+    loss = measure.measure_power_loss(bench)
     flow = measure.measure_flow(rig)
     done()
     return {'accuracy': accuracy, 'steps': steps, 'response': _response(steps), 'moving': moving,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Figures of merit of a valve from recorded arrays: steps, straight line, sines, ripple, pulses."""
+"""Figures of merit of a valve from recorded arrays: steps, line, sines, ripple, pulses."""
 
 from dataclasses import dataclass
 import math

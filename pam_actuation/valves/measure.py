@@ -15,14 +15,14 @@
 """
 The measurements: the same pressure commands on the same rig, for every valve.
 
-Each ``measure_*`` builds a chain, gives it a command and returns plain numbers in SI.
+Each ``measure_*`` takes a Bench, gives its chain a command and returns plain numbers in SI.
 """
 
 from dataclasses import asdict
 
 import numpy as np
 from pam_actuation.valves import figures
-from pam_actuation.valves.chain import Chain, STEP_S
+from pam_actuation.valves.chain import STEP_S
 from pam_actuation.valves.energy import normal_litres, pulse_energy_j, supplied_kg
 from pam_sim.units import P_ATM_PA
 
@@ -46,21 +46,30 @@ def _steps(seconds):
     return round(seconds / STEP_S)
 
 
-def measure_steps(rig, seed=0):
-    """Return the StepFigures of all steps, as dicts, and the record."""
+def measure_steps(bench):
+    """Return the StepFigures of all steps as dicts."""
     count = _steps(STEP_TIME_S)
     command = np.repeat(STEPS_PA, count)
-    record = Chain(rig, STEPS_PA[0], seed).follow(command)
-    found = [asdict(figures.step_figures(
+    record = bench.chain(STEPS_PA[0]).follow(command)
+    return [asdict(figures.step_figures(
         record.gauge_pa[k * count:(k + 1) * count], STEPS_PA[k - 1], STEPS_PA[k], STEP_S))
         for k in range(1, len(STEPS_PA))]
-    return found, record
 
 
-def measure_accuracy(rig, seed=0):
-    """Return steady errors, straight line and hysteresis of a staircase, and sine tracking."""
+def measure_accuracy(bench):
+    """
+    Return the accuracy of a staircase and of a sine.
+
+    Returns
+    -------
+    dict
+        Steady errors, straight line, difference up and down, tracking error, ripple.
+    ndarray
+        Valve signal of the sine after its first cycle.
+
+    """
     count, levels = _steps(STAIR_TIME_S), np.array(STAIRS_PA)
-    record = Chain(rig, levels[0], seed).follow(np.repeat(levels, count))
+    record = bench.chain(levels[0]).follow(np.repeat(levels, count))
     rest = record.gauge_pa.reshape(len(levels), count)[:, -count // 3:].mean(axis=1)
     error = rest - levels
     gain, offset, away = figures.straight_line(levels, rest)
@@ -68,7 +77,7 @@ def measure_accuracy(rig, seed=0):
     width = np.abs(rest[:half] - rest[:half:-1])
     time = np.arange(_steps(SINE_CYCLES / SINE_HZ)) * STEP_S
     wanted = SINE_PA + SINE_SIZE_PA * np.sin(2.0 * np.pi * SINE_HZ * time)
-    sine = Chain(rig, SINE_PA, seed).follow(wanted)
+    sine = bench.chain(SINE_PA).follow(wanted)
     late = slice(_steps(1.0 / SINE_HZ), None)
     moving_rms, moving_ptp = figures.ripple(sine.gauge_pa[late], _steps(0.02))
     result = {
@@ -79,16 +88,16 @@ def measure_accuracy(rig, seed=0):
         'tracking_rmse_pa': float(np.sqrt(np.mean((sine.gauge_pa - wanted)[late] ** 2))),
         'ripple_moving_rms_pa': moving_rms, 'ripple_moving_peak_to_peak_pa': moving_ptp,
     }
-    return result, sine, late
+    return result, sine.signal[late]
 
 
-def measure_bandwidth(rig, seed=0):
+def measure_bandwidth(bench):
     """Return the gains of small sines and where they fall by 3 dB [Hz] (None: above all)."""
     gains = []
     for frequency in SMALL_SINES_HZ:
         count = _steps(max(3.0 / frequency, 1.0))
         turn = 2.0 * np.pi * frequency * np.arange(count) * STEP_S
-        record = Chain(rig, SINE_PA, seed).follow(SINE_PA + SMALL_SINE_PA * np.sin(turn))
+        record = bench.chain(SINE_PA).follow(SINE_PA + SMALL_SINE_PA * np.sin(turn))
         late = slice(-_steps(max(round(0.6 * count * STEP_S * frequency), 1) / frequency), None)
         gains.append(
             figures.sine_gain(record.gauge_pa[late], frequency, STEP_S) / SMALL_SINE_PA)
@@ -96,25 +105,25 @@ def measure_bandwidth(rig, seed=0):
             'bandwidth_hz': figures.bandwidth(SMALL_SINES_HZ, gains)}
 
 
-def measure_cycle(rig, seed=0):
+def measure_cycle(bench):
     """Return the air of one cycle, up and down again."""
     low, high = CYCLE_PA
     count = _steps(STEP_TIME_S)
-    record = Chain(rig, low, seed).follow(np.repeat([high, low], count))
-    used = supplied_kg(record, rig)[-1]
+    record = bench.chain(low).follow(np.repeat([high, low], count))
+    used = supplied_kg(record, bench.rig)[-1]
     return {'air_kg': float(used), 'air_normal_l': normal_litres(float(used)),
             'needed_kg': float(record.air_mass_kg[count] - record.air_mass_kg[0])}
 
 
-def measure_hold(rig, seconds, power, seed=0):
+def measure_hold(bench, seconds, power):
     """
     Return air, ripple, pulses and energy of holding a pressure.
 
     Counted after a lead in which the pressure has settled.
     """
     lead, count = _steps(HOLD_LEAD_S), _steps(seconds)
-    record = Chain(rig, HOLD_PA - 100e3, seed).follow(np.full(lead + count, HOLD_PA))
-    gauge, used = record.gauge_pa[lead:], supplied_kg(record, rig)
+    record = bench.chain(HOLD_PA - 100e3).follow(np.full(lead + count, HOLD_PA))
+    gauge, used = record.gauge_pa[lead:], supplied_kg(record, bench.rig)
     rms, peak = figures.ripple(gauge, _steps(1.0))
     x_rms, x_peak = figures.ripple(record.true_contraction_m[lead + 1:], _steps(1.0))
     air = float(used[-1] - used[lead])
@@ -124,7 +133,7 @@ def measure_hold(rig, seconds, power, seed=0):
         'error_max_pa': float(np.max(np.abs(gauge - HOLD_PA))),
         'ripple_rms_pa': rms, 'ripple_peak_to_peak_pa': peak,
         'contraction_ripple_rms_m': x_rms, 'contraction_ripple_peak_to_peak_m': x_peak,
-        **signal_use(rig, record.signal[lead:], power),
+        **signal_use(bench.rig, record.signal[lead:], power),
     }
 
 
@@ -172,17 +181,19 @@ def _rate(rig, start_pa, duties):
     return float(pressure[-1] - pressure[wait]) / OPEN_LOOP_TIME_S
 
 
-def measure_power_loss(rig, seed=0):
+def measure_power_loss(bench):
     """
     Return what the pressure does when the valve has lost its power.
 
     PPR: 0 V. HSV: both valves shut by their springs; beside that, with a vent valve
     that opens without power (``vented``).
     """
-    cases = {'off': (0.0,)} if rig.valve == 'ppr' else {'off': (0.0, 0.0), 'vented': (0.0, 1.0)}
+    cases = {'off': (0.0,)}
+    if bench.rig.valve == 'hsv':
+        cases = {'off': (0.0, 0.0), 'vented': (0.0, 1.0)}
     result = {}
     for name, signal in cases.items():
-        chain = Chain(rig, HOLD_PA, seed)
+        chain = bench.chain(HOLD_PA)
         chain.follow(np.full(_steps(1.0), HOLD_PA))
         gauge = chain.impose(signal, OFF_TIME_S).gauge_pa
         below = np.flatnonzero(gauge <= 0.1 * HOLD_PA)
