@@ -27,6 +27,9 @@ def add_arguments(parser):
         '--rig', default='dmsp_5_300_realistic', metavar='NAME|FILE',
         help='rig preset or model YAML; its valve is replaced (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    parser.add_argument(
+        '--hold', type=float, default=60.0, metavar='SECONDS',
+        help='length of the holds (default: %(default)g)')
     parser.add_argument('--html', metavar='FILE', default=None, help='write an HTML page too')
     parser.add_argument(
         '--power', action='append', default=[], metavar='NAME=VALUE',
@@ -43,7 +46,7 @@ def run(args):
     from pam_sim import load_rig
     rig, power = load_rig(args.rig), power_arguments(args.power)
     with progress(args, STAGES, description='valves') as bar:
-        result = compare(rig, args.seed, power, progress=bar.update)
+        result = compare(rig, args.seed, power, args.hold, progress=bar.update)
     shown = as_text(result)
     if args.html is not None:
         shown += f'\n\npage: {write_text(args.html, as_page(result))}'

@@ -24,7 +24,7 @@ from pam_sim.load import LOADS
 CHAINS = {'ppr': ('ppr', 'averaged'), 'hsv averaged': ('hsv', 'averaged'),
           'hsv switching': ('hsv', 'switching')}
 TITLES = {'ppr': 'PPR', 'hsv averaged': 'HSV averaged', 'hsv switching': 'HSV switching'}
-HOLD_S = 60.0
+HOLD_S, LEAST_HOLD_S, MOST_HOLD_S = 60.0, 2.0, 3600.0
 STAGES = 7 * len(CHAINS)
 
 
@@ -54,9 +54,13 @@ def compare(rig, seed=0, power=None, hold_s=HOLD_S, progress=None):
     Raises
     ------
     InputError
-        The load's motion must be prescribed, or the driver cannot follow on this rig.
+        The hold is too short or too long, the load's motion must be prescribed, or the
+        driver cannot follow on this rig.
 
     """
+    if not LEAST_HOLD_S <= hold_s <= MOST_HOLD_S:
+        raise InputError(f'a hold of {hold_s:g} s; allowed {LEAST_HOLD_S:g} to {MOST_HOLD_S:g} s',
+                         'hold')
     if LOADS[rig.load].NEEDS_CONTRACTION:
         raise InputError(f'load `{rig.load}` needs a recorded contraction; choose a rig with '
                          'another load', rig.name)
