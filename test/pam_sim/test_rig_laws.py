@@ -165,6 +165,7 @@ def test_a_table_by_path_stands_beside_the_model(tmp_path):
     ('muscle:\n  like: dmsp_5_300\n  length_m: 20\nload: isometric\n', 3,
      ['length_m', '0.02', '9']),
     ('muscle: {length_m: 0.3}\nload: isometric\n', 1, ['bore_m', 'like']),
+    ('rig: knee\nload: antagonistic_joint\n', 2, ['load_joint']),
     (f'rig: {RIG}\nlaw: {{name: lookup, table: {{load_n: [0, 1]}}}}\n', 2,
      ['pressure_gauge_pa', 'missing']),
 ])
