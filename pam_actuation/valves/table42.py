@@ -187,13 +187,16 @@ def number_head():
 
 
 def number_rows(result):
-    """Return the rows under :func:`number_head`; a dash where a level was not reached."""
+    """Return the rows under :func:`number_head`; a dash where it did not settle."""
     rows = []
     for label, unit, scale, digits, part, key in NUMBERS:
         cells = []
         for name in TITLES:
-            value = result['valves'][name][part][key]
-            cells.append('–' if value is None else f'{value * scale:.{digits}f}')
+            found = result['valves'][name][part]
+            if found[key] is not None:
+                cells.append(f'{found[key] * scale:.{digits}f}')
+            else:
+                cells.append(f'> {found["frequencies_hz"][-1]:g}' if part == 'small_sines' else '–')
         rows.append((label, unit, *cells))
     for label, case in (('power off: to 10 %', 'off'),
                         ('power off, vent open: to 10 %', 'vented')):

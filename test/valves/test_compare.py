@@ -171,6 +171,9 @@ def test_numbers_are_plain_and_shown(result):
     shown = as_text(result)
     for label, *_ in number_rows(result):
         assert label in shown
+    tame = copy.deepcopy(result)
+    tame['valves']['ppr']['small_sines']['bandwidth_hz'] = None
+    assert '> 16' in as_text(tame) and '> 16' not in shown
     assert 'design values' in shown and 'as given by the chapter' in shown
 
 
