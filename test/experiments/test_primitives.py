@@ -31,13 +31,15 @@ EXAMPLES = {
               'duration_s': 5.0},
     'triangle': {'low_m': 0.002, 'high_m': 0.02, 'period_s': 4.0, 'cycles': 2},
     'staircase': {'low_m': 0.0, 'high_m': 0.02, 'steps': 4, 'hold_s': 1.0},
+    'increments': {'to_m': 0.02, 'steps': 3, 'move_s': 0.8, 'hold_s': 1.0},
     'random_steps': {'low_m': 0.0, 'high_m': 0.02, 'min_hold_s': 0.2, 'max_hold_s': 0.9,
                      'duration_s': 5.0, 'seed': 3},
     'multisine': {'center_m': 0.01, 'amplitude_m': 0.005, 'min_hz': 0.1, 'max_hz': 2.0,
                   'lines': 8, 'duration_s': 6.0, 'seed': 3},
 }
-SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'multisine')
-NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification')
+SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'increments', 'multisine')
+NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification',
+         'pressure_increments')
 
 
 def make(name):
