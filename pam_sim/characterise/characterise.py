@@ -19,15 +19,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.fixed_load import fixed_load
-from pam_sim.characterise.points import points_of
+from pam_sim.characterise.points import points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import loads_of_table, points_of_map
 from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
-from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.units import absolute_pa
 
-FINER = 4                   # points between two grid points in the comparison with a rig
 # What makes a muscle another one, as far as a rig says it.
 MUSCLE_PARAMETERS = ('force_map_gain', 'V_dead')
 
@@ -102,17 +100,19 @@ def characterise_runs(runs, dimensions=None, loads_n=None, load_step_n=None):
     dimensions = _one_muscle(runs, rigs, dimensions)
     loads = [fixed_load(run, dimensions.length_m, loads_n[k] if loads_n else None, rigs[k])
              for k, run in enumerate(runs)]
-    surfaces = build_surfaces(points_of(loads), dimensions, load_step_n)
+    points, stuck = without_stuck(points_of(loads))
+    surfaces = build_surfaces(points, dimensions, load_step_n)
     loads = sorted(loads, key=lambda one: one.load_n)
     provenance = [f'{len(runs)} recordings of a fixed load under stepped pressure, '
                   f'{loads[0].load_n:.2f} to {loads[-1].load_n:.2f} N']
     provenance += sorted({
         f'rig {rig.name}, valve {rig.valve}; experiment '
-        f'{run.metadata.get("experiment_name", "unknown")}; software '
-        f'{run.metadata.get("software_version", "unknown")}'
+        f'{run.metadata.get("experiment_name", "unknown")}'
+        + ('; simulated' if _simulated(run) else '')
         for run, rig in zip(runs, rigs) if rig is not None})
     result = Characterisation(surfaces, dimensions, 'recordings', loads,
                               [run.path for run in runs], provenance)
+    result.remarks += _stuck_words(stuck)
     _finish(result)
     return result
 
@@ -135,7 +135,7 @@ def characterise_table(table, dimensions, load_step_n=None):
         Too few pressures or loads.
 
     """
-    loads = []
+    loads, stuck = [], []
     if table.kind == 'force map':
         top = float(table.columns['force'].max())
         wanted = None if load_step_n is None else load_step_n * np.arange(
@@ -144,17 +144,23 @@ def characterise_table(table, dimensions, load_step_n=None):
         load_step_n = load_step_n or float(points.load_n[1])
     else:
         loads = loads_of_table(table, dimensions.length_m)
-        points = points_of(loads)
+        points, stuck = without_stuck(points_of(loads))
     surfaces = build_surfaces(points, dimensions, load_step_n)
     result = Characterisation(
         surfaces, dimensions, table.kind, loads, [table.path],
         [f'from a {table.kind}'] + [line for line in table.source.splitlines() if line])
+    result.remarks += _stuck_words(stuck)
     if table.kind == 'force map':
         result.remarks.append(
             'A force map has one branch and states no noise: the uncertainty given is only '
             'that of the contraction at which the force vanishes.')
     _finish(result)
     return result
+
+
+def _stuck_words(loads):
+    return [f'The load of {load:.2f} N did not pull the muscle long again when the pressure fell '
+            f'(friction holds it); it was left out.' for load in loads]
 
 
 def _rig_of(run):
@@ -167,6 +173,11 @@ def _rig_of(run):
     except InputError as mistake:
         raise InputError(f'the rig in its metadata cannot be read: {mistake}',
                          run.path) from None
+
+
+def _simulated(run):
+    """Return whether a run says that it comes from the offline simulation."""
+    return bool(run.metadata.get('seed')) and run.metadata.get('origin') != 'live'
 
 
 def _one_muscle(runs, rigs, given):
@@ -210,8 +221,7 @@ def _finish(result):
             'Some points were measured on one branch only: their uncertainty holds no '
             'hysteresis.')
     if result.loads and result.loads[0].load_n > 0.05:
-        result.remarks.append(
-            f'0 N was extrapolated from {result.loads[0].load_n:.2f} N upwards.')
+        result.remarks.append('No run had 0 N: that column was extrapolated from the others.')
     moved = result.surfaces.monotone
     if moved['moved']:
         result.remarks.append(
@@ -233,7 +243,7 @@ def against_rig(surfaces, rig):
     -------
     dict
         ``rms_percent``, ``max_percent`` on the grid; ``between_rms_percent``,
-        ``between_max_percent`` on a finer one, through the interpolation;
+        ``between_max_percent`` half way between its points;
         ``within_2u_share`` of the grid points that lie within two standard uncertainties;
         ``error_percent``, shape (P, L).
 
@@ -247,9 +257,9 @@ def against_rig(surfaces, rig):
                           for load in loads] for p in pressures])
 
     error = surfaces.strain - truth(surfaces.pressure_gauge_pa, surfaces.load_n)
-    law = Lookup(surfaces.table())
-    pressures, loads = (_finer(axis) for axis in (surfaces.pressure_gauge_pa, surfaces.load_n))
-    between = law.strain_at(pressures[:, None], loads[None, :]) - truth(pressures, loads)
+    pressures, loads = (0.5 * (axis[:-1] + axis[1:])
+                        for axis in (surfaces.pressure_gauge_pa, surfaces.load_n))
+    between = surfaces.law().strain_at(pressures[:, None], loads[None, :]) - truth(pressures, loads)
     return {
         'rms_percent': 100.0 * float(np.sqrt(np.mean(error ** 2))),
         'max_percent': 100.0 * float(np.abs(error).max()),
@@ -260,8 +270,3 @@ def against_rig(surfaces, rig):
         'error_percent': (100.0 * error).tolist(),
     }
 
-
-def _finer(axis):
-    """Return an axis with FINER - 1 points between any two."""
-    steps = np.linspace(axis[:-1], axis[1:], FINER, endpoint=False, axis=1)
-    return np.append(steps.ravel(), axis[-1])

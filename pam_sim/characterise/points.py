@@ -29,6 +29,8 @@ from scipy.interpolate import PchipInterpolator
 
 EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its end
 LIFTED_STRAIN = 1e-4        # contraction from which a load counts as lifted
+STUCK_STRAIN = 5e-3         # branches closer than this are never a stuck muscle
+_SURFACES = ('strain', 'half_distance', 'noise', 'settling', 'reading')
 SAME_PA = 1e3               # grid pressures are rounded to this
 
 
@@ -157,6 +159,26 @@ def load_grid(load_n, step_n=None):
         raise InputError(f'of {step:g} N makes {grid.size} loads up to {load_n[-1]:.1f} N; '
                          f'3 or more are needed', '--load-step-n')
     return grid
+
+
+def without_stuck(points):
+    """
+    Return (Points, loads left out [N]): without small loads that friction alone can hold.
+
+    A load smaller than the friction inside the muscle does not pull it long
+    again; its branches lie far apart and their mean says little. Such a run is
+    told by branches more than twice as far apart as those of the next load.
+    """
+    left_out = []
+    while points.load_n.size > 3:
+        with np.errstate(invalid='ignore'):
+            apart = np.sqrt(np.mean(np.nan_to_num(points.half_distance[:, :2]) ** 2, axis=0))
+        if apart[0] < STUCK_STRAIN or apart[0] < 2.0 * apart[1]:
+            break
+        left_out.append(float(points.load_n[0]))
+        points = Points(points.pressure_gauge_pa, points.load_n[1:], points.load_u_n[1:], *(
+            getattr(points, name)[:, 1:] for name in _SURFACES))
+    return points, left_out
 
 
 def with_no_load(points):

@@ -25,6 +25,7 @@ from pam_sim.muscle.lookup_table import LookupTable
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 STRAIN_STEP = 0.01          # of the tabulated F(eps, P)
+REST_SIGMAS = 5.0           # a contraction of fewer standard deviations of its noise is rest
 _DIGITS_STRAIN, _DIGITS_MASS = 7, 13     # far below any uncertainty; keeps files short
 
 
@@ -84,6 +85,10 @@ class Surfaces:
         return LookupTable(self.pressure_gauge_pa, self.load_n, self.strain, self.air_mass_kg,
                            source)
 
+    def law(self):
+        """Return the Lookup law of contraction and force; the air is right only if known."""
+        return _law(self.pressure_gauge_pa, self.load_n, self.strain, self.air_mass_kg)
+
 
 def build_surfaces(points, dimensions, load_step_n=None):
     """
@@ -112,14 +117,17 @@ def build_surfaces(points, dimensions, load_step_n=None):
 
     measured = PchipInterpolator(points.load_n, points.strain, axis=1)(at)
     strain = np.round(monotone_surface(measured), _DIGITS_STRAIN)
+    # What noise alone can make is rest: the force law asks which loads were lifted.
+    strain[strain < REST_SIGMAS * np.median(points.noise)] = 0.0
     if strain.max() <= 1e-3:
         raise InputError('the muscle does not contract at any pressure', 'characterise')
     half = onto(points.half_distance)
     slope = np.gradient(strain, loads, axis=1)
     parts = {
         'noise': onto(points.noise),
-        # Both branches are equally right: the truth lies anywhere between (uniform).
-        'hysteresis': np.nan_to_num(np.abs(half)) / np.sqrt(3.0),
+        # Both branches are equally right: the truth lies anywhere between (uniform). Where the
+        # pressure turns they meet without being right: the widest distance below counts.
+        'hysteresis': np.maximum.accumulate(np.nan_to_num(np.abs(half))) / np.sqrt(3.0),
         'settling': onto(points.settling),
         'load': np.abs(slope) * np.interp(at, points.load_n, points.load_u_n),
         'reading': onto(points.reading),
@@ -148,11 +156,15 @@ def _air(pressure, strain, strain_u, dimensions):
     return np.round(mass, _DIGITS_MASS), np.abs(per_strain) * strain_u / per_pascal
 
 
-def _force(pressure, loads, strain, strain_u, mass):
-    """Return (contractions, F, uncertainty of F); NaN where only larger loads would reach."""
+def _law(pressure, loads, strain, mass):
     # The force does not depend on the air: any rising mass serves where it is unknown.
     air = mass if mass is not None else np.repeat(1.0 + pressure[:, None], loads.size, axis=1)
-    law = Lookup(LookupTable(pressure, loads, strain, air))
+    return Lookup(LookupTable(pressure, loads, strain, air))
+
+
+def _force(pressure, loads, strain, strain_u, mass):
+    """Return (contractions, F, uncertainty of F); NaN where only larger loads would reach."""
+    law = _law(pressure, loads, strain, mass)
     axis = np.append(np.arange(0.0, strain.max(), STRAIN_STEP), strain.max())
     force = law.force_n(pressure[:, None], axis[None, :], outside='allow')
     # Smooth rows of the largest load say nothing on contractions that only more load reaches.
