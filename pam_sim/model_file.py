@@ -14,6 +14,7 @@
 
 """Model files and presets: YAML in, Rig out, and back."""
 
+from dataclasses import replace
 from importlib import resources
 import os
 
@@ -21,15 +22,15 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
-from pam_sim.muscle import dmsp_5_300
+from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
 from pam_sim.parameters import check_parameters
 from pam_sim.rig import EffectSetting, Rig, rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import hsv
 
-KEYS = ('name', 'rig', 'muscle', 'load', 'valve', 'fidelity', 'parameters', 'tolerance',
+KEYS = ('name', 'rig', 'muscle', 'law', 'load', 'valve', 'fidelity', 'parameters', 'tolerance',
         'effects', 'sensors')
-_PRESET_OF_LOAD = {load: f'dmsp_5_300_{load}' for load in LOADS}
+_MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
 
 
 def preset_names():
@@ -96,8 +97,14 @@ def _from_mapping(data, name, seen):
     else:
         if 'load' not in data:
             raise data.error(f'`rig` is missing; allowed: {", ".join(preset_names())}')
-        data.require('muscle', str, choices=(dmsp_5_300.NAME,))
-        base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)))
+        if isinstance(data.get('muscle'), Located):
+            muscle = read_muscle(data['muscle'])
+        else:
+            muscle = get_muscle(data.require('muscle', str, choices=muscle_names()))
+        base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)), muscle=muscle)
+    muscle = base.muscle
+    if 'law' in data:
+        muscle = muscle.with_law(read_law(data, muscle.law))
     known = rig_parameters(base.load)
     given = data.get('parameters', dict) if data.get('parameters') is not None else {}
     check_parameters(known, given)
@@ -113,7 +120,7 @@ def _from_mapping(data, name, seen):
         data.get('valve', str, base.valve, choices=VALVES),
         data.get('fidelity', str, base.fidelity, choices=hsv.FIDELITIES),
         {**base.parameters, **dict(given)}, _effects(data, base),
-        {**base.sensors, **dict(sensors)}, tolerance)
+        {**base.sensors, **dict(sensors)}, tolerance, muscle)
 
 
 def _effects(data, base):
@@ -139,11 +146,20 @@ def _effects(data, base):
     return list(settings.values())
 
 
+def _base(rig):
+    """Return the lines that choose muscle, law and load."""
+    nominal = get_muscle(_MUSCLE)
+    if rig.muscle == nominal:
+        return {'rig': f'{_MUSCLE}_{rig.load}'}
+    if rig.muscle == replace(nominal, law=rig.muscle.law):
+        return {'rig': f'{_MUSCLE}_{rig.load}', 'law': rig.muscle.law.plain()}
+    return {'muscle': rig.muscle.plain(), 'load': rig.load}
+
+
 def rig_to_yaml(rig):
     """Return the text of a model file that gives an equal rig."""
     known = rig_parameters(rig.load)
-    data = {'name': rig.name, 'rig': _PRESET_OF_LOAD[rig.load], 'valve': rig.valve,
-            'fidelity': rig.fidelity}
+    data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}
     changed = {p.name: rig.parameters[p.name] for p in known
                if rig.parameters[p.name] != p.nominal}
     tolerance = {p.name: rig.tolerance[p.name] for p in known

@@ -67,7 +67,8 @@ class Plant:
         Raises
         ------
         InputError
-            The number of signals does not fit the valve, or a number is not finite.
+            The number of signals does not fit the valve, or a number is not finite, given
+            or computed.
 
         """
         values = (signal,) if np.isscalar(signal) else tuple(signal)
@@ -83,6 +84,10 @@ class Plant:
         if not np.isfinite(inp).all():
             raise InputError('is not finite', 'valve signal, force or contraction')
         kernel.step(self.state, self.par, inp, self._out)
+        if not np.isfinite(self._out).all():
+            raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
+                             'numbers of the model make no rig that can be stepped',
+                             f'rig {self.rig.name}')
 
     @property
     def time_s(self):

@@ -15,13 +15,12 @@
 """The rig: muscle, valve, load, effects and sensors as one object that can be simulated."""
 
 from dataclasses import dataclass, field, replace
-import math
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.muscle import dmsp_5_300, geometry, sarosi
+from pam_sim.muscle.muscle import get_muscle, Muscle, MUSCLE_PARAMETERS
 from pam_sim.parameters import check_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
@@ -33,7 +32,7 @@ DEFAULT_TOLERANCE = 0.02
 
 def rig_parameters(load):
     """Return the Parameters a rig with this load has, in the order of model files."""
-    return (*dmsp_5_300.PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS)
+    return (*MUSCLE_PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -94,6 +93,8 @@ class Rig:
         Sensor settings, name -> value (see :class:`pam_sim.sensors.SensorChain`).
     tolerance : dict
         Parameter name -> relative standard deviation.
+    muscle : Muscle or str
+        Dimensions and force law, or the name of a muscle; ``dmsp_5_300`` by default.
 
     """
 
@@ -105,6 +106,7 @@ class Rig:
     effects: list = field(default_factory=list)
     sensors: dict = field(default_factory=dict)
     tolerance: dict = field(default_factory=dict)
+    muscle: Muscle = 'dmsp_5_300'
 
     def __post_init__(self):
         """Check the choices and fill in nominal numbers."""
@@ -113,7 +115,13 @@ class Rig:
                                       (self.fidelity, hsv.FIDELITIES, 'fidelity')):
             if value not in choices:
                 raise InputError(f'`{value}` is not known; allowed: {", ".join(choices)}', where)
+        if isinstance(self.muscle, str):
+            object.__setattr__(self, 'muscle', get_muscle(self.muscle))
         known = rig_parameters(self.load)
+        if self.parameters.get('contraction_m', 0.0) > self.muscle.stroke_m:
+            raise InputError(
+                f'`contraction_m` is {self.parameters["contraction_m"]:g}; allowed 0 to '
+                f'{self.muscle.stroke_m:g} m with muscle {self.muscle.name}', 'parameters')
         tolerance = {parameter.name: parameter.tolerance for parameter in known}
         tolerance.update(self.tolerance)
         settings = {}
@@ -143,7 +151,7 @@ class Rig:
         return next((item for item in self.effects if item.name == name), None)
 
     def with_(self, parameters=None, effects=None, valve=None, fidelity=None, load=None,
-              sensors=None, name=None):
+              sensors=None, name=None, muscle=None, law=None):
         """
         Return a changed copy.
 
@@ -157,6 +165,10 @@ class Rig:
             As of the class; parameters the new load does not have are dropped.
         sensors : dict, optional
             Sensor settings to change.
+        muscle : str or Muscle, optional
+            Another muscle.
+        law : str or LawChoice, optional
+            Another force law for the muscle; a name takes the law's first set.
 
         Raises
         ------
@@ -165,6 +177,10 @@ class Rig:
 
         """
         new_load = load or self.load
+        muscle = muscle or self.muscle
+        if law is not None:
+            muscle = get_muscle(muscle) if isinstance(muscle, str) else muscle
+            muscle = muscle.with_law(law)
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
         tolerance = {key: value for key, value in self.tolerance.items() if key in known}
@@ -172,14 +188,15 @@ class Rig:
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
             fidelity=fidelity or self.fidelity, parameters={**kept, **(parameters or {})},
             effects=self.effects if effects is None else effects, tolerance=tolerance,
-            sensors={**self.sensors, **(sensors or {})})
+            sensors={**self.sensors, **(sensors or {})}, muscle=muscle)
 
     # -- statics ---------------------------------------------------------------------------
     def static_pressure_pa(self, contraction_m, load_n=None):
         """
         Return the absolute pressure [Pa] at which the muscle holds a contraction.
 
-        The force map with its gain, no effects; never below atmospheric pressure.
+        The force map with its gain, no effects; never below atmospheric pressure, inf
+        where no pressure suffices.
 
         Parameters
         ----------
@@ -196,15 +213,16 @@ class Rig:
         """
         if load_n is None:
             load_n = self._weight_n()
-        gauge = sarosi.pressure_gauge_pa(
+        pressure = P_ATM_PA + self.muscle.law.law.holding_pressure_pa(
             np.asarray(load_n, float) / self.parameters['force_map_gain'],
-            np.asarray(contraction_m, float) / geometry.LENGTH_M)
-        pressure = P_ATM_PA + np.maximum(gauge, 0.0)
+            np.asarray(contraction_m, float) / self.muscle.length_m)
         return float(pressure) if np.ndim(pressure) == 0 else pressure
 
     def static_contraction_m(self, pressure_pa, load_n=None):
         """
-        Return the contraction [m] at rest, 0 to 0.25 L0, at an absolute pressure [Pa].
+        Return the contraction [m] at rest, 0 to the stroke, at an absolute pressure [Pa].
+
+        The force map with its gain, no effects; scalars or arrays.
 
         Raises
         ------
@@ -214,20 +232,11 @@ class Rig:
         """
         if load_n is None:
             load_n = self._weight_n()
-        wanted = load_n / self.parameters['force_map_gain']
-        low, high = 0.0, geometry.MAX_STRAIN
-        gauge = pressure_pa - P_ATM_PA
-        if sarosi.tension_n(gauge, low) <= wanted:
-            return 0.0
-        if sarosi.tension_n(gauge, high) >= wanted:
-            return high * geometry.LENGTH_M
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if sarosi.tension_n(gauge, middle) > wanted:
-                low = middle
-            else:
-                high = middle
-        return low * geometry.LENGTH_M
+        strain = self.muscle.law.law.max_strain(
+            np.maximum(np.asarray(pressure_pa, float) - P_ATM_PA, 0.0),
+            np.asarray(load_n, float) / self.parameters['force_map_gain'])
+        contraction = self.muscle.length_m * np.minimum(strain, self.muscle.max_strain)
+        return float(contraction) if np.ndim(contraction) == 0 else contraction
 
     def _weight_n(self):
         if 'mass_kg' not in self.parameters:
@@ -311,6 +320,4 @@ class Rig:
 
     def volume_m3(self, contraction_m):
         """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
-        thread, turns = geometry.braid()
-        return self.parameters['V_dead'] + geometry.volume_of(
-            contraction_m, geometry.LENGTH_M, thread * thread, 1.0 / (4.0 * math.pi * turns ** 2))
+        return self.parameters['V_dead'] + self.muscle.volume_m3(contraction_m)

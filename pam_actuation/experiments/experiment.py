@@ -20,7 +20,6 @@ from pam_actuation.experiments.primitives import make_primitive, Sine, Triangle
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
-from pam_sim.muscle import geometry
 from pam_sim.units import P_ATM_PA
 
 # What a value means, its unit suffix in files, its rest value and its allowed range.
@@ -104,7 +103,7 @@ class Experiment:
         """Raise InputError where the experiment asks for more than the rig's stroke."""
         if self.domain != 'contraction':
             return
-        stroke = geometry.MAX_STRAIN * geometry.LENGTH_M
+        stroke = rig.muscle.stroke_m
         steps = max(int(self.duration_s / 0.01), 1)
         worst = max(self.at(k * 0.01)[0] for k in range(steps + 1))
         if worst > stroke:

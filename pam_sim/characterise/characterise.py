@@ -26,8 +26,6 @@ from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
 from pam_sim.units import absolute_pa
 
-# What makes a muscle another one, as far as a rig says it.
-MUSCLE_PARAMETERS = ('force_map_gain', 'V_dead')
 
 
 @dataclass
@@ -189,8 +187,8 @@ def _one_muscle(runs, rigs, given):
         if rig is None and given is None:
             raise InputError('says nothing of its muscle; give --length-m and --bore-m', run.path)
         if rig is not None:
-            key = (Dimensions.of_rig(rig), getattr(rig, 'muscle', None),
-                   *(rig.parameters.get(name) for name in MUSCLE_PARAMETERS))
+            key = (Dimensions.of_rig(rig), str(rig.muscle.plain()),
+                   rig.parameters['force_map_gain'])
             seen.setdefault(key, run.path)
     if len(seen) > 1:
         raise InputError('the recordings are of different muscles or dead volumes: '
@@ -253,8 +251,8 @@ def against_rig(surfaces, rig):
     def truth(pressures, loads):
         # Without any load a clipped force map holds every contraction beyond the first
         # of zero force; a breath of load picks that one.
-        return np.array([[rig.static_contraction_m(absolute_pa(p), max(load, 1e-6)) / length
-                          for load in loads] for p in pressures])
+        return rig.static_contraction_m(
+            absolute_pa(pressures)[:, None], np.maximum(loads, 1e-6)) / length
 
     error = surfaces.strain - truth(surfaces.pressure_gauge_pa, surfaces.load_n)
     pressures, loads = (0.5 * (axis[:-1] + axis[1:])

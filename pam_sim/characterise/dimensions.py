@@ -64,7 +64,9 @@ class Dimensions:
     @classmethod
     def of_rig(cls, rig):
         """Return the dimensions of the muscle of a :class:`pam_sim.rig.Rig`."""
-        return cls(geometry.LENGTH_M, geometry.BORE_M, rig.parameters['V_dead'])
+        muscle = rig.muscle
+        return cls(muscle.length_m, muscle.bore_m, rig.parameters['V_dead'],
+                   muscle.braid_angle_rad)
 
     def volume_m3(self, strain):
         """Return the volume [m^3] of muscle and dead volume at a contraction; broadcasts."""

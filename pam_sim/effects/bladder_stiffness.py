@@ -35,7 +35,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
-    """Return the force less that of the tube."""
-    return force_n - par[k] * contraction_m
+def map_output(tension_n, pressure_pa, contraction_m, state, i, par, k):
+    """Return the tension less that of the tube."""
+    return tension_n - par[k] * contraction_m

@@ -22,7 +22,6 @@ Generalised Maxwell solid, e.g. Findley, Lai, Onaran (1976), ch. 5.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle.sarosi import tension_n
 from pam_sim.parameters import Parameter
 
 _K1, _TAU1, _K2, _TAU2 = range(4)
@@ -38,11 +37,10 @@ def _relaxing_stiffness(values, rig):
 
 def _creep_fraction(values, rig):
     """Return relaxing over static stiffness at 400 kPa gauge and 8.9 mm (5 kg at rest)."""
-    length, x, d = 0.300, 8.86e-3, 1e-5
-    static = (float(tension_n(400e3, (x - d) / length))
-              - float(tension_n(400e3, (x + d) / length))) / (2.0 * d)
-    gain = rig.parameters['force_map_gain'] if rig is not None else 1.0
-    return _relaxing_stiffness(values, rig) / (gain * static)
+    length, x, d = rig.muscle.length_m, 8.86e-3, 1e-5
+    near, far = rig.muscle.law.law.force_n(400e3, [(x - d) / length, (x + d) / length], 'allow')
+    static = rig.parameters['force_map_gain'] * (near - far) / (2.0 * d)
+    return float(_relaxing_stiffness(values, rig) / static) if static > 0.0 else 0.0
 
 
 EFFECT = Effect(

@@ -41,6 +41,8 @@ class Numbers:
         Valve signal before the start.
     pressure_pa, contraction_m, force_n : float
         State at the start, pressure absolute.
+    muscle : Muscle
+        Dimensions and force law.
 
     """
 
@@ -53,6 +55,7 @@ class Numbers:
     pressure_pa: float = 0.0
     contraction_m: float = 0.0
     force_n: float = 0.0
+    muscle: object = None
 
 
 @dataclass(frozen=True)

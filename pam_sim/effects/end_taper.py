@@ -16,17 +16,16 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle.geometry import LENGTH_M
-from pam_sim.muscle.sarosi import tension_n
 from pam_sim.parameters import Parameter
 
 
 def _force_change(values, rig):
     """Return the change of tension at 500 kPa gauge and 10 mm, N."""
-    strain = 10e-3 / LENGTH_M
-    gain = rig.parameters['force_map_gain'] if rig is not None else 1.0
-    return gain * float(tension_n(500e3, (1.0 + values['k_minus_1']) * strain)
-                        - tension_n(500e3, strain))
+    strain = 10e-3 / rig.muscle.length_m
+    force_n = rig.muscle.law.law.force_n
+    return float(rig.parameters['force_map_gain'] * (
+        force_n(500e3, (1.0 + values['k_minus_1']) * strain, 'allow')
+        - force_n(500e3, strain, 'allow')))
 
 
 EFFECT = Effect(

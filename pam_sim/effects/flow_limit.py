@@ -24,7 +24,6 @@ is the rig's own supply.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle import geometry
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
@@ -37,10 +36,8 @@ _FILL, _VENT, _SUPPLY, _ATMOSPHERE, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = 
 
 
 def _pack(values, numbers):
-    thread, turns = geometry.braid()
-    shape = (geometry.LENGTH_M, thread * thread, 1.0 / (12.566370614359172 * turns * turns))
     dead, supply = numbers.parameters['V_dead'], numbers.parameters['supply_pa']
-    volume = dead + geometry.volume_of(_CONTRACTION_M, *shape)
+    volume = dead + numbers.muscle.volume_m3(_CONTRACTION_M)
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
     if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:
@@ -49,7 +46,7 @@ def _pack(values, numbers):
     if values['vent_rate_at_400kpa_pa_per_s'] > 0.0:
         flow = mass_flow_kg_per_s(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
         vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow
-    return fill, vent, supply, P_ATM_PA, dead, *shape
+    return fill, vent, supply, P_ATM_PA, dead, *numbers.muscle.shape
 
 
 EFFECT = Effect(

@@ -21,7 +21,6 @@ left with a small droop.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.muscle import geometry
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
 from pam_sim.units import (
@@ -34,10 +33,9 @@ _CONDUCTANCE, _ATMOSPHERE, _RT, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = rang
 
 
 def _pack(values, numbers):
-    thread, turns = geometry.braid()
     return (values['conductance_m3_per_s_pa'] * _KG_PER_S_PA, P_ATM_PA,
-            GAS_CONSTANT_AIR * TEMPERATURE_K, numbers.parameters['V_dead'], geometry.LENGTH_M,
-            thread * thread, 1.0 / (12.566370614359172 * turns * turns))
+            GAS_CONSTANT_AIR * TEMPERATURE_K, numbers.parameters['V_dead'],
+            *numbers.muscle.shape)
 
 
 def _flow_at_400kpa(values, rig):

@@ -26,7 +26,7 @@ MOVES_FREELY = True
 NEEDS_CONTRACTION = False
 
 PARAMETERS = (
-    Parameter('mass_kg', 'kg', 5.0, 0.1, 50.0, 0.02, 'Hanging mass.', 'rig of the seed chapter'),
+    Parameter('mass_kg', 'kg', 5.0, 0.1, 500.0, 0.02, 'Hanging mass.', 'rig of the seed chapter'),
 )
 
 

@@ -14,7 +14,6 @@
 
 """Constant contraction; the load cell reads the force the muscle transmits."""
 
-from pam_sim.muscle.geometry import LENGTH_M, MAX_STRAIN
 from pam_sim.parameters import Parameter
 
 NAME = 'isometric'
@@ -22,6 +21,7 @@ MOVES_FREELY = False
 NEEDS_CONTRACTION = False
 
 PARAMETERS = (
-    Parameter('contraction_m', 'm', 0.0, 0.0, MAX_STRAIN * LENGTH_M, 0.0,
-              'Contraction at which the ends are held.', 'design value'),
+    Parameter('contraction_m', 'm', 0.0, 0.0, 5.0, 0.0,
+              'Contraction at which the ends are held; at most the stroke of the muscle.',
+              'design value'),
 )

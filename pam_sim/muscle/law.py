@@ -96,6 +96,12 @@ class MuscleLaw:
         Set name to ParameterSet.
     CLAIMS : tuple of int
         Which of ``RULES`` the law claims.
+    COMPILED, COMPILED_DAMPER : callable or None
+        ``tension_n(gauge_pa, strain, par, k)`` and, for a law with a damper,
+        ``damper_force_n(velocity_m_per_s, gauge_pa, strain, par, k)`` of the file; compiled,
+        not clipped, with the values of :meth:`pack` at ``par[k]`` on.
+    EXTRAPOLATES : bool
+        Whether the formula goes on outside its range; else a rollout flags it.
 
     Raises
     ------
@@ -112,6 +118,10 @@ class MuscleLaw:
     PARAMETERS = ()
     SETS = {'default': ParameterSet()}
     CLAIMS = ()
+    # The same formula for the compiled rig, put here by the registry from the law's file.
+    COMPILED = None
+    COMPILED_DAMPER = None
+    EXTRAPOLATES = True
 
     def __init__(self, values=None, muscle=None, where=''):
         muscle = next(iter(self.SETS)) if muscle is None else muscle
@@ -132,6 +142,10 @@ class MuscleLaw:
     def _tension_n(self, pressure, strain):
         """Return the formula's value [N], negative where the muscle would push."""
         raise NotImplementedError(f'{type(self).__name__} states no force')
+
+    def pack(self):
+        """Return the floats that the compiled formula reads."""
+        return tuple(self.values.values())
 
     def outside(self, pressure_gauge_pa, strain):
         """Return True where the point is outside the range of the numbers; arrays broadcast."""
@@ -206,3 +220,30 @@ class MuscleLaw:
             pulls = self.formula_n(pressure, middle) > load
             low, high = np.where(pulls, middle, low), np.where(pulls, high, middle)
         return np.where(self.formula_n(pressure, 0.0 * low) > load, 0.5 * (low + high), 0.0)[()]
+
+    def holding_pressure_pa(self, force_n, strain, upper_pa=2e6):
+        """
+        Return the gauge pressure [Pa] that gives a tension; arrays broadcast.
+
+        Bisection, by rule 2; 0 where no pressure is needed, inf where
+        ``upper_pa`` does not suffice. Points outside the range are not flagged.
+
+        Parameters
+        ----------
+        force_n : float or ndarray
+            Tension to hold, N.
+        strain : float or ndarray
+            Contraction over length at rest.
+        upper_pa : float
+            Largest gauge pressure tried, Pa.
+
+        """
+        force, strain = np.broadcast_arrays(
+            np.asarray(force_n, float), np.asarray(strain, float))
+        low, high = np.zeros(force.shape), np.full(force.shape, float(upper_pa))
+        for _ in range(52):
+            middle = 0.5 * (low + high)
+            short = self.formula_n(middle, strain) < force
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        found = np.where(self.formula_n(high, strain) < force, np.inf, 0.5 * (low + high))
+        return np.where(self.formula_n(0.0 * low, strain) >= force, 0.0, found)[()]

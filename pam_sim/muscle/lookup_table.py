@@ -26,7 +26,7 @@ from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LookupTable:
     """
     Static points on a full grid of pressure and load.
@@ -82,6 +82,12 @@ class LookupTable:
         if np.any(self.air_mass_kg <= 0) or np.any(np.diff(self.air_mass_kg, axis=0) <= 0.0):
             raise InputError('air mass must be positive and rise with pressure',
                              'lookup table, air_mass_kg')
+
+    def __eq__(self, other):
+        return isinstance(other, LookupTable) and self.source == other.source and all(
+            np.array_equal(getattr(self, name), getattr(other, name)) for name in COLUMNS)
+
+    __hash__ = None
 
     def write_csv(self, path):
         """Write the table, one line per point, atomically; the source goes into a comment."""

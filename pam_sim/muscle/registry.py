@@ -49,6 +49,8 @@ def laws():
         if law.NAME in found or law.NAME != path.stem:
             raise InputError(
                 f'law `{law.NAME}` must be defined once, in a file of its name', str(path))
+        law.COMPILED = getattr(module, 'tension_n', None)
+        law.COMPILED_DAMPER = getattr(module, 'damper_force_n', None)
         found[law.NAME] = law
     return found
 

@@ -30,11 +30,13 @@ import tempfile
 
 import numba
 from pam_sim.effects import registry
+from pam_sim.muscle.registry import law_files, laws
 from pam_sim.rollout import hooks as hook_functions, layout
 from pam_sim.rollout.hooks import HOOKS
 
 _PACKAGE = Path(__file__).parent.parent
 _MARK = '# --- kernel'
+_FAST_LAW = 'sarosi'        # of the nominal rig: no call is left of it
 
 _HEAD = '''"""Generated from the effect registry; do not edit."""
 
@@ -46,13 +48,14 @@ from pam_sim.compiled import compiled, inlined
 from pam_sim.effects.registry import effects
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
-from pam_sim.muscle.sarosi import tension_n
+from pam_sim.muscle.registry import laws
 from pam_sim.rollout.layout import *
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
 
 _EFFECTS = effects()
+_LAWS = laws()
 '''
 
 _TAIL = '''
@@ -78,6 +81,24 @@ def settle(state, par):
     state[S_SUPPLY] = apply_supply(par[PAR_SUPPLY], state, par)
     state[S_MUSCLE_FORCE] = muscle_force(
         map_tension(p, x, state, par), p, x, state[S_VELOCITY], 0.0, 0.0, state, par)
+
+
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+def rest_contraction(p, state, par):
+    """Return the contraction [m] at which a free load rests at a pressure [Pa], by bisection."""
+    low = 0.0
+    high = par[PAR_MAX_CONTRACTION]
+    if map_tension(p, low, state, par) <= load_force(low, 0.0, 0.0, 0.0, 0.0, state, par):
+        return low
+    if map_tension(p, high, state, par) >= load_force(high, 0.0, 0.0, 0.0, 0.0, state, par):
+        return high
+    for _ in range(52):
+        x = 0.5 * (low + high)
+        if map_tension(p, x, state, par) > load_force(x, 0.0, 0.0, 0.0, 0.0, state, par):
+            low = x
+        else:
+            high = x
+    return low
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
@@ -115,6 +136,38 @@ def effect_layout():
     return places, k, i
 
 
+def law_codes():
+    """Return {law name: number in ``par[PAR_LAW]``} of the laws a rig can use, 0 the fast one."""
+    usable = [name for name, law in laws().items() if law.COMPILED is not None]
+    return {name: float(code) for code, name in enumerate(
+        sorted(usable, key=lambda name: (name != _FAST_LAW, name)))}
+
+
+def _law_dispatchers():
+    _, k, _ = effect_layout()
+    lines, others, dampers = [], [], []
+    for name, code in law_codes().items():
+        lines.append(f'_law_{name} = _LAWS[{name!r}].COMPILED')
+        if name != _FAST_LAW:
+            others += [f'    if law == {code}:',
+                       f'        return _law_{name}(gauge, strain, par, {k})']
+        if laws()[name].COMPILED_DAMPER is not None:
+            lines.append(f'_damper_{name} = _LAWS[{name!r}].COMPILED_DAMPER')
+            dampers += [f'    if law == {code}:',
+                        f'        return _damper_{name}(v, gauge, strain, par, {k})']
+    for header, decorator, body in (
+            ('_other_law(gauge, strain, par)', '@compiled',
+             ['    law = par[PAR_LAW]', *others, '    return 0.0']),
+            ('law_tension(gauge, strain, par)', '@inlined',
+             ['    if par[PAR_LAW] == 0.0:',
+              f'        return _law_{_FAST_LAW}(gauge, strain, par, {k})',
+              '    return _other_law(gauge, strain, par)']),
+            ('law_damper(v, gauge, strain, par)', '@compiled',
+             ['    law = par[PAR_LAW]', *dampers, '    return 0.0'])):
+        lines += ['', '', decorator, f'def {header}:', *body]
+    return lines
+
+
 def _dispatchers():
     places, _, _ = effect_layout()
     lines = []
@@ -148,7 +201,7 @@ def _dispatchers():
     for hook in ('pressure_rate', 'valve_flow', 'air_rt'):
         lines += ['', '', '@inlined', f'def {hook}_active(par):',
                   f'    return par[{hook_flag(hook)}] != 0.0']
-    return '\n'.join(lines) + '\n'
+    return '\n'.join(lines + _law_dispatchers()) + '\n'
 
 
 def kernel_source():
@@ -166,7 +219,7 @@ def kernel_hash():
     files = [_PACKAGE / 'compiled.py', _PACKAGE / 'rollout' / 'layout.py']
     for folder in ('muscle', 'valve', 'load'):
         files += sorted((_PACKAGE / folder).glob('*.py'))
-    for path in files + registry.effect_files():
+    for path in files + law_files() + registry.effect_files():
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
@@ -236,5 +289,5 @@ def load_cached_module(name, source, key):
 
 
 def load_kernel():
-    """Return the kernel module with ``step``, ``look``, ``settle`` and ``rollout``."""
+    """Return the kernel module with the functions of :mod:`pam_sim.rollout.kernel`."""
     return load_cached_module('pam_sim_kernel', kernel_source(), kernel_hash())

@@ -26,4 +26,5 @@ _module = load_kernel()
 step = _module.step
 look = _module.look
 settle = _module.settle
+rest_contraction = _module.rest_contraction
 rollout = _module.rollout

@@ -17,7 +17,7 @@ Index constants of the four arrays of the kernel.
 
 ``step(state, par, inp, out)`` reads ``par`` and ``inp``, advances ``state`` and
 fills ``out``. All are float64, SI, absolute pressures. Effects follow behind
-``STATE_BASE`` and ``PAR_BASE``.
+``STATE_BASE`` and ``PAR_BASE``; the numbers of the force law stand at the end of ``par``.
 """
 
 # -- inputs of one step, held constant during it --------------------------------------
@@ -89,7 +89,9 @@ PAR_PWM_PERIOD = 22         # s
 PAR_INVERSE_LENGTH = 23     # 1/m
 PAR_INVERSE_MASS = 24       # 1/kg
 PAR_INVERSE_RT = 25         # kg/J
-PAR_BASE = 26
+PAR_LAW = 26                # which force law, see generate.law_codes
+PAR_LAW_DAMPER = 27         # 1: the law has a damper of its own
+PAR_BASE = 28
 
 VALVE_PPR = 0
 VALVE_HSV_AVERAGED = 1

@@ -14,6 +14,7 @@
 
 """Turn a rig into the arrays of the kernel."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -21,23 +22,37 @@ from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.muscle import geometry
 from pam_sim.rollout import kernel, layout
-from pam_sim.rollout.generate import effect_layout, hook_flag
+from pam_sim.rollout.generate import effect_layout, hook_flag, law_codes
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
+from pam_sim.valve import hsv, ppr
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
-from pam_sim.valve.hsv import SWITCHING_STEP_S
 
 _PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
+_LAW_CODES = law_codes()
 
 
 def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
     """Return (state, par); arguments and errors as of ``Rig.pack``."""
     numbers = _numbers(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
+    law = rig.muscle.law.law.pack()
     state = np.zeros(_STATE_SIZE)
-    par = np.zeros(_PAR_SIZE)
+    par = np.zeros(_PAR_SIZE + len(law))
+    par[_PAR_SIZE:] = law
     _pack_base(rig, numbers, state, par)
+    _pack_effects(rig, numbers, state, par)
+    if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
+        rest_m = kernel.rest_contraction(numbers.pressure_pa, state, par)
+        if rest_m != numbers.contraction_m:         # effects start from where the load rests
+            numbers = replace(numbers, contraction_m=rest_m)
+            state[layout.S_CONTRACTION] = rest_m
+            _pack_effects(rig, numbers, state, par)
+    kernel.settle(state, par)
+    return state, par
+
+
+def _pack_effects(rig, numbers, state, par):
     for setting in rig.effects:
         k, i = _PLACES[setting.name]
         effect = get_effect(setting.name)
@@ -45,8 +60,6 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
         if par[k - 1] != 0.0:
             for hook in effect.hooks:
                 par[hook_flag(hook)] = 1.0
-    kernel.settle(state, par)
-    return state, par
 
 
 def _numbers(rig, dt_s, pressure, contraction, signal):
@@ -57,43 +70,56 @@ def _numbers(rig, dt_s, pressure, contraction, signal):
         if not lower <= number <= upper:
             raise InputError(f'`{name}` is {number:g}; allowed {lower:g} to {upper:g} {unit}')
     if contraction is None:
-        if LOADS[rig.load].MOVES_FREELY:
-            contraction = rig.static_contraction_m(pressure)
-        else:
-            contraction = value.get('contraction_m', 0.0)
-    top = geometry.MAX_STRAIN * geometry.LENGTH_M
-    if not 0.0 <= contraction <= top and LOADS[rig.load].MOVES_FREELY:
+        contraction = value.get('contraction_m', 0.0)
+    top = rig.muscle.stroke_m
+    moves = LOADS[rig.load].MOVES_FREELY
+    if not (0.0 <= contraction <= top if moves else math.isfinite(contraction)):
         raise InputError(f'`initial_contraction_m` is {contraction:g}; allowed 0 to {top:g} m')
     if signal is None:
         signal = ((min(max((pressure - P_ATM_PA) / value['K_m'], 0.0), 6.0),)
                   if rig.valve == 'ppr' else (0.0, 0.0))
-    elif np.isscalar(signal):
-        signal = (float(signal),)
+    else:
+        signal = np.atleast_1d(np.asarray(signal, dtype=float))
+        lower, upper, unit = ppr.SIGNAL_RANGE if rig.valve == 'ppr' else hsv.SIGNAL_RANGE
+        if signal.shape != (len(rig.signal_names),):
+            raise InputError(f'`initial_signal` has {signal.size} numbers; valve `{rig.valve}` '
+                             f'takes {len(rig.signal_names)}')
+        for number in signal:
+            if not lower <= number <= upper:
+                raise InputError(f'`initial_signal` is {number:g}; allowed {lower:g} to '
+                                 f'{upper:g} {unit}')
     return Numbers(
         float(dt_s), _substep(rig, dt_s), rig.valve,
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
         {**value, 'p_atm': P_ATM_PA}, tuple(float(s) for s in signal),
-        float(pressure), float(contraction), value.get('mass_kg', 0.0) * GRAVITY_M_PER_S2)
+        float(pressure), float(contraction), value.get('mass_kg', 0.0) * GRAVITY_M_PER_S2,
+        rig.muscle)
 
 
 def _substep(rig, dt_s):
-    """Return the physics step: 0.1 ms when switching, shorter where the flow law is steep."""
-    if rig.valve == 'ppr':
-        return float(dt_s)
+    """Return the physics step: 0.1 ms when switching, shorter where something is faster."""
     value = rig.parameters
+    fastest = 0.0                # 1/s, of lag, damping and swing
+    if LOADS[rig.load].MOVES_FREELY:
+        stiffness = value['force_map_gain'] * rig.muscle.stiffness_n_per_m
+        fastest = max(value['damping_n_s_per_m'] / value['mass_kg'],
+                      2.0 * math.sqrt(stiffness / value['mass_kg']))
+    if rig.valve == 'ppr':
+        return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
     smallest = rig.volume_m3(0.0)
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
     slope = flow_function(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
     rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
-    count = max(1, math.ceil(dt_s * rate / 0.5))
+    count = max(1, math.ceil(dt_s * max(rate / 0.5, fastest)))
     if rig.fidelity == 'switching':
-        count = max(count, math.ceil(dt_s / SWITCHING_STEP_S - 1e-9))
+        count = max(count, math.ceil(dt_s / hsv.SWITCHING_STEP_S - 1e-9))
     return dt_s / count
 
 
 def _pack_base(rig, numbers, state, par):
     value = rig.parameters
-    thread, turns = geometry.braid()
+    muscle = rig.muscle
+    length_m, thread_squared, inverse_4_pi_n2 = muscle.shape
     substeps = round(numbers.dt_s / numbers.substep_s)
     valve = layout.VALVE_PPR
     if rig.valve == 'hsv':
@@ -107,14 +133,14 @@ def _pack_base(rig, numbers, state, par):
             (layout.PAR_VALVE, valve),
             (layout.PAR_FREE_LOAD, LOADS[rig.load].MOVES_FREELY),
             (layout.PAR_ATMOSPHERE, P_ATM_PA),
-            (layout.PAR_LENGTH, geometry.LENGTH_M),
+            (layout.PAR_LENGTH, length_m),
             (layout.PAR_FORCE_GAIN, value['force_map_gain']),
             (layout.PAR_DAMPING, value['damping_n_s_per_m']),
             (layout.PAR_MASS, mass),
             (layout.PAR_WEIGHT, mass * GRAVITY_M_PER_S2),
-            (layout.PAR_MAX_CONTRACTION, geometry.MAX_STRAIN * geometry.LENGTH_M),
-            (layout.PAR_THREAD_SQUARED, thread * thread),
-            (layout.PAR_INVERSE_4_PI_N2, 1.0 / (4.0 * math.pi * turns * turns)),
+            (layout.PAR_MAX_CONTRACTION, muscle.stroke_m),
+            (layout.PAR_THREAD_SQUARED, thread_squared),
+            (layout.PAR_INVERSE_4_PI_N2, inverse_4_pi_n2),
             (layout.PAR_DEAD_VOLUME, value['V_dead']),
             (layout.PAR_RT, GAS_CONSTANT_AIR * TEMPERATURE_K),
             (layout.PAR_CONDUCTANCE,
@@ -125,9 +151,11 @@ def _pack_base(rig, numbers, state, par):
             (layout.PAR_TIME_CONSTANT, value['T_m']),
             (layout.PAR_DECAY_HALF, math.exp(-0.5 * numbers.substep_s / value['T_m'])),
             (layout.PAR_PWM_PERIOD, value['pwm_period_s']),
-            (layout.PAR_INVERSE_LENGTH, 1.0 / geometry.LENGTH_M),
+            (layout.PAR_INVERSE_LENGTH, 1.0 / length_m),
             (layout.PAR_INVERSE_MASS, 1.0 / mass),
-            (layout.PAR_INVERSE_RT, 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K))):
+            (layout.PAR_INVERSE_RT, 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K)),
+            (layout.PAR_LAW, _LAW_CODES[muscle.law.name]),
+            (layout.PAR_LAW_DAMPER, type(muscle.law.law).COMPILED_DAMPER is not None)):
         par[index] = number
     state[layout.S_PRESSURE] = numbers.pressure_pa
     state[layout.S_CONTRACTION] = numbers.contraction_m

@@ -12,13 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Check the inputs of a simulation and run the rollout."""
+"""Check the inputs of a simulation, run the rollout and check what came out."""
+
+import math
+import warnings
 
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.response import Response
 from pam_sim.rollout import kernel, layout
+from pam_sim.units import P_ATM_PA
+from pam_sim.valve import hsv, ppr
+
+MAX_FORCE_N = 1e5
+# Of the length at rest: a sensor may read a little below zero.
+STRAIN_RANGE = (-0.05, 0.5)
 
 
 def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
@@ -31,7 +41,39 @@ def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initi
         inputs[:, layout.INP_CONTRACTION] = state[layout.S_CONTRACTION]
     outputs = np.empty((len(inputs) + 1, layout.OUT_SIZE))
     kernel.rollout(state, par, inputs, outputs)
+    check_outputs(rig, outputs)
     return Response(outputs)
+
+
+def check_outputs(rig, outputs):
+    """
+    Refuse a rollout that left the numbers; flag one that left the table of its force law.
+
+    Raises
+    ------
+    InputError
+        A number is not finite or an absolute pressure not positive, with the step at which it
+        began.
+
+    """
+    pressure = outputs[:, layout.OUT_TRUE_PRESSURE]
+    if not math.isfinite(outputs.sum()) or pressure.min() <= 0.0:
+        row = int(np.argmax(~np.isfinite(outputs).all(axis=1) | ~(pressure > 0.0)))
+        raise InputError(
+            f'the simulation leaves what is physical at step {row}: these numbers cannot be '
+            'stepped so coarsely; use a smaller `dt_s`, or less extreme numbers',
+            f'rig {rig.name}')
+    law = rig.muscle.law.law
+    if not law.EXTRAPOLATES:
+        gauge = outputs[:, layout.OUT_TRUE_PRESSURE] - P_ATM_PA
+        beyond = law.outside(gauge, outputs[:, layout.OUT_TRUE_CONTRACTION] / rig.muscle.length_m)
+        if beyond.any():
+            low, high = law.validity.pressure_gauge_pa
+            warnings.warn(
+                f'{100.0 * beyond.mean():.3g} % of the simulation lies outside the table of law '
+                f'`{law.NAME}`, {low / 1e3:g} to {high / 1e3:g} kPa and up to '
+                f'{100.0 * law.validity.strain[1]:.3g} % contraction; its edge was used',
+                ExtrapolationWarning, stacklevel=4)
 
 
 def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
@@ -41,7 +83,8 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
     Raises
     ------
     InputError
-        Wrong shape, number not finite, or the contraction of a driven load missing.
+        Wrong shape, number not finite or out of range, or the contraction of a driven load
+        missing.
 
     """
     signal = np.asarray(valve_signal, dtype=float)
@@ -53,11 +96,15 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
         raise InputError(f'has shape {np.shape(valve_signal)}; valve `{rig.valve}` takes {shape}, '
                          'N at least 1', 'valve_signal')
     count = len(signal)
+    limits = ppr.SIGNAL_RANGE if rig.valve == 'ppr' else hsv.SIGNAL_RANGE
+    for column, name in enumerate(rig.signal_names):
+        _check_range(signal[:, column], *limits, name)
     inputs = np.zeros((count, layout.INP_SIZE))
     inputs[:, :wanted] = signal
     if external_force_n is not None:
-        inputs[:, layout.INP_EXTERNAL_FORCE] = _sized(external_force_n, (count,),
-                                                      'external_force_n')
+        force = _sized(external_force_n, (count,), 'external_force_n')
+        _check_range(force, -MAX_FORCE_N, MAX_FORCE_N, 'N', 'external_force_n')
+        inputs[:, layout.INP_EXTERNAL_FORCE] = force
     start = None
     if contraction_m is not None:
         if LOADS[rig.load].MOVES_FREELY:
@@ -65,14 +112,26 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
         path = _sized(contraction_m, (count, count + 1), 'contraction_m')
         if path.ndim == 0:
             path = np.full(count + 1, float(path))
+        low, high = (share * rig.muscle.length_m for share in STRAIN_RANGE)
+        _check_range(path, low, high, 'm', 'contraction_m')
         start = float(path[0])
         inputs[:len(path) - 1, layout.INP_CONTRACTION] = path[1:]
         inputs[len(path) - 1:, layout.INP_CONTRACTION] = path[-1]
     elif LOADS[rig.load].NEEDS_CONTRACTION:
         raise InputError('is missing; a driven load needs it', 'contraction_m')
-    if not np.isfinite(inputs).all() or (start is not None and not np.isfinite(start)):
-        raise InputError('a number is not finite', 'simulation inputs')
     return inputs, start
+
+
+def _check_range(values, lower, upper, unit, name):
+    """Refuse a number that is not finite or out of range, by name and place."""
+    values = np.atleast_1d(values)
+    slack = 1e-9 * (upper - lower)
+    # Of the smallest and largest: not a number fails both comparisons.
+    if values.min() >= lower - slack and values.max() <= upper + slack:
+        return
+    row = int(np.argmax(~((values >= lower - slack) & (values <= upper + slack))))
+    raise InputError(f'is {values[row]:g} at sample {row}; allowed {lower:g} to {upper:g} {unit}',
+                     name)
 
 
 def _sized(values, lengths, name):

@@ -32,7 +32,7 @@ import math
 from pam_sim.compiled import inlined
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
-from pam_sim.muscle.sarosi import tension_n
+from pam_sim.muscle.laws.sarosi import tension_n
 from pam_sim.rollout.hooks import (
     air_rt_active, apply_air_rt, apply_clock_shift, apply_command, apply_commit,
     apply_flow_opening, apply_load_force, apply_load_friction, apply_map_input,
@@ -43,9 +43,9 @@ from pam_sim.rollout.layout import (
     INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
     OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
     OUT_TRUE_CONTRACTION, OUT_TRUE_FORCE, OUT_TRUE_PRESSURE, OUT_VELOCITY, OUT_VENTED,
-    PAR_ATMOSPHERE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
+    PAR_ATMOSPHERE, PAR_BASE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
     PAR_DECAY_HALF, PAR_DT, PAR_FORCE_GAIN, PAR_FREE_LOAD, PAR_GAIN_PPR, PAR_INVERSE_4_PI_N2,
-    PAR_INVERSE_LENGTH, PAR_INVERSE_MASS, PAR_INVERSE_RT, PAR_LENGTH, PAR_MASS,
+    PAR_INVERSE_LENGTH, PAR_INVERSE_MASS, PAR_INVERSE_RT, PAR_LAW_DAMPER, PAR_LENGTH, PAR_MASS,
     PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP, PAR_SUBSTEPS, PAR_SUPPLY,
     PAR_THREAD_SQUARED, PAR_TIME_CONSTANT, PAR_VALVE, PAR_WEIGHT, S_AIR_MASS, S_CONTRACTION,
     S_DIRECTION, S_FILL_OFF, S_FILL_ON, S_FILLED, S_MUSCLE_FORCE, S_PERIOD, S_PRESSURE,
@@ -54,6 +54,19 @@ from pam_sim.rollout.layout import (
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
+
+
+@inlined
+def law_tension(gauge, strain, par):
+    """Return the value of the force law [N], negative where it would push."""
+    return tension_n(gauge, strain, par, PAR_BASE)
+
+
+@inlined
+def law_damper(v, gauge, strain, par):
+    """Return the force of the law's own damper [N]."""
+    return 0.0
+
 
 # --- kernel: everything below is copied into the generated module -------------------------
 
@@ -71,14 +84,20 @@ def map_tension(p, x, state, par):
     """Return the static tension [N] at pressure p [Pa] and contraction x [m]."""
     gauge, strain = apply_map_input(
         p - par[PAR_ATMOSPHERE], x * par[PAR_INVERSE_LENGTH], state, par)
-    return apply_map_output(par[PAR_FORCE_GAIN] * tension_n(gauge, strain), p, x, state, par)
+    tension = law_tension(gauge, strain, par)
+    if tension < 0.0:           # a muscle does not push
+        tension = 0.0
+    return apply_map_output(par[PAR_FORCE_GAIN] * tension, p, x, state, par)
 
 
 @inlined
 def muscle_force(tension, p, x, v, dx, elapsed, state, par):
     """Return the force the muscle transmits [N], its dry friction excepted."""
-    return apply_muscle_force(
-        tension - par[PAR_DAMPING] * v, p, x, v, dx, elapsed, state, par)
+    force = tension - par[PAR_DAMPING] * v
+    if par[PAR_LAW_DAMPER] != 0.0 and tension > 0.0:
+        force -= law_damper(
+            v, p - par[PAR_ATMOSPHERE], x * par[PAR_INVERSE_LENGTH], par)
+    return apply_muscle_force(force, p, x, v, dx, elapsed, state, par)
 
 
 @inlined

@@ -27,6 +27,7 @@ NAME = 'hsv'
 SIGNAL_NAMES = ('fill_duty', 'vent_duty')
 FIDELITIES = ('averaged', 'switching')
 SWITCHING_STEP_S = 1e-4
+SIGNAL_RANGE = (0.0, 1.0, '')         # a duty
 
 PARAMETERS = (
     Parameter('C', 'm3/(s Pa)', 2.0e-10, 1e-12, 1e-8, 0.02,

@@ -26,6 +26,8 @@ from pam_sim.parameters import Parameter
 NAME = 'ppr'
 SIGNAL_NAMES = ('ppr_voltage',)
 MAX_VOLTAGE_V = 6.0
+# Beyond 6 V the regulator saturates; beyond these a number is no voltage of such a valve.
+SIGNAL_RANGE = (-1.0, 12.0, 'V')
 
 PARAMETERS = (
     Parameter('K_m', 'Pa/V', 100e3, 10e3, 500e3, 0.02,

@@ -79,7 +79,8 @@ def test_effects_of_a_file_are_added_to_those_of_its_rig():
     ('rig: dmsp_5_300_hanging_mass\nvalve: xyz\n', 2, ['xyz', 'ppr, hsv']),
     ('rig: nothing_like_it\n', 1, ['nothing_like_it', 'dmsp_5_300_realistic']),
     ('valve: ppr\n', 1, ['`rig` is missing']),
-    ('rig: dmsp_5_300_hanging_mass\nparameters:\n  mass_kg: -1\n', 3, ['mass_kg', '0.1 to 50 kg']),
+    ('rig: dmsp_5_300_hanging_mass\nparameters:\n  mass_kg: -1\n', 3,
+     ['mass_kg', '0.1 to 500 kg']),
     ('rig: dmsp_5_300_hanging_mass\nparameters:\n  mass_kg: heavy\n', 3, ['mass_kg', 'heavy']),
     ('rig: dmsp_5_300_hanging_mass\nparameters:\n  mass_g: 5000\n', 3, ['mass_g', 'mass_kg']),
     ('rig: dmsp_5_300_hanging_mass\nparameters:\n  K_m: 100\n', 3, ['K_m', '500000 Pa/V']),
@@ -127,8 +128,6 @@ def test_mistakes_outside_files(tmp_path):
         rig.simulate(np.zeros((5, 2)))
     with pytest.raises(InputError, match='shape'):
         rig.simulate([])
-    with pytest.raises(InputError, match='not finite'):
-        rig.simulate([np.nan])
     with pytest.raises(InputError, match='driven'):
         load_rig('dmsp_5_300_driven').simulate([1.0])
     with pytest.raises(InputError, match='load_n'):

@@ -22,6 +22,7 @@ Caldwell et al. (1994). Force and volume belong to each other: F = -p dV/dL.
 import math
 
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
@@ -70,6 +71,13 @@ GEOMETRY = (
 )
 
 
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    """Return p S (a (1 - eps)^2 - b) [N], one point; S [m^2], a, b at ``par[k]``."""
+    ratio = 1.0 - strain
+    return gauge_pa * par[k] * (par[k + 1] * ratio * ratio - par[k + 2])
+
+
 def check_angle(values, where):
     """Raise InputError where the braid angle gives no contraction at all."""
     _, a, b = shape(values)
@@ -95,6 +103,10 @@ class ChouHannaford(MuscleLaw):
     def _tension_n(self, pressure, strain):
         area, a, b = shape(self.values)
         return pressure * area * (a * (1.0 - strain) ** 2 - b)
+
+    def pack(self):
+        """Return force per pressure [m^2], a and b."""
+        return shape(self.values)
 
     def volume_m3(self, pressure_gauge_pa, strain):
         """Return the inner volume [m^3]; the pressure does not change it. Arrays broadcast."""

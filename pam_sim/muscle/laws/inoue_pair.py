@@ -24,9 +24,10 @@ J phi'' + c phi' + k phi = g dp; without friction model, as in the paper.
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet
-from pam_sim.muscle.laws.chou_hannaford import GEOMETRY_SETS, shape
+from pam_sim.muscle.laws.chou_hannaford import GEOMETRY_SETS, shape, tension_n
 from pam_sim.parameters import Parameter
 
+__all__ = ['InouePair', 'tension_n']
 _SOURCE = 'Inoue 1988, Rubbertuators and applications for robots'
 
 
@@ -75,6 +76,10 @@ class InouePair(MuscleLaw):
         value = self.values
         return pressure * value['diameter_m'] ** 2 * (
             value['a'] * (1.0 - strain) ** 2 - value['b'])
+
+    def pack(self):
+        """Return D^2 [m^2], a and b of the single muscle; its formula is that of eq. 4.6."""
+        return self.values['diameter_m'] ** 2, self.values['a'], self.values['b']
 
     def torque_n_m(self, first_pa, second_pa, angle_rad, outside='warn'):
         """

@@ -26,14 +26,98 @@ from pathlib import Path
 import warnings
 
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
-from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 STRAIN_POINTS = 41
 SHIPPED = Path(__file__).parent.parent / 'lookup_tables'
 _SMALL = 1e-7           # contraction below this counts as rest
+_ROWS, _COLUMNS, _PER_STRAIN, _HEAD = range(4)
+
+
+@compiled
+def hermite(y0, y1, slope0, slope1, width, share):
+    """Return the cubic between two points at ``share`` of the way; slopes per unit of width."""
+    rest = 1.0 - share
+    return (rest * rest * ((1.0 + 2.0 * share) * y0 + share * width * slope0)
+            + share * share * ((1.0 + 2.0 * rest) * y1 - rest * width * slope1))
+
+
+@compiled
+def middle_slope(width0, width1, slope0, slope1):
+    """Return the monotone slope (Fritsch and Carlson 1980) between two intervals."""
+    if slope0 * slope1 <= 0.0:
+        return 0.0
+    weight0 = 2.0 * width1 + width0
+    weight1 = width1 + 2.0 * width0
+    return (weight0 + weight1) / (weight0 / slope0 + weight1 / slope1)
+
+
+@compiled
+def end_slope(width0, width1, slope0, slope1):
+    """Return the slope at the outer end of interval 0, three points, kept monotone."""
+    slope = ((2.0 * width0 + width1) * slope0 - width0 * slope1) / (width0 + width1)
+    if slope * slope0 <= 0.0:
+        return 0.0
+    if slope0 * slope1 <= 0.0 and abs(slope) > 3.0 * abs(slope0):
+        return 3.0 * slope0
+    return slope
+
+
+@compiled
+def row_force(row, column, share, width, par, k):
+    """Return F [N] of one tabulated pressure within a strain interval."""
+    columns = int(par[k + _COLUMNS])
+    rows = int(par[k + _ROWS])
+    force = k + _HEAD + rows + row * columns + column
+    slope = force + rows * columns
+    return hermite(par[force], par[force + 1], par[slope], par[slope + 1], width, share)
+
+
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    """
+    Return F(eps, P) [N], one point; PCHIP along contraction, then along pressure.
+
+    Beyond the table its edge is used. ``par[k]``: numbers of pressures and of
+    contractions, contractions per unit, pressures, forces, their slopes.
+    """
+    rows = int(par[k + _ROWS])
+    columns = int(par[k + _COLUMNS])
+    place = min(max(strain * par[k + _PER_STRAIN], 0.0), columns - 1.0)
+    column = min(int(place), columns - 2)
+    share = place - column
+    width = 1.0 / par[k + _PER_STRAIN]
+    axis = k + _HEAD
+    pressure = min(max(gauge_pa, par[axis]), par[axis + rows - 1])
+    row = 0
+    while row < rows - 2 and par[axis + row + 1] < pressure:
+        row += 1
+    y0 = row_force(row, column, share, width, par, k)
+    y1 = row_force(row + 1, column, share, width, par, k)
+    h = par[axis + row + 1] - par[axis + row]
+    slope = (y1 - y0) / h
+    slope0 = 0.0
+    slope1 = 0.0
+    before = 0.0
+    after = 0.0
+    h_before = h
+    h_after = h
+    if row > 0:
+        h_before = par[axis + row] - par[axis + row - 1]
+        before = (y0 - row_force(row - 1, column, share, width, par, k)) / h_before
+        slope0 = middle_slope(h_before, h, before, slope)
+    if row < rows - 2:
+        h_after = par[axis + row + 2] - par[axis + row + 1]
+        after = (row_force(row + 2, column, share, width, par, k) - y1) / h_after
+        slope1 = middle_slope(h, h_after, slope, after)
+    if row == 0:
+        slope0 = end_slope(h, h_after, slope, after)
+    if row == rows - 2:
+        slope1 = end_slope(h, h_before, slope, before)
+    return hermite(y0, y1, slope0, slope1, h, (pressure - par[axis + row]) / h)
 
 
 def _isobar(strain, load):
@@ -83,12 +167,15 @@ class Lookup(MuscleLaw):
             'DMSP-10-250; no DMSP-5 was measured', Validity((0.0, 600e3), (0.0, 0.2))),
         'table': ParameterSet({}, 'the table given; its source line says what it is')}
     CLAIMS = (1, 2, 3, 4)
+    EXTRAPOLATES = False
 
     def __init__(self, table=None, muscle=None, where=''):
         table = None if table == {} else table
         if muscle is None:
             muscle = 'dmsp_5_300' if table is None else 'table'
         super().__init__(None, muscle, where)
+        # Imported when a table is used: it takes longer than all other laws together.
+        from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
         if isinstance(table, dict) or (table is None) == (muscle == 'table'):
             raise InputError('law `lookup` takes no parameters but a table: a LookupTable or '
                              'the path of a CSV file, and no other set with it', where)
@@ -110,12 +197,19 @@ class Lookup(MuscleLaw):
         columns = [PchipInterpolator(share[:, j], pressure)(fraction) for j in range(load.size)]
         self._pressure = RegularGridInterpolator((fraction, load), np.transpose(columns), 'pchip')
         strain = np.linspace(0.0, limit, STRAIN_POINTS)
-        self._force = RegularGridInterpolator(
-            (pressure, strain), np.array([self._pulls(row, strain) for row in self.table.strain]),
-            'pchip')
+        force = np.array([self._pulls(row, strain) for row in self.table.strain])
+        slope = np.array([PchipInterpolator(strain, row).derivative()(strain) for row in force])
+        self._packed = (*force.shape, (STRAIN_POINTS - 1) / limit, *pressure, *force.ravel(),
+                        *slope.ravel())
+        self._force = RegularGridInterpolator((pressure, strain), force, 'pchip')
+
+    def pack(self):
+        """Return sizes, pressures, forces and their slopes along contraction."""
+        return self._packed
 
     def _pulls(self, strain_of_load, strain):
         """Return the force [N] of one tabulated pressure on a grid of contractions."""
+        from scipy.interpolate import PchipInterpolator
         eps, pull = _isobar(strain_of_load, self.table.load_n)
         eps, first = np.unique(eps, return_index=True)
         if eps.size < 2:

@@ -22,6 +22,7 @@ in gauge pressure; the spring's slope may change once, and it may stiffen with x
 """
 
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
@@ -34,6 +35,23 @@ _KPA = 1e-3          # per Pa; the published numbers are per kPa and per mm
 
 def _number(name, unit, nominal, lower, upper, text):
     return Parameter(name, unit, nominal, lower, upper, 0.05, text, _SOURCE)
+
+
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    """Return F_ce - K x [N], one point; values in the order of PARAMETERS at ``par[k]``."""
+    x = strain * par[k]
+    bend = par[k + 6]
+    spring = (par[k + 3] + par[k + 4] * min(gauge_pa, bend)
+              + par[k + 5] * max(gauge_pa - bend, 0.0) + par[k + 7] * x)
+    return par[k + 1] + par[k + 2] * gauge_pa - spring * x
+
+
+@compiled
+def damper_force_n(velocity_m_per_s, gauge_pa, strain, par, k):
+    """Return B v [N], one point; never pushes the way the muscle moves."""
+    place = k + 8 if velocity_m_per_s >= 0.0 else k + 10
+    return max(0.0, par[place] + par[place + 1] * gauge_pa) * velocity_m_per_s
 
 
 class Repperger(MuscleLaw):

@@ -13,18 +13,30 @@
 # limitations under the License.
 
 """
-Six coefficients in pressure and contraction, after Sarosi.
+Six coefficients in pressure and contraction, after Sarosi: the force map of the nominal rig.
 
 J. Sarosi (2012), "New approximation algorithm for the force of fluidic
-muscles", IEEE SACI. The chapter does not have it; the rig's force map does.
+muscles", IEEE SACI. The chapter does not have it. No published DMSP-5 force data exist: the
+coefficients of that size follow the measured map of a DMSP-10-250 scaled to the
+data sheet.
 """
 
+import math
+
 import numpy as np
+from pam_sim.compiled import inlined
 from pam_sim.errors import InputError
-from pam_sim.muscle import sarosi as kernel
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
 
+# Of the DMSP-5-300: P gauge kPa, E contraction %, F newton.
+_DMSP_5 = (-0.00680486, 46.3339, -0.42779, -0.00817055, 0.256907, -56.3953)
+# Fits to the measured maps of Martens and Boblan 2017 (pam_sim/muscle/fit.py), SI.
+_DMSP_10_MAP = (-2.421150e-05, 164.85488, -42.779040, -2.9070609e-03, 9.1406841e-04, -200.65288)
+_DMSP_20_MAP = (1.2213924e-04, 421.05634, -56.729761, -8.7174119e-03, 2.6795981e-03, -310.14613)
+_AT_REST_20_N = 1791.9526      # of that fit at 600 kPa
+_MAP = ('fit to the measured map of a {}, Martens and Boblan 2017, doi 10.3390/act6040033, '
+        'within {} % of the largest force (RMSE, in sample)')
 _NAMES = ('a1_n_per_pa', 'a2_n', 'a3', 'a4_n_per_pa', 'a5_n_per_pa', 'a6_n')
 _SOURCE = 'Sarosi 2012, New approximation algorithm for the force of fluidic muscles'
 _PUBLISHED = 'published fit as quoted in a public model comparison; original paper not seen'
@@ -37,6 +49,19 @@ def _si(coefficients, pressure_unit_pa):
                              100.0 * a4 / pressure_unit_pa, a5 / pressure_unit_pa, a6)))
 
 
+def _scaled(coefficients, factor):
+    """Return the SI values of a map with every force multiplied."""
+    return {name: value if name == 'a3' else factor * value
+            for name, value in zip(_NAMES, coefficients)}
+
+
+@inlined
+def tension_n(gauge_pa, strain, par, k):
+    """Return the formula's value [N], one point; coefficients at ``par[k]``."""
+    return ((par[k] * gauge_pa + par[k + 1]) * math.exp(par[k + 2] * strain)
+            + (par[k + 3] * strain + par[k + 4]) * gauge_pa + par[k + 5])
+
+
 class Sarosi(MuscleLaw):
     """F = (a1 p + a2) exp(a3 eps) + a4 eps p + a5 p + a6; p gauge, SI."""
 
@@ -47,18 +72,18 @@ class Sarosi(MuscleLaw):
     PARAMETERS = tuple(
         Parameter(name, unit, nominal, lower, upper, 0.02, text, _SOURCE)
         for name, unit, nominal, lower, upper, text in (
-            ('a1_n_per_pa', 'N/Pa', kernel.A1 / 1e3, -0.01, 0.01,
+            ('a1_n_per_pa', 'N/Pa', _DMSP_5[0] / 1e3, -0.01, 0.01,
              'Pressure part of the decaying term.'),
-            ('a2_n', 'N', kernel.A2, 0.0, 5000.0, 'Force of the decaying term.'),
-            ('a3', '-', 100.0 * kernel.A3, -500.0, -1.0, 'Decay with contraction.'),
-            ('a4_n_per_pa', 'N/Pa', kernel.A4 / 10.0, -1.0, 0.0,
+            ('a2_n', 'N', _DMSP_5[1], 0.0, 5000.0, 'Force of the decaying term.'),
+            ('a3', '-', 100.0 * _DMSP_5[2], -500.0, -1.0, 'Decay with contraction.'),
+            ('a4_n_per_pa', 'N/Pa', _DMSP_5[3] / 10.0, -1.0, 0.0,
              'Loss of pressure gain with contraction.'),
-            ('a5_n_per_pa', 'N/Pa', kernel.A5 / 1e3, 1e-6, 0.1, 'Pressure gain at rest.'),
-            ('a6_n', 'N', kernel.A6, -5000.0, 1000.0, 'Offset.'),
+            ('a5_n_per_pa', 'N/Pa', _DMSP_5[4] / 1e3, 1e-6, 0.1, 'Pressure gain at rest.'),
+            ('a6_n', 'N', _DMSP_5[5], -5000.0, 1000.0, 'Offset.'),
         ))
     SETS = {
         'dmsp_5': ParameterSet(
-            _si((kernel.A1, kernel.A2, kernel.A3, kernel.A4, kernel.A5, kernel.A6), 1e3),
+            _si(_DMSP_5, 1e3),
             'the force map of the rig: measured map of a DMSP-10-250 fitted and scaled to 140 N '
             'at 600 kPa; no DMSP-5 force data exist, good to 15 %',
             Validity((50e3, 600e3), (0.0, 0.25))),
@@ -72,6 +97,17 @@ class Sarosi(MuscleLaw):
             _si((-4.35573, 281.2237, -0.32866, -9.27035, 302.20107, -263.69185), 1e5),
             _PUBLISHED + '; named for 400 N', Validity((0.0, 600e3), (0.0, 0.28))),
     }
+    SETS['dmsp_10_250_map'] = ParameterSet(
+        dict(zip(_NAMES, _DMSP_10_MAP)), _MAP.format('DMSP-10-250', 0.25),
+        Validity((50e3, 650e3), (0.0, 0.208)))
+    SETS['dmsp_20_300_map'] = ParameterSet(
+        dict(zip(_NAMES, _DMSP_20_MAP)), _MAP.format('DMSP-20-300', 0.38),
+        Validity((35e3, 675e3), (0.0133, 0.26)))
+    SETS['dmsp_40'] = ParameterSet(
+        _scaled(_DMSP_20_MAP, 6000.0 / _AT_REST_20_N),
+        'the fitted DMSP-20-300 map scaled to the data sheet, 6000 N at 600 kPa at rest; no '
+        'DMSP-40 force data at hand, the shape is that of the smaller muscle',
+        Validity((35e3, 600e3), (0.0, 0.25)))
     CLAIMS = (2, 3, 4)
 
     def _check(self, where):
@@ -94,11 +130,24 @@ class Sarosi(MuscleLaw):
                 + (a4 * strain + a5) * pressure + a6)
 
     def pressure_gauge_pa(self, force_n, strain):
-        """Return the gauge pressure [Pa] that gives a force; the law is linear in pressure."""
+        """
+        Return the gauge pressure [Pa] that gives a force; arrays broadcast.
+
+        Exact, since the law is linear in pressure; negative where the muscle
+        would have to be sucked.
+        """
         a1, a2, a3, a4, a5, a6 = self.values.values()
         strain = np.asarray(strain, dtype=float)
         decay = np.exp(a3 * strain)
         return (np.asarray(force_n, float) - a2 * decay - a6) / (a1 * decay + a4 * strain + a5)
+
+    def holding_pressure_pa(self, force_n, strain, upper_pa=2e6):
+        """Return the gauge pressure [Pa] that holds a tension, 0 or more; see MuscleLaw."""
+        pressure = self.pressure_gauge_pa(force_n, strain)
+        a1, _, a3, a4, a5, _ = self.values.values()
+        gain = a1 * np.exp(a3 * np.asarray(strain, float)) + a4 * np.asarray(strain, float) + a5
+        held = (gain > 0.0) & (pressure <= upper_pa)
+        return np.where(held, np.maximum(pressure, 0.0), np.inf)[()]
 
 
 LAW = Sarosi

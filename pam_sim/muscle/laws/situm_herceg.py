@@ -20,6 +20,7 @@ order lag; gain and time constant are the rig's own regulator.
 """
 
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
@@ -32,6 +33,12 @@ def _chosen(length_m, force_n, pressure_pa, shortest):
         f'constant chosen for {force_n:g} N at {pressure_pa / 1e3:g} kPa at rest (data sheet) '
         f'and no force at {100 * (1 - shortest):g} % contraction; numbers of the paper not seen',
         Validity((0.0, pressure_pa), (0.0, 1.0 - shortest)))
+
+
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    """Return the formula's value [N], one point; lengths [m] and Kp at ``par[k]``."""
+    return par[k + 2] * gauge_pa * (par[k] * (1.0 - strain) - par[k + 1])
 
 
 class SitumHerceg(MuscleLaw):

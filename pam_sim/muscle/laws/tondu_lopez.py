@@ -25,11 +25,20 @@ Lopez use k >= 1, which is what shortens the stroke. Both fit the bounds.
 import math
 
 import numpy as np
+from pam_sim.compiled import compiled
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.muscle.laws.chou_hannaford import check_angle, GEOMETRY, GEOMETRY_SETS, shape
 from pam_sim.parameters import Parameter
 
 _CONSTANT = {'k0': 1.25, 'k_rise': 0.0, 'k_pressure_pa': 235e3}
+
+
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    """Return the formula's value [N], one point; S, a, b, k0, k_rise, 1 / k_pressure at k."""
+    factor = par[k + 3] + par[k + 4] * math.exp(-gauge_pa * par[k + 5])
+    left = max(0.0, 1.0 - factor * strain)
+    return gauge_pa * par[k] * (par[k + 1] * left * left - par[k + 2])
 
 
 class TonduLopez(MuscleLaw):
@@ -74,6 +83,11 @@ class TonduLopez(MuscleLaw):
         # Beyond k eps = 1 the square would rise again; there the muscle has long stopped pulling.
         left = np.maximum(0.0, 1.0 - self.k(pressure) * strain)
         return pressure * area * (a * left ** 2 - b)
+
+    def pack(self):
+        """Return force per pressure [m^2], a, b, k0, k_rise and 1 / k_pressure [1/Pa]."""
+        value = self.values
+        return (*shape(value), value['k0'], value['k_rise'], 1.0 / value['k_pressure_pa'])
 
     def volume_m3(self, pressure_gauge_pa, strain):
         """

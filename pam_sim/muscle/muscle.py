@@ -1,0 +1,273 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A muscle: dimensions, force law and where its numbers come from.
+
+Muscles by name are YAML files in ``pam_sim/muscle/sizes``; a model file may name one or
+state its own, from one of them or anew.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+import math
+from pathlib import Path
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import load_yaml, Located
+from pam_sim.muscle import geometry
+from pam_sim.muscle.lookup_table import LookupTable, read_table
+from pam_sim.muscle.registry import make_law
+from pam_sim.parameters import Parameter
+
+_FOLDER = Path(__file__).parent / 'sizes'
+DIMENSIONS = (
+    Parameter('length_m', 'm', 0.300, 0.02, 9.0, 0.0, 'Length at rest, L0.', 'chapter'),
+    Parameter('bore_m', 'm', 0.005, 0.001, 0.1, 0.0, 'Inner diameter at rest.', 'chapter'),
+    Parameter('braid_angle_rad', 'rad', math.radians(28.6), 0.1, 0.9, 0.0,
+              'Angle between thread and axis at rest.', 'Martens and Boblan 2017'),
+    Parameter('max_strain', '-', 0.25, 0.05, 0.5, 0.0,
+              'Mechanical end of contraction.', 'chapter, 25 %'),
+)
+# Numbers of the muscle a model file may change under `parameters`.
+MUSCLE_PARAMETERS = (
+    Parameter('force_map_gain', '-', 1.0, 0.2, 5.0, 0.02,
+              'Factor on the force law.', 'scaled map of a measured DMSP-10-250'),
+    Parameter('damping_n_s_per_m', 'N s/m', 25.0, 0.0, 1e4, 0.02,
+              'Viscous damping of the muscle.', 'design value'),
+)
+_KEYS = ('like', 'rests_on', 'law', *(parameter.name for parameter in DIMENSIONS))
+_LAW_KEYS = ('name', 'set', 'parameters', 'table')
+_TABLE_KEYS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg', 'source')
+
+
+@dataclass(frozen=True)
+class LawChoice:
+    """
+    Which force law a muscle has, with which numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of the registry.
+    set : str, optional
+        Named numbers of the law; its first ones by default.
+    parameters : dict
+        Values that differ from the set.
+    table : LookupTable, optional
+        For law ``lookup``: its own points instead of a set.
+
+    """
+
+    name: str = 'sarosi'
+    set: str = None
+    parameters: dict = field(default_factory=dict)
+    table: LookupTable = None
+
+    @cached_property
+    def law(self):
+        """The law itself; made once."""
+        if self.table is not None:
+            return make_law(self.name, self.table)
+        return make_law(self.name, self.parameters or None, self.set)
+
+    def plain(self):
+        """Return the choice as plain data for a model file."""
+        data = {'name': self.name}
+        if self.table is not None:
+            data['table'] = {key: getattr(self.table, key) if key == 'source'
+                             else getattr(self.table, key).tolist() for key in _TABLE_KEYS}
+            return data
+        data['set'] = self.law.muscle
+        if self.parameters:
+            data['parameters'] = dict(self.parameters)
+        return data
+
+
+@dataclass(frozen=True)
+class Muscle:
+    """
+    A muscle as the rig needs it.
+
+    Parameters
+    ----------
+    name : str
+    length_m, bore_m, braid_angle_rad, max_strain : float
+        See :data:`DIMENSIONS`.
+    law : LawChoice
+    rests_on : str
+        Where the numbers come from and how far to trust them.
+
+    """
+
+    name: str
+    length_m: float = geometry.LENGTH_M
+    bore_m: float = geometry.BORE_M
+    braid_angle_rad: float = geometry.BRAID_ANGLE_RAD
+    max_strain: float = geometry.MAX_STRAIN
+    law: LawChoice = field(default_factory=lambda: LawChoice(set='dmsp_5'))
+    rests_on: str = ''
+
+    @property
+    def stroke_m(self):
+        """Largest contraction, m."""
+        return self.max_strain * self.length_m
+
+    @cached_property
+    def shape(self):
+        """Arguments of :func:`pam_sim.muscle.geometry.volume_of` after the contraction."""
+        thread, turns = geometry.braid(self.length_m, self.bore_m, self.braid_angle_rad)
+        return self.length_m, thread * thread, 1.0 / (4.0 * math.pi * turns * turns)
+
+    @cached_property
+    def stiffness_n_per_m(self):
+        """Largest fall of the tension with contraction up to 600 kPa, N/m: how short to step."""
+        strain = np.linspace(0.0, self.max_strain, 51)
+        force = self.law.law.force_n(np.array([[200e3], [400e3], [600e3]]), strain, 'allow')
+        return float(np.max(-np.diff(force)) / (strain[1] * self.length_m))
+
+    def volume_m3(self, contraction_m):
+        """Return the inner volume [m^3] at a contraction [m]; scalar or array."""
+        return geometry.volume_of(contraction_m, *self.shape)
+
+    def with_law(self, law):
+        """Return the muscle with another law, a LawChoice or a name."""
+        return replace(self, law=checked_law(LawChoice(law) if isinstance(law, str) else law))
+
+    def plain(self):
+        """Return the muscle as plain data for a model file: its name if that says all."""
+        if self.name in muscle_names() and self == get_muscle(self.name):
+            return self.name
+        data = {parameter.name: getattr(self, parameter.name) for parameter in DIMENSIONS}
+        if self.rests_on:
+            data['rests_on'] = self.rests_on
+        data['law'] = self.law.plain()
+        return data
+
+
+def muscle_names():
+    """Return the names of the muscles there are, sorted."""
+    return sorted(path.stem for path in _FOLDER.glob('*.yaml'))
+
+
+@lru_cache(maxsize=None)
+def get_muscle(name):
+    """
+    Return a muscle by name.
+
+    Raises
+    ------
+    InputError
+        Unknown name; the message lists the names there are.
+
+    """
+    if name not in muscle_names():
+        raise InputError(f'muscle `{name}` is not known; allowed: {", ".join(muscle_names())}')
+    return read_muscle(load_yaml(_FOLDER / f'{name}.yaml'), name)
+
+
+def read_muscle(data, name='muscle'):
+    """
+    Return the muscle a mapping describes.
+
+    Parameters
+    ----------
+    data : Located
+        Dimensions, ``law``, ``rests_on``; with ``like`` only what differs from that muscle.
+    name : str
+        What to call it.
+
+    Raises
+    ------
+    InputError
+        Unknown key or law, or a number out of bounds, with file and line.
+
+    """
+    data.check_keys(_KEYS)
+    base = Muscle(name)
+    if 'like' in data:
+        base = get_muscle(data.require('like', str, choices=muscle_names()))
+    elif 'bore_m' not in data or 'length_m' not in data or 'law' not in data:
+        raise data.error('a muscle states `length_m`, `bore_m` and `law`, or the muscle it is '
+                         f'`like`: {", ".join(muscle_names())}')
+    numbers = {one.name: data.require(one.name, float, one.lower, one.upper, unit=one.unit)
+               for one in DIMENSIONS if one.name in data}
+    rests_on = data.get('rests_on', str, base.rests_on if not numbers else 'stated by the model')
+    law = read_law(data, base.law) if 'law' in data else base.law
+    return replace(base, name=name, **numbers, law=law, rests_on=' '.join(rests_on.split()))
+
+
+def read_law(data, base=None):
+    """
+    Return the LawChoice under the key ``law`` of a mapping: a name, or a mapping.
+
+    Parameters
+    ----------
+    data : Located
+        Has the key ``law``: a name, or ``name``, ``set``, ``parameters``, ``table``.
+    base : LawChoice, optional
+        Used where only its numbers change.
+
+    Raises
+    ------
+    InputError
+        Unknown law, set, parameter or table, with file and line.
+
+    """
+    stated, where = data['law'], data.where('law')
+    given = table = None
+    if isinstance(stated, Located):
+        stated.check_keys(_LAW_KEYS)
+        name = stated.get('name', str, None if base is None else base.name)
+        chosen = stated.get('set', str, base.set if base and name == base.name else None)
+        given = stated.get('parameters', dict)
+        table = _read_law_table(stated) if 'table' in stated else None
+    else:
+        name, chosen = data.require('law', str), None
+    return checked_law(LawChoice(name, chosen, given, table), where)
+
+
+def checked_law(choice, where=''):
+    """
+    Return a LawChoice with its set and plain parameters, once the law could be made.
+
+    Raises
+    ------
+    InputError
+        Unknown law, set or parameter, or a law without a compiled formula.
+
+    """
+    if choice.table is not None:
+        law = make_law(choice.name, choice.table, where=where)
+    else:
+        law = make_law(choice.name, choice.parameters or None, choice.set, where)
+    if type(law).COMPILED is None:
+        raise InputError(f'law `{choice.name}` has no compiled `tension_n` in its file, so a rig '
+                         'cannot use it', where)
+    return LawChoice(choice.name, law.muscle, dict(choice.parameters or {}), choice.table)
+
+
+def _read_law_table(stated):
+    given = stated['table']
+    if isinstance(given, str):
+        path = Path(given)
+        here = Path(stated.name).parent
+        return read_table(path if path.is_absolute() or path.exists() else here / path)
+    if not isinstance(given, Located):
+        raise stated.error('`table` is the path of a CSV file or a mapping of '
+                           + ', '.join(_TABLE_KEYS), 'table')
+    given.check_keys(_TABLE_KEYS)
+    return LookupTable(*(given.require(key, list) for key in _TABLE_KEYS[:4]),
+                       given.get('source', str, ''))

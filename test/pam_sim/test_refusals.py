@@ -1,0 +1,133 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a rollout refuses, by name and range, and that it never gives back what is no number."""
+
+from hypothesis import given, HealthCheck, settings, strategies as st
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.effects.registry import effects
+from pam_sim.errors import InputError
+from pam_sim.rollout import layout
+from pam_sim.rollout.simulate import check_outputs
+import pytest
+
+RIG = 'dmsp_5_300_hanging_mass'
+
+
+@pytest.mark.parametrize('valve, signal, words', [
+    ('ppr', [1.0, np.nan], 'ppr_voltage: is nan at sample 1; allowed -1 to 12 V'),
+    ('ppr', [1.0, 2.0, 400.0], 'ppr_voltage: is 400 at sample 2; allowed -1 to 12 V'),
+    ('ppr', [-np.inf], 'ppr_voltage: is -inf at sample 0'),
+    ('hsv', [[0.0, 0.0], [0.5, 1.01]], 'vent_duty: is 1.01 at sample 1; allowed 0 to 1'),
+    ('hsv', [[-0.2, 0.0]], 'fill_duty: is -0.2 at sample 0; allowed 0 to 1'),
+    ('hsv', [[np.nan, 0.0]], 'fill_duty: is nan'),
+])
+def test_signals_out_of_range_are_refused_by_name_and_range(valve, signal, words):
+    with pytest.raises(InputError) as caught:
+        load_rig(RIG, valve=valve).simulate(signal)
+    assert str(caught.value).startswith(words)
+
+
+def test_a_saturated_voltage_is_no_mistake():
+    rig = load_rig(RIG)
+    assert np.array_equal(rig.simulate(np.full(50, 8.0)).outputs,
+                          rig.simulate(np.full(50, 6.0)).outputs)
+
+
+@pytest.mark.parametrize('given_inputs, words', [
+    ({'external_force_n': [1.0, np.nan]}, 'external_force_n: is nan at sample 1'),
+    ({'external_force_n': 1e7}, 'external_force_n: is 1e+07 at sample 0; allowed -100000'),
+    ({'initial_pressure_pa': np.nan}, 'initial_pressure_pa` is nan; allowed'),
+    ({'initial_pressure_pa': 400.0}, 'initial_pressure_pa` is 400; allowed 50662.5 to 2e'),
+    ({'initial_contraction_m': 0.2}, 'initial_contraction_m` is 0.2; allowed 0 to 0.075 m'),
+    ({'initial_contraction_m': np.nan}, 'initial_contraction_m` is nan'),
+    ({'initial_signal': np.nan}, 'initial_signal` is nan; allowed -1 to 12 V'),
+    ({'dt_s': np.nan}, 'dt_s` is nan; allowed 1e-06 to 0.02 s'),
+    ({'dt_s': 0.0}, 'dt_s` is 0; allowed'),
+])
+def test_other_inputs_are_refused_by_name_and_range(given_inputs, words):
+    with pytest.raises(InputError) as caught:
+        load_rig(RIG).simulate([1.0, 2.0], **given_inputs)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize('path', [[0.0, np.nan, 0.0], [0.0, 0.01, 0.4], [-0.1, 0.0, 0.0]])
+def test_a_driven_contraction_must_be_one_of_the_muscle(path):
+    with pytest.raises(InputError, match='contraction_m: is .* allowed -0.015 to 0.15 m'):
+        load_rig('dmsp_5_300_driven').simulate([1.0, 1.0], contraction_m=path)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_every_parameter_of_rig_and_effects_refuses_what_is_not_physical(valve):
+    rig = load_rig(RIG, valve=valve)
+    for parameter in rig.parameter_list:
+        step = 1e-3 * (parameter.upper - parameter.lower)
+        for value in (np.nan, np.inf, parameter.lower - step, parameter.upper + step, 'much'):
+            with pytest.raises(InputError, match=f'`{parameter.name}`.* allowed'):
+                rig.with_(parameters={parameter.name: value})
+    for name, effect in effects().items():
+        for parameter in effect.parameters:
+            step = 1e-3 * (parameter.upper - parameter.lower)
+            for value in (np.nan, parameter.lower - step, parameter.upper + step):
+                with pytest.raises(InputError, match=f'`{parameter.name}`.* allowed'):
+                    rig.with_(effects=[{'name': name, 'parameters': {parameter.name: value}}])
+
+
+@pytest.mark.parametrize('column, value', [
+    (layout.OUT_CONTRACTION, np.nan), (layout.OUT_FORCE, np.inf),
+    (layout.OUT_TRUE_PRESSURE, -5.0), (layout.OUT_TRUE_PRESSURE, np.nan)])
+def test_a_result_that_is_no_physics_is_not_handed_over(column, value):
+    rig = load_rig(RIG)
+    outputs = rig.simulate(np.full(20, 3.0)).outputs
+    check_outputs(rig, outputs)
+    outputs[7, column] = value
+    with pytest.raises(InputError, match='leaves what is physical at step 7'):
+        check_outputs(rig, outputs)
+
+
+def test_the_live_plant_stops_as_well():
+    plant = load_rig(RIG).plant()
+    plant.step(3.0)
+    plant.state[layout.S_PRESSURE] = np.nan
+    with pytest.raises(InputError, match='not finite'):
+        plant.step(3.0)
+
+
+@given(data=st.data())
+@settings(max_examples=60, deadline=None, derandomize=True,
+          suppress_health_check=[HealthCheck.too_slow])
+def test_extreme_numbers_give_finite_results_or_a_sentence(data):
+    valve, fidelity = data.draw(st.sampled_from(
+        [('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching')]))
+    rig = load_rig(RIG, valve=valve, fidelity=fidelity)
+    share = st.sampled_from([0.0, 1e-3, 0.5, 1.0])
+
+    def extreme(parameters):
+        return {p.name: p.lower + data.draw(share) * (p.upper - p.lower) for p in parameters}
+
+    chosen = data.draw(st.sets(st.sampled_from(sorted(effects())), max_size=6))
+    some = data.draw(st.sets(st.sampled_from([p.name for p in rig.parameter_list]), max_size=5))
+    rig = rig.with_(
+        parameters=extreme(p for p in rig.parameter_list if p.name in some),
+        effects=[{'name': name, 'parameters': extreme(effects()[name].parameters)}
+                 for name in sorted(chosen)])
+    random = np.random.default_rng(data.draw(st.integers(0, 99)))
+    signal = random.uniform(0.0, 6.0, 60) if valve == 'ppr' else random.uniform(size=(60, 2))
+    try:
+        response = rig.simulate(signal, dt_s=data.draw(st.sampled_from([1e-3, 2e-2])))
+    except InputError as refused:
+        assert 'physical' in str(refused)
+    else:
+        assert np.isfinite(response.outputs).all()

@@ -1,0 +1,202 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every muscle law and size in a rig: the compiled formula, statics, model files, refusals."""
+
+from both_ways import compiled_and_not
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.muscle.law import ExtrapolationWarning
+from pam_sim.muscle.lookup_table import table_from_law
+from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names
+from pam_sim.muscle.registry import get_law, laws, make_law
+from pam_sim.units import P_ATM_PA
+import pytest
+
+CHOICES = [(name, chosen) for name, law in laws().items() if name != 'lookup'
+           for chosen in law.SETS]
+RIG = 'dmsp_5_300_hanging_mass'
+
+
+def table_of(law='sarosi', loads=16):
+    """Return a table computed from a law on the axes of the chapter's experiment."""
+    muscle = get_muscle('dmsp_5_300')
+    return table_from_law(
+        make_law(law), lambda strain: muscle.volume_m3(strain * muscle.length_m),
+        np.array([0.0, 40e3, 110e3, 180e3, 240e3, 300e3, 360e3, 410e3, 470e3, 540e3, 600e3]),
+        np.linspace(0.0, 150.0, loads))
+
+
+@pytest.mark.parametrize('name, chosen', CHOICES + [('lookup', None)])
+def test_the_compiled_formula_is_that_of_the_law(name, chosen):
+    law = make_law('lookup', table_of()) if name == 'lookup' else make_law(name, muscle=chosen)
+    pressure = np.linspace(*law.validity.pressure_gauge_pa, 23)
+    strain = np.linspace(*law.validity.strain, 29)
+    packed = np.array([-7.0, *law.pack()])
+    one = type(law).COMPILED
+    compiled = [[one(p, e, packed, 1) for e in strain] for p in pressure]
+    wanted = law.formula_n(pressure[:, None], strain)
+    assert np.allclose(compiled, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize('name, chosen', CHOICES)
+def test_a_rig_with_any_law_rests_where_the_law_says(name, chosen):
+    rig = load_rig(RIG).with_(law=LawChoice(name, chosen))
+    pressure = P_ATM_PA + 350e3
+    x = rig.static_contraction_m(pressure)
+    response = rig.simulate(np.full(1500, 3.5), initial_pressure_pa=pressure)
+    assert response.contraction_m[0] == pytest.approx(x, abs=1e-9)
+    assert response.contraction_m[-1] == pytest.approx(x, abs=1e-8)
+    if 0.0 < x < rig.muscle.stroke_m:
+        assert response.force_n[-1] == pytest.approx(5.0 * 9.80665, rel=1e-6)
+        assert rig.static_pressure_pa(x) == pytest.approx(pressure, rel=1e-6)
+    assert load_rig(rig.to_yaml()) == rig
+
+
+def test_the_damper_of_a_law_slows_the_rig():
+    plain = load_rig(RIG).with_(law='repperger')
+    free = plain.with_(law=LawChoice('repperger', 'reynolds_2003', {
+        key: 0.0 for key in ('b0_n_s_per_m', 'b1_n_s_per_m_pa', 'c0_n_s_per_m',
+                             'c1_n_s_per_m_pa')}))
+    signal = np.full(400, 4.0)
+    assert np.abs(plain.simulate(signal).velocity_m_per_s).max() \
+        < 0.8 * np.abs(free.simulate(signal).velocity_m_per_s).max()
+
+
+def test_a_lookup_rig_follows_the_law_its_table_was_computed_from():
+    rig = load_rig(RIG)
+    table = rig.with_(law=LawChoice('lookup', table=table_of()))
+    time = np.arange(4000) * 1e-3
+    signal = 3.5 + 1.5 * np.sin(2 * np.pi * 0.5 * time)
+    start = {'initial_pressure_pa': P_ATM_PA + 350e3}
+    apart = rig.simulate(signal, **start).contraction_m - table.simulate(
+        signal, **start).contraction_m
+    assert np.sqrt(np.mean(apart ** 2)) < 0.002 * 0.3
+    assert load_rig(table.to_yaml()) == table       # the table travels with the model
+
+
+def test_leaving_the_table_is_flagged():
+    rig = load_rig(RIG).with_(law=LawChoice('lookup', table=table_of()))
+    stretched = rig.with_(parameters={'K_m': 120e3})
+    with pytest.warns(ExtrapolationWarning, match='outside the table of law `lookup`, 0 to 600'):
+        stretched.simulate(np.full(600, 6.0))
+
+
+@pytest.mark.parametrize('name', muscle_names())
+def test_every_size_says_what_it_rests_on_and_lifts_its_mass(name):
+    muscle = get_muscle(name)
+    assert len(muscle.rests_on) > 40
+    rig = load_rig(f'{name}_hanging_mass')
+    assert rig.muscle == muscle and load_rig(rig.to_yaml()) == rig
+    settled = [rig.static_contraction_m(P_ATM_PA + kpa * 1e3) for kpa in (300, 400, 500, 600)]
+    assert 0.0 < settled[0] < settled[1] < settled[2] < settled[3] < muscle.stroke_m
+    for valve in ('ppr', 'hsv'):
+        signal = np.full(2500, 4.0) if valve == 'ppr' else np.tile([0.3, 0.0], (900, 1))
+        response = rig.with_(valve=valve).simulate(signal)
+        gauge = response.pressure_pa[-1] - P_ATM_PA
+        assert gauge > 350e3
+        assert response.contraction_m[-1] == pytest.approx(
+            rig.static_contraction_m(P_ATM_PA + gauge), rel=0.1)
+        mass = response.air_mass_kg[-1]
+        volume = rig.volume_m3(response.contraction_m[-1])
+        assert mass == pytest.approx((gauge + P_ATM_PA) * volume / (287.05 * 293.15), rel=1e-9)
+
+
+def test_published_forces_of_the_sizes():
+    for name, force_n, share in (('dmsp_5_300', 140.0, 1e-3), ('dmsp_40_300', 6000.0, 1e-3),
+                                 ('dmsp_10_250', 488.0, 0.03), ('dmsp_20_300', 1760.0, 0.03)):
+        pressure = 589e3 if name == 'dmsp_10_250' else 600e3
+        law = get_muscle(name).law.law
+        assert law.force_n(pressure, 0.0, 'allow') == pytest.approx(force_n, rel=share)
+
+
+def test_the_fitted_sets_are_what_the_fit_gives():
+    from pam_sim.muscle.fit import fit_law
+    from pam_sim.muscle.force_maps import read_force_map
+    for name in ('dmsp_10_250', 'dmsp_20_300'):
+        fitted = fit_law('sarosi', read_force_map(name)).law.values
+        stated = get_law('sarosi').SETS[f'{name}_map'].values
+        assert stated == pytest.approx(fitted, rel=2e-4)
+
+
+def test_a_model_states_its_own_muscle():
+    rig = load_rig('muscle: {like: dmsp_20_300, length_m: 0.18, rests_on: own bench}\n'
+                   'load: hanging_mass\nparameters: {mass_kg: 40.0}\n')
+    assert rig.muscle.length_m == 0.18 and rig.muscle.rests_on == 'own bench'
+    assert rig.static_contraction_m(P_ATM_PA + 400e3) == pytest.approx(
+        0.6 * load_rig('dmsp_20_300_hanging_mass').static_contraction_m(
+            P_ATM_PA + 400e3, 40.0 * 9.80665))
+    assert load_rig(rig.to_yaml()) == rig
+    assert load_rig('muscle: {length_m: 0.2, bore_m: 0.012, law: situm_herceg}\n'
+                    'load: isometric\n').muscle.law.set == 'dmsp_5'
+
+
+def test_a_table_by_path_stands_beside_the_model(tmp_path):
+    table_of().write_csv(tmp_path / 'mine.csv')
+    path = tmp_path / 'model.yaml'
+    path.write_text(f'rig: {RIG}\nlaw: {{name: lookup, table: mine.csv}}\n')
+    rig = load_rig(str(path))
+    assert rig.muscle.law.table == table_of()
+
+
+@pytest.mark.parametrize('text, line, words', [
+    (f'rig: {RIG}\nlaw: saroshi\n', 2, ['did you mean `sarosi`']),
+    (f'rig: {RIG}\nlaw:\n  name: sarosi\n  set: dmsp_7\n', 2, ['dmsp_7', 'dmsp_20_400n']),
+    (f'rig: {RIG}\nlaw:\n  name: tondu_lopez\n  parameters:\n    k0: 50\n', 5,
+     ['k0', '0.3 to 5']),
+    (f'rig: {RIG}\nlaw:\n  nam: sarosi\n', 3, ['did you mean `name`']),
+    ('muscle: dmsp_7\nload: isometric\n', 1, ['dmsp_7', 'dmsp_40_300']),
+    ('muscle:\n  like: dmsp_5_300\n  length_m: 20\nload: isometric\n', 3,
+     ['length_m', '0.02', '9']),
+    ('muscle: {length_m: 0.3}\nload: isometric\n', 1, ['bore_m', 'like']),
+    (f'rig: {RIG}\nlaw: {{name: lookup, table: {{load_n: [0, 1]}}}}\n', 2,
+     ['pressure_gauge_pa', 'missing']),
+])
+def test_mistakes_name_the_line_and_what_is_allowed(text, line, words):
+    with pytest.raises(InputError) as caught:
+        load_rig(text)
+    message = str(caught.value)
+    assert f':{line}' in message and all(word in message for word in words), message
+
+
+def test_a_law_without_a_compiled_formula_is_refused(monkeypatch):
+    monkeypatch.setattr(get_law('situm_herceg'), 'COMPILED', None)
+    with pytest.raises(InputError, match='no compiled `tension_n`'):
+        load_rig(RIG).with_(law='situm_herceg')
+
+
+def test_the_contraction_held_must_fit_the_muscle():
+    with pytest.raises(InputError, match='0 to 0.0625 m'):
+        load_rig('muscle: dmsp_10_250\nload: isometric\nparameters: {contraction_m: 0.07}\n')
+
+
+SCRIPT = """
+import sys
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.muscle.registry import laws
+signal = 3.5 + 1.5 * np.sin(np.arange(120) * 0.05)
+rows = []
+for name in laws():
+    if name != 'lookup':
+        rig = load_rig('dmsp_5_300_hanging_mass').with_(law=name)
+        rows.append(rig.simulate(signal, initial_pressure_pa=4e5).outputs)
+np.save(sys.argv[1], np.array(rows))
+"""
+
+
+def test_laws_give_the_same_bits_with_the_compiler_off(tmp_path):
+    compiled, plain = compiled_and_not(SCRIPT, tmp_path)
+    assert np.array_equal(compiled, plain)
