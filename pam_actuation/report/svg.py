@@ -138,7 +138,7 @@ def line_chart(curves, x_title, y_title, title):
         ink = colour(0.92 * k / max(len(curves) - 1, 1))
         canvas.line(place(curve.x, curve.y), ink, 1.8)
         for x, y, half in curve.points:
-            canvas.line(place([x - half, x + half], [y, y]), ink, 1.0)
+            canvas.line(place(np.clip([x - half, x + half], 0.0, x_high), [y, y]), ink, 1.0)
             canvas.dot(*place(x, y), ink)
         # The legend reads from the highest curve down.
         at = top + 14 + 20 * (len(curves) - 1 - k)

@@ -31,6 +31,7 @@ EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its
 LIFTED_STRAIN = 1e-4        # contraction from which a load counts as lifted
 STUCK_STRAIN = 5e-3         # branches closer than this are never a stuck muscle
 _SURFACES = ('strain', 'half_distance', 'noise', 'settling', 'reading')
+LEAST = 4                   # points a cubic needs along an axis
 SAME_PA = 1e3               # grid pressures are rounded to this
 
 
@@ -150,7 +151,7 @@ def load_grid(load_n, step_n=None):
     usual = float(np.median(spacing))
     if step_n is None and (np.any(np.abs(spacing[1:] - usual) > 0.2 * usual) or usual < 1.0):
         inner = np.round(load_n[load_n > 0.05], 1)
-        return np.concatenate([[0.0], inner[inner > 0.25 * usual]])
+        return _with_middles(np.concatenate([[0.0], inner[inner > 0.25 * usual]]))
     step = float(step_n or np.round(usual))
     if not step > 0.0:
         raise InputError(f'is {step:g}; allowed is above 0', '--load-step-n')
@@ -158,7 +159,25 @@ def load_grid(load_n, step_n=None):
     if grid.size < 3:
         raise InputError(f'of {step:g} N makes {grid.size} loads up to {load_n[-1]:.1f} N; '
                          f'3 or more are needed', '--load-step-n')
-    return grid
+    return _with_middles(grid)
+
+
+def _with_middles(axis):
+    """Return an axis; with the middles between its points where they are too few for PCHIP."""
+    if axis.size >= LEAST:
+        return axis
+    return np.sort(np.concatenate([axis, 0.5 * (axis[:-1] + axis[1:])]))
+
+
+def with_enough_pressures(points):
+    """Return Points with at least LEAST pressures; those between are interpolated."""
+    old, new = points.pressure_gauge_pa, _with_middles(points.pressure_gauge_pa)
+    if new.size == old.size:
+        return points
+    between = {name: np.array([np.interp(new, old, column) for column in
+                               getattr(points, name).T]).T for name in _SURFACES}
+    between['strain'] = PchipInterpolator(old, points.strain)(new)
+    return Points(new, points.load_n, points.load_u_n, **between)
 
 
 def without_stuck(points):

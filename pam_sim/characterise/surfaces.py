@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_sim.characterise.monotone import monotone_surface
-from pam_sim.characterise.points import load_grid, with_no_load
+from pam_sim.characterise.points import load_grid, with_enough_pressures, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.muscle.lookup_table import LookupTable
@@ -108,7 +108,7 @@ def build_surfaces(points, dimensions, load_step_n=None):
         Fewer than 3 loads, the smallest too far from 0 N, or nothing contracts.
 
     """
-    points = with_no_load(points)
+    points = with_enough_pressures(with_no_load(points))
     loads = load_grid(points.load_n, load_step_n)
     at = np.clip(loads, points.load_n[0], points.load_n[-1])
 
