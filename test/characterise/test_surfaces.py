@@ -65,9 +65,9 @@ def test_hysteresis_is_lumped_and_its_half_distance_reported():
     assert found.half_distance[inside] == pytest.approx(0.005, abs=2e-5)
     assert found.parts['hysteresis'][inside] == pytest.approx(0.005 / np.sqrt(3.0), rel=0.02)
     # Where the pressure turns the branches meet, and the doubt stays.
-    top = truth[-1] > 0.006
+    top = truth[-1] > 0.01
     assert found.half_distance[-1, top] == pytest.approx(0.0, abs=2e-5)
-    assert np.all(found.strain_u[-1, top] > 0.0028)
+    assert np.all(found.strain_u[-1, top] > 0.0024)
     assert np.all(np.abs(found.strain - truth) <= 2.0 * found.strain_u + 1e-6)
 
 

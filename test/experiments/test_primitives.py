@@ -70,6 +70,16 @@ def test_triangle_rate_and_turning_points():
     assert primitive.end == pytest.approx(0.002)
 
 
+def test_increments_end_where_they_should_and_hold_between():
+    primitive = make('increments')
+    assert primitive.duration_s == pytest.approx(5.4)
+    assert primitive.at(0.0) == (pytest.approx(0.003), 0.0)
+    for k in range(1, 4):
+        for t in (1.8 * k - 0.9, 1.8 * k - 1e-6):
+            assert primitive.at(t) == (pytest.approx(0.003 + 0.017 * k / 3), pytest.approx(0.0))
+    assert primitive.end == pytest.approx(0.02)
+
+
 def test_ramp_is_at_rest_at_both_ends_and_starts_where_the_last_ended():
     primitive = make('ramp')
     assert primitive.at(0.0) == (0.003, 0.0)
