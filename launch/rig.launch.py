@@ -112,7 +112,7 @@ def generate_launch_description():
          'controller': ParameterValue(_controller_name(), value_type=str)},
         condition=IfCondition(LaunchConfiguration('record')))
     plant = _node('plant_simulator', valve, seed, {'rig': _text('rig')})
-    driver = _node('valve_driver', valve)
+    driver = _node('valve_driver', valve, {'rig': _text('rig')})
     reference = _node(
         'reference_generator',
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,

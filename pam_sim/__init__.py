@@ -16,12 +16,13 @@
 Physics and models of a rig with a pneumatic artificial muscle; no ROS.
 
 ``load_rig`` gives a rig from a preset or a model file; ``Rig.simulate`` runs
-it on arrays, ``Rig.plant`` step by step.
+it on arrays, ``Rig.plant`` step by step. ``load_joint`` does the same for two muscles
+that turn a joint.
 """
 
 from pam_sim.errors import InputError
 
-__all__ = ['InputError', 'Rig', 'load_rig', 'preset_names']
+__all__ = ['InputError', 'Rig', 'load_joint', 'load_rig', 'preset_names']
 
 
 def __getattr__(name):
@@ -29,6 +30,9 @@ def __getattr__(name):
     if name in ('load_rig', 'preset_names'):
         from pam_sim import model_file
         return getattr(model_file, name)
+    if name == 'load_joint':
+        from pam_sim.joint.model_file import load_joint
+        return load_joint
     if name == 'Rig':
         from pam_sim.rig import Rig
         return Rig

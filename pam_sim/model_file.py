@@ -84,6 +84,9 @@ def load_rig(source, valve=None, fidelity=None):
 
 
 def _from_mapping(data, name, seen):
+    if data.get('load') == 'antagonistic_joint' or 'joint' in data:
+        raise data.error('describes a joint with two muscles; `pam_sim.load_joint` reads it',
+                         'load' if 'load' in data else 'joint')
     data.check_keys(KEYS)
     name = data.get('name', str, name)
     if 'rig' in data:

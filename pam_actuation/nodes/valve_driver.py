@@ -16,7 +16,7 @@
 
 import sys
 
-from pam_actuation.drivers.config import DRIVER_PARAMETERS
+from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.managed import ManagedNode
@@ -43,6 +43,9 @@ class ValveDriver(ManagedNode):
         NodeParameter(
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
             'high-speed valves.', choices=('ppr', 'hsv')),
+        NodeParameter(
+            'rig', '', 'Rig preset or model file that tells the driver valves, volume and load; '
+            'numbers given beside it win. Empty: the defaults of the parameters.'),
         *(NodeParameter(p.name, p.default, p.description, p.lower, p.upper)
           for p in DRIVER_PARAMETERS),
     )
@@ -52,9 +55,9 @@ class ValveDriver(ManagedNode):
     def setup(self):
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
-        values = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS}
-        _warm_up(DriverLoop(self.value('valve_type'), values))
-        self.loop = DriverLoop(self.value('valve_type'), values)
+        config = self._config()
+        _warm_up(DriverLoop(self.value('valve_type'), config))
+        self.loop = DriverLoop(self.value('valve_type'), config)
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
         self.pressures = self.add_subscription('pressure')
@@ -63,6 +66,23 @@ class ValveDriver(ManagedNode):
             self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
             self.create_service(Trigger, '~/reset', self._on_reset),
         ]
+
+    def _config(self):
+        """Return the driver's numbers: those given, else the rig's, else the defaults."""
+        if not self.value('rig'):
+            return DriverConfig.from_parameters(
+                {p.name: self.value(p.name) for p in DRIVER_PARAMETERS})
+        from pam_actuation.drivers.for_rig import driver_config
+        from pam_sim import load_rig
+        given = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS
+                 if p.name in self._parameter_overrides}
+        config = driver_config(
+            load_rig(self.value('rig'), valve=self.value('valve_type')), given)
+        told = {name: value for name, value in config.as_parameters().items()
+                if value != self.value(name)}
+        self.get_logger().info(f'numbers told by rig {self.value("rig")}: ' + (
+            ', '.join(f'{name} {value:g}' for name, value in told.items()) or 'the defaults'))
+        return config
 
     def teardown(self):
         """Take the services back."""

@@ -141,7 +141,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
             'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
     nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
-    nodes[DRIVER] = {'valve_type': rig.valve}
+    nodes[DRIVER] = {'valve_type': rig.valve, 'rig': rig_file}
     if controller is not None:
         nodes[plan.controller_node] = {
             'rig': rig_file, 'valve_type': rig.valve,

@@ -101,6 +101,21 @@ def rest_contraction(p, state, par):
     return low
 
 
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+def driven_tension(state, par):
+    """Return the static tension [N] of the present state: the force map and what changes it."""
+    return map_tension(state[S_PRESSURE], state[S_CONTRACTION], state, par)
+
+
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+def driven_force(tension, velocity, state, par):
+    """Return (force without dry friction, its level) [N] of the present state at a velocity."""
+    p = state[S_PRESSURE]
+    x = state[S_CONTRACTION]
+    return (muscle_force(tension, p, x, velocity, 0.0, 0.0, state, par),
+            apply_muscle_friction(0.0, p, x, velocity, state, par))
+
+
 @njit(cache=True, error_model='numpy', nogil=True)
 def rollout(state, par, inputs, outputs):
     """Step through ``inputs`` (N, INP_SIZE); ``outputs`` is (N + 1, OUT_SIZE), row 0 the start."""

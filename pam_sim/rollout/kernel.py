@@ -26,5 +26,7 @@ _module = load_kernel()
 step = _module.step
 look = _module.look
 settle = _module.settle
+driven_tension = _module.driven_tension
+driven_force = _module.driven_force
 rest_contraction = _module.rest_contraction
 rollout = _module.rollout

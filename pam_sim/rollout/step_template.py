@@ -22,8 +22,8 @@ unchanged.
 Scheme of one physics step h: the regulator's lag exactly; air mass by
 Runge-Kutta of fourth order; the motion by a Nystroem step whose contraction at
 middle and end follow from accelerations already known, so that the force map is
-read twice a step, velocities by Simpson's rule. Second order where a force
-depends on velocity, fourth elsewhere. Contraction and velocity end at events
+read twice a step, velocities by Simpson's rule. Third order or better; second where
+an effect's force depends on velocity. Contraction and velocity end at events
 (end stop, reversal under dry friction).
 """
 
@@ -295,6 +295,8 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         a_mid = acceleration(
             force - load_force(x_mid, v_mid, dx, g, external, state, par) - dry,
             x_mid, v_mid, inverse_mass, top)
+        # The velocity used was the one with a0; the damping feels the mean of a0 and a_mid.
+        a_mid -= 0.5 * g * par[PAR_DAMPING] * inverse_mass * (a_mid - a0)
 
     # End of the step: contraction, pressure, velocity.
     x1 = x0

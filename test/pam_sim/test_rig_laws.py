@@ -14,6 +14,10 @@
 
 """Every muscle law and size in a rig: the compiled formula, statics, model files, refusals."""
 
+import os
+import subprocess
+import sys
+
 from both_ways import compiled_and_not
 import numpy as np
 from pam_sim import load_rig
@@ -161,6 +165,7 @@ def test_a_table_by_path_stands_beside_the_model(tmp_path):
     ('muscle:\n  like: dmsp_5_300\n  length_m: 20\nload: isometric\n', 3,
      ['length_m', '0.02', '9']),
     ('muscle: {length_m: 0.3}\nload: isometric\n', 1, ['bore_m', 'like']),
+    ('rig: knee\nload: antagonistic_joint\n', 2, ['load_joint']),
     (f'rig: {RIG}\nlaw: {{name: lookup, table: {{load_n: [0, 1]}}}}\n', 2,
      ['pressure_gauge_pa', 'missing']),
 ])
@@ -200,3 +205,47 @@ np.save(sys.argv[1], np.array(rows))
 def test_laws_give_the_same_bits_with_the_compiler_off(tmp_path):
     compiled, plain = compiled_and_not(SCRIPT, tmp_path)
     assert np.array_equal(compiled, plain)
+
+
+LAW = """
+import numpy as np
+from pam_sim.compiled import compiled
+from pam_sim.muscle.law import MuscleLaw, ParameterSet
+from pam_sim.parameters import Parameter
+
+@compiled
+def tension_n(gauge_pa, strain, par, k):
+    return par[k] * gauge_pa * (1.0 - strain / 0.2)
+
+class Straight(MuscleLaw):
+    NAME = 'straight'
+    EQUATION = 'none'
+    FORMULA = 'F = a p (1 - eps / 0.2)'
+    SOURCE = 'test'
+    PARAMETERS = (Parameter('a_m2', 'm^2', 2e-4, 1e-6, 1.0, description='Area.', source='test'),)
+    SETS = {'one': ParameterSet({}, 'nothing')}
+    CLAIMS = (2, 3, 4)
+    def _tension_n(self, pressure, strain):
+        return self.values['a_m2'] * pressure * (1.0 - strain / 0.2)
+
+LAW = Straight
+"""
+
+USE_OF_LAW = """
+import numpy as np
+from pam_sim import load_rig
+rig = load_rig('rig: dmsp_5_300_hanging_mass\\n'
+               'law: {name: straight, parameters: {a_m2: 3.0e-4}}\\n')
+response = rig.simulate(np.full(40, 4.0), initial_pressure_pa=501325.0)
+wanted = 0.3 * 0.2 * (1.0 - 5.0 * 9.80665 / (3.0e-4 * 400e3))
+print(abs(response.contraction_m - wanted).max() < 1e-9, load_rig(rig.to_yaml()) == rig)
+"""
+
+
+def test_a_law_in_a_folder_of_the_user_moves_a_rig(tmp_path):
+    (tmp_path / 'straight.py').write_text(LAW)
+    answer = subprocess.run(
+        [sys.executable, '-c', USE_OF_LAW], capture_output=True, text=True, timeout=200,
+        env={**os.environ, 'PAM_MUSCLE_LAWS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
+             'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
+    assert answer.stdout.split() == ['True', 'True'], answer.stderr

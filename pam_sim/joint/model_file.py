@@ -1,0 +1,129 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Model files and presets of joints: YAML in, JointRig out, and back."""
+
+from importlib import resources
+import os
+
+from pam_sim.errors import InputError
+from pam_sim.joint.parameters import NAME, PARAMETERS
+from pam_sim.joint.rig import JointRig, SIDES
+from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+from pam_sim.model_file import load_rig
+from pam_sim.parameters import check_parameters
+
+KEYS = ('name', 'joint', 'load', 'flexor', 'extensor', 'parameters')
+
+
+def _presets():
+    return resources.files('pam_sim.joint').joinpath('presets')
+
+
+def joint_preset_names():
+    """Return the names of the presets, sorted."""
+    return sorted(item.name[:-5] for item in _presets().iterdir() if item.name.endswith('.yaml'))
+
+
+def _preset(name):
+    text = _presets().joinpath(f'{name}.yaml').read_text('utf-8')
+    return load_yaml(text, name=f'{name}.yaml')
+
+
+def load_joint(source, valve=None, fidelity=None):
+    """
+    Return a joint from a preset or a model file.
+
+    Parameters
+    ----------
+    source : str, os.PathLike, Located or JointRig
+        Preset name, path of a model file, YAML text, or a mapping already read.
+    valve, fidelity : str, optional
+        Of both muscles, instead of those of the model.
+
+    Returns
+    -------
+    JointRig
+
+    Raises
+    ------
+    InputError
+        One sentence with file, line, key, value and what is allowed.
+
+    """
+    if isinstance(source, JointRig):
+        joint = source
+    elif isinstance(source, Located):
+        joint = _from_mapping(source, None)
+    elif isinstance(source, str) and source in joint_preset_names():
+        joint = _from_mapping(_preset(source), source)
+    elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
+            and ': ' not in source and not source.endswith(('.yaml', '.yml')):
+        raise InputError(f'joint `{source}` is neither a preset nor a file; presets: '
+                         + ', '.join(joint_preset_names()))
+    else:
+        joint = _from_mapping(load_yaml(source), None)
+    return joint.with_(valve=valve, fidelity=fidelity)
+
+
+def _from_mapping(data, name):
+    data.check_keys(KEYS)
+    name = data.get('name', str, name)
+    base = None
+    if 'joint' in data:
+        base = load_joint(data.require('joint', str, choices=joint_preset_names()))
+        data.get('load', str, choices=(NAME,))
+    else:
+        if 'load' not in data:
+            raise data.error(
+                f'`load: {NAME}` is missing, or `joint` with one of: '
+                + ', '.join(joint_preset_names()))
+        data.require('load', str, choices=(NAME,))
+    sides = {side: _side(data, side, base) for side in SIDES}
+    given = data.get('parameters', dict) if data.get('parameters') is not None else {}
+    check_parameters(PARAMETERS, given)
+    kept = base.parameters if base else {}
+    try:
+        return JointRig(name or (base.name if base else 'joint'), **sides,
+                        parameters={**kept, **dict(given)})
+    except InputError as error:
+        # The parts are sound; they do not fit each other.
+        raise data.error(f'{error.where}: {error.problem}', error.where) from error
+
+
+def _side(data, side, base):
+    """Return the rig of a side: a preset by name, a mapping as in a model file, or the base's."""
+    if side not in data and base is not None:
+        return getattr(base, side)
+    value = data.require(side)
+    if isinstance(value, Located):
+        return load_rig(value)
+    if not isinstance(value, str):
+        raise data.error(f'`{side}` must be a preset or a mapping as in a model file', side)
+    try:
+        return load_rig(value)
+    except InputError as error:
+        raise data.error(error.problem, side) from error
+
+
+def joint_to_yaml(joint):
+    """Return the text of a model file that gives an equal joint."""
+    data = {'name': joint.name, 'load': NAME}
+    for side in SIDES:
+        data[side] = load_yaml(getattr(joint, side).to_yaml()).plain()
+    changed = {p.name: joint.parameters[p.name] for p in PARAMETERS
+               if joint.parameters[p.name] != p.nominal}
+    if changed:
+        data['parameters'] = changed
+    return dump_yaml(data)

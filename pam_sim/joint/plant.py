@@ -1,0 +1,144 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The joint as a live object: one step at a time, the compiled step of the rollout."""
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.joint import kernel, layout
+from pam_sim.joint.packing import pack_joint
+from pam_sim.plant import Plant
+
+
+class JointMuscle(Plant):
+    """One muscle of a live joint: read as any plant, stepped by the joint only."""
+
+    def step(self, signal, external_force_n=0.0, contraction_m=None):
+        """Refuse: the joint prescribes the contraction."""
+        raise InputError('is stepped by its joint', self.rig.name)
+
+    @property
+    def arrays(self):
+        """State, par, inp, out as the compiled step takes them."""
+        return self.state, self.par, self._inp, self._out
+
+
+class JointPlant:
+    """
+    A joint that is stepped from outside; its steps equal those of ``JointRig.simulate``.
+
+    Parameters
+    ----------
+    joint : JointRig
+    seed : int
+        Kept for the sensor chains; the extensor has the next one. The physics is deterministic.
+    dt_s : float
+        Step, s.
+    **initial
+        As for :func:`pam_sim.joint.packing.pack_joint`.
+
+    Attributes
+    ----------
+    flexor, extensor : JointMuscle
+        Pressure, contraction, force and the rest of each muscle.
+
+    """
+
+    def __init__(self, joint, seed=0, dt_s=0.001, **initial):
+        self.joint = joint
+        self.dt_s = float(dt_s)
+        self._initial = initial
+        self._inp = np.zeros(layout.IN_SIZE)
+        self._out = np.zeros(layout.OUT_SIZE)
+        self._start, self.par, flexor, extensor = pack_joint(joint, self.dt_s, **initial)
+        self.flexor = JointMuscle(joint.flexor, seed, **flexor)
+        self.extensor = JointMuscle(joint.extensor, int(seed) + 1, **extensor)
+        self.reset()
+
+    def reset(self):
+        """Go back to the start."""
+        self.state = self._start.copy()
+        self._inp[:] = 0.0
+        self.flexor.reset()
+        self.extensor.reset()
+        kernel.joint_look(*self.arrays)
+
+    @property
+    def arrays(self):
+        """Arguments of the compiled step: joint, flexor, extensor."""
+        return ((self._inp, self.state, self.par, self._out), self.flexor.arrays,
+                self.extensor.arrays)
+
+    def step(self, flexor_signal, extensor_signal, external_torque_n_m=0.0):
+        """
+        Advance by ``dt_s`` with the valve signals held.
+
+        Parameters
+        ----------
+        flexor_signal, extensor_signal : float or sequence of float
+            PPR: voltage [V] (or a tuple of it); HSV: (fill duty, vent duty), 0..1.
+        external_torque_n_m : float
+            On the limb, N m, flexion positive.
+
+        Raises
+        ------
+        InputError
+            The number of signals does not fit the valve, or a number is not finite, given
+            or computed.
+
+        """
+        inp = self._inp.copy()
+        for first, signal, side in ((layout.IN_FLEXOR_0, flexor_signal, 'flexor'),
+                                    (layout.IN_EXTENSOR_0, extensor_signal, 'extensor')):
+            values = (signal,) if np.isscalar(signal) else tuple(signal)
+            rig = getattr(self.joint, side)
+            wanted = len(rig.signal_names)
+            if len(values) != wanted:
+                raise InputError(f'valve `{rig.valve}` takes {wanted} numbers, got {len(values)}',
+                                 f'{side}_signal')
+            inp[first:first + wanted] = values
+        inp[layout.IN_TORQUE] = external_torque_n_m
+        if not np.isfinite(inp).all():
+            raise InputError('is not finite', 'valve signal or external torque')
+        self._inp[:] = inp
+        kernel.joint_step(*self.arrays)
+        if not all(np.isfinite(side[-1]).all() for side in self.arrays):
+            raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
+                             'numbers of the model make no joint that can be stepped',
+                             f'joint {self.joint.name}')
+
+    @property
+    def time_s(self):
+        """Time since the start, s."""
+        return float(self._out[layout.OUT_TIME])
+
+    @property
+    def angle_rad(self):
+        """Joint angle, flexion positive, rad."""
+        return float(self._out[layout.OUT_ANGLE])
+
+    @property
+    def velocity_rad_per_s(self):
+        """Joint velocity, rad/s."""
+        return float(self._out[layout.OUT_VELOCITY])
+
+    @property
+    def torque_n_m(self):
+        """Torque of both tendons, N m."""
+        return float(self._out[layout.OUT_TORQUE])
+
+    @property
+    def outputs(self):
+        """All outputs of the joint after the last step (copy), by ``layout.OUT_*``."""
+        return self._out.copy()

@@ -1,0 +1,59 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a simulation of a joint returns."""
+
+from pam_sim.joint import layout
+from pam_sim.response import Response
+
+
+class JointResponse:
+    """
+    Signals of a simulated joint, each an ndarray of shape (N + 1,), row 0 the start.
+
+    Attributes
+    ----------
+    time_s : ndarray
+        Seconds since the start.
+    angle_rad, velocity_rad_per_s, acceleration_rad_per_s2 : ndarray
+        True motion of the joint, flexion positive.
+    torque_n_m : ndarray
+        Torque of both tendons together, flexion positive.
+    flexor, extensor : pam_sim.response.Response
+        Pressure, contraction, tension and the rest of each muscle.
+
+    """
+
+    def __init__(self, outputs, flexor, extensor):
+        self.outputs = outputs
+        self.flexor = Response(flexor)
+        self.extensor = Response(extensor)
+        self.time_s = outputs[:, layout.OUT_TIME]
+        self.angle_rad = outputs[:, layout.OUT_ANGLE]
+        self.velocity_rad_per_s = outputs[:, layout.OUT_VELOCITY]
+        self.acceleration_rad_per_s2 = outputs[:, layout.OUT_ACCELERATION]
+        self.torque_n_m = outputs[:, layout.OUT_TORQUE]
+
+    def __len__(self):
+        """Return the number of samples, N + 1."""
+        return len(self.outputs)
+
+    def as_dict(self):
+        """Return name -> ndarray; names of a muscle begin with ``flexor/`` or ``extensor/``."""
+        signals = {name: getattr(self, name) for name in (
+            'time_s', 'angle_rad', 'velocity_rad_per_s', 'acceleration_rad_per_s2', 'torque_n_m')}
+        for side in ('flexor', 'extensor'):
+            signals.update({f'{side}/{name}': values
+                            for name, values in getattr(self, side).as_dict().items()})
+        return signals

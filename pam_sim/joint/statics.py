@@ -1,0 +1,67 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where a joint rests: from the forces at rest of the kernel."""
+
+import math
+
+import numpy as np
+from pam_sim.rollout import layout
+from scipy.optimize import brentq
+
+_SCAN = 48                     # angles looked at for changes of sign over the whole range
+
+
+def static_torque(joint, angle_rad, pressures_pa, external_n_m):
+    """Return the net torque [N m] at rest; see ``JointRig.static_torque_n_m``."""
+    value = joint.parameters
+    torque = external_n_m - (
+        value['limb_mass_kg'] * value['gravity_m_per_s2'] * value['centre_of_mass_m']
+        * math.sin(angle_rad - value['hanging_angle_rad']))
+    for rig, contraction, pressure, arm in zip(
+            (joint.flexor, joint.extensor), joint.contractions_m(angle_rad), pressures_pa,
+            (value['flexor_radius_m'], -value['extensor_radius_m'])):
+        torque += arm * _static_force(rig, pressure, contraction)
+    return torque
+
+
+def _static_force(rig, pressure, contraction):
+    state, par = rig.pack(initial_pressure_pa=pressure,
+                          initial_contraction_m=max(contraction, 0.0))
+    if contraction > par[layout.PAR_MAX_CONTRACTION]:
+        return 0.0
+    return max(state[layout.S_MUSCLE_FORCE], 0.0)
+
+
+def static_angle(joint, pressures_pa, external_n_m=0.0, near_rad=None):
+    """Return the angle [rad] of rest; see ``JointRig.static_angle_rad``."""
+    lower, upper = joint.range_rad
+    if near_rad is None:
+        near_rad = joint.parameters['hanging_angle_rad']
+    near_rad = min(max(near_rad, lower), upper)
+
+    def torque(angle):
+        return static_torque(joint, angle, pressures_pa, external_n_m)
+
+    if torque(near_rad) == 0.0:
+        return near_rad
+    angles = np.linspace(lower, upper, _SCAN)
+    torques = [torque(angle) for angle in angles]
+    found = [brentq(torque, a, b, xtol=1e-13) for a, b, left, right in
+             zip(angles, angles[1:], torques, torques[1:]) if left > 0.0 >= right]
+    if torques[0] <= 0.0:
+        found.append(lower)
+    if torques[-1] >= 0.0:
+        found.append(upper)
+    return float(min(found, key=lambda angle: abs(angle - near_rad)))
