@@ -27,7 +27,6 @@ from pam_sim.model_file import load_rig
 from pam_sim.units import absolute_pa
 
 
-
 @dataclass
 class Characterisation:
     """
@@ -78,6 +77,7 @@ def characterise_runs(runs, dimensions=None, loads_n=None, load_step_n=None):
     Parameters
     ----------
     runs : list of pam_sim.run.Run
+        The recordings, in any order.
     dimensions : Dimensions, optional
         Instead of those of the rig in the metadata of the runs.
     loads_n : list of float, optional
@@ -121,7 +121,8 @@ def characterise_table(table, dimensions, load_step_n=None):
 
     Parameters
     ----------
-    table : pam_sim.characterise.tables.MeasuredTable
+    table : MeasuredTable
+        Of :func:`pam_sim.characterise.tables.read_measured_table`.
     dimensions : Dimensions
         Without a bore, P(m_air, load) is left out.
     load_step_n : float, optional
@@ -234,6 +235,7 @@ def against_rig(surfaces, rig):
     Parameters
     ----------
     surfaces : Surfaces
+        What was found.
     rig : pam_sim.rig.Rig
         The rig that was simulated.
 
@@ -257,7 +259,8 @@ def against_rig(surfaces, rig):
     error = surfaces.strain - truth(surfaces.pressure_gauge_pa, surfaces.load_n)
     pressures, loads = (0.5 * (axis[:-1] + axis[1:])
                         for axis in (surfaces.pressure_gauge_pa, surfaces.load_n))
-    between = surfaces.law().strain_at(pressures[:, None], loads[None, :]) - truth(pressures, loads)
+    through = surfaces.law().strain_at(pressures[:, None], loads[None, :])
+    between = through - truth(pressures, loads)
     return {
         'rms_percent': 100.0 * float(np.sqrt(np.mean(error ** 2))),
         'max_percent': 100.0 * float(np.abs(error).max()),
@@ -267,4 +270,3 @@ def against_rig(surfaces, rig):
         'within_2u_share': float(np.mean(np.abs(error) <= 2.0 * surfaces.strain_u + 1e-6)),
         'error_percent': (100.0 * error).tolist(),
     }
-

@@ -80,6 +80,7 @@ def fixed_load(run, length_m, load_n=None, rig=None):
     Parameters
     ----------
     run : pam_sim.run.Run
+        The recording.
     length_m : float
         Length of the muscle at rest.
     load_n : float, optional

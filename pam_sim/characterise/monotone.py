@@ -46,6 +46,7 @@ def monotone_surface(strain):
     Parameters
     ----------
     strain : ndarray, shape (P, L)
+        Contraction over pressure and load, as a fraction.
 
     """
     surface = np.maximum(strain, 0.0)

@@ -97,7 +97,8 @@ def build_surfaces(points, dimensions, load_step_n=None):
     Parameters
     ----------
     points : pam_sim.characterise.points.Points
-    dimensions : pam_sim.characterise.dimensions.Dimensions
+        What was measured.
+    dimensions : Dimensions
         Without a bore, P(m_air, load) is left out.
     load_step_n : float, optional
         Spacing of the grid of loads, see ``load_grid``.
