@@ -26,14 +26,16 @@ def add_arguments(parser):
                         help='bags, one fixed load each, or one table measured by others')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the results')
     parser.add_argument('--simulate', metavar='RIG', default=None,
-                        help='first simulate the bags (0 to 150 N in 10 N steps) with this rig')
+                        help='first simulate the bags with this rig (0 to 150 N in 10 N steps, '
+                             'about 100 MB)')
     parser.add_argument('--seed', type=int, default=0, help='seed of the simulated sensors')
     parser.add_argument('--jobs', type=int, default=2, help='processes that simulate')
     parser.add_argument('--experiment', default='pressure_increments', metavar='NAME|FILE',
                         help='experiment to simulate (default: %(default)s)')
     parser.add_argument('--namespace', default=None, help='which muscle of a bag with several')
     parser.add_argument('--load-n', type=float, nargs='+', default=None, metavar='N',
-                        help='loads, one per bag in their order, instead of the measured ones')
+                        help='loads, one per bag in their order, instead of the measured ones; '
+                             'with --simulate the loads to hang on')
     parser.add_argument('--load-step-n', type=float, default=None, metavar='N',
                         help='spacing of loads in the table (default: as measured)')
     parser.add_argument('--length-m', type=float, default=None, metavar='M',
@@ -78,8 +80,9 @@ def _simulated(args):
     if not 1 <= args.jobs <= 64:
         raise InputError(f'is {args.jobs}; allowed is 1 to 64', '--jobs')
     rig = with_sensor_noise(load_rig(args.simulate))
-    with progress(args, len(LOADS_N), ' bags', 'simulating') as bar:
-        bags = simulate_loads(rig, Path(args.out) / 'bags', args.seed, jobs=args.jobs,
+    loads = args.load_n or LOADS_N
+    with progress(args, len(loads), ' bags', 'simulating') as bar:
+        bags = simulate_loads(rig, Path(args.out) / 'bags', args.seed, loads, args.jobs,
                               experiment=args.experiment,
                               progress=lambda done: bar.update(done - bar.n))
     return rig, bags
@@ -100,7 +103,9 @@ def _characterised(args, sources):
             for path in sources:
                 runs.append(load_run(path, args.namespace, recover=args.recover))
                 bar.update()
-        return characterise_runs(runs, _dimensions(args, runs), args.load_n, args.load_step_n)
+        # Simulated loads are read off the load cell like any others.
+        loads = None if args.simulate else args.load_n
+        return characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
     if len(sources) > 1:
         raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
     return characterise_table(read_measured_table(tables[0]), _dimensions(args, []),

@@ -114,6 +114,9 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
     if load_experiment(experiment).domain != 'pressure':
         raise InputError(f'the experiment {experiment} is not in the pressure domain')
     loads = np.asarray(loads_n, dtype=float)
+    if loads.size < 3 or np.any(np.diff(loads) < 1.0) or loads[0] < 0.0 or loads[-1] > 490.0:
+        raise InputError('needs 3 or more loads, ascending by at least 1 N, from 0 to 490 N',
+                         'loads')
     targets = [Path(folder) / bag_name(load) for load in loads]
     there = [path for path in targets if path.exists()]
     if there:

@@ -90,6 +90,7 @@ def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
     ([str(MAP), '--simulate', 'dmsp_5_300_realistic'], 'takes no bags'),
     (['--simulate', 'dmsp_5_300_isometric'], 'no hanging mass'),
     (['--simulate', 'dmsp_5_300_realistic', '--experiment', 'step_10mm'], 'pressure domain'),
+    (['--simulate', 'dmsp_5_300_realistic', '--load-n', '0', '10', '5'], 'ascending'),
     (['no_such_bag'], 'no_such_bag'),
 ])
 def test_mistakes_are_one_sentence_and_write_nothing(arguments, words, tmp_path, capsys):
@@ -103,7 +104,7 @@ def test_a_series_is_that_of_the_chapter_and_never_overwrites(bags, tmp_path):
     assert LOADS_N == tuple(range(0, 151, 10))
     (tmp_path / 'load_010_0_n').mkdir()
     with pytest.raises(InputError, match='exists already'):
-        simulate_loads(load_rig('dmsp_5_300_hanging_mass'), tmp_path, loads_n=(0.0, 10.0))
+        simulate_loads(load_rig('dmsp_5_300_hanging_mass'), tmp_path, loads_n=(0.0, 10.0, 20.0))
     assert load_experiment('pressure_increments').domain == 'pressure'
 
 
