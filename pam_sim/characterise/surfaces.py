@@ -126,9 +126,8 @@ def build_surfaces(points, dimensions, load_step_n=None):
     slope = np.gradient(strain, loads, axis=1)
     parts = {
         'noise': onto(points.noise),
-        # Both branches are equally right: the truth lies anywhere between (uniform). Where the
-        # pressure turns they meet without being right: the widest distance below counts.
-        'hysteresis': np.maximum.accumulate(np.nan_to_num(np.abs(half))) / np.sqrt(3.0),
+        # Both branches are equally right: the truth lies anywhere between (uniform).
+        'hysteresis': _open_loop(half) / np.sqrt(3.0),
         'settling': onto(points.settling),
         'load': np.abs(slope) * np.interp(at, points.load_n, points.load_u_n),
         'reading': onto(points.reading),
@@ -145,6 +144,19 @@ def build_surfaces(points, dimensions, load_step_n=None):
             'points': int(strain.size), 'moved': int(np.count_nonzero(moved)),
             'largest_strain': float(parts['monotone'].max()),
             'rms_strain': float(np.sqrt(np.mean(parts['monotone'] ** 2)))})
+
+
+def _open_loop(half_distance):
+    """
+    Return the half distance of the branches as if the loop never closed.
+
+    Where the pressure turns the branches meet without being right: the widest
+    distance at lower pressures counts. A load lifted only there has none; that
+    of the next smaller load counts.
+    """
+    widest = np.maximum.accumulate(np.nan_to_num(np.abs(half_distance)), axis=0)
+    widest[-1, 1:] = np.maximum(widest[-1, 1:], widest[-1, :-1])
+    return widest
 
 
 def _air(pressure, strain, strain_u, dimensions):

@@ -12,25 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-The pressure sensor is slower than the others: tau dy/dt = p - y.
-
-Exact for a signal that is linear between samples.
-"""
-
-import math
+"""The pressure sensor is slower than the others: tau dy/dt = p - y."""
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.lag import advance_sampled, pack_sampled
 from pam_sim.parameters import Parameter
-
-_DECAY, _STEPS = range(2)           # exp(-dt / tau); tau / dt
-_READING, _TRUE = range(2)
-
-
-def _pack(values, numbers):
-    steps = values['time_constant_s'] / numbers.dt_s
-    return math.exp(-1.0 / steps), steps
 
 
 def _initial(values, numbers):
@@ -50,7 +37,7 @@ EFFECT = Effect(
     reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
     states=2,
     slots=2,
-    pack=_pack,
+    pack=pack_sampled,
     initial=_initial,
     active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
     order=30,               # before scale and offset
@@ -60,13 +47,10 @@ EFFECT = Effect(
 @compiled
 def sensor_commit(pressure_pa, contraction_m, force_n, dt_s, state, i, par, k):
     """Advance the lagged reading by one step."""
-    slope = (pressure_pa - state[i + _TRUE]) * par[k + _STEPS]
-    state[i + _READING] = pressure_pa - slope + (
-        state[i + _READING] - state[i + _TRUE] + slope) * par[k + _DECAY]
-    state[i + _TRUE] = pressure_pa
+    advance_sampled(pressure_pa, state, i, par, k)
 
 
 @compiled
 def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
     """Return the readings with the lag."""
-    return state[i + _READING], contraction_m, force_n
+    return state[i], contraction_m, force_n

@@ -24,10 +24,11 @@ from pam_sim.rollout.hooks import HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('effect', 'registry')
+_SHARED = ('lag',)      # compiled code that several effects call
 
 
 def effect_files():
-    """Return the source files of all effects, sorted by effect name."""
+    """Return the source files of all effects and of what they share, sorted by name."""
     return plugin_files(_OWN_FOLDER, 'PAM_EFFECTS_PATH', _NOT_EFFECTS)
 
 
@@ -44,6 +45,8 @@ def effects():
     """
     found = {}
     for path in effect_files():
+        if path.parent == _OWN_FOLDER and path.stem in _SHARED:
+            continue
         module = plugin_module(path, _OWN_FOLDER, 'pam_sim.effects', 'pam_effect')
         effect = getattr(module, 'EFFECT', None)
         if not isinstance(effect, Effect):

@@ -21,21 +21,12 @@ PPR: y is the set point that reaches the regulator. HSV: y is the opening of
 each valve. The mean of y over a physics step is used, exact for a held u.
 """
 
-import math
-
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.lag import mean_of_held, pack_held
 from pam_sim.parameters import Parameter
 from pam_sim.valve.hsv import clip_duty
 from pam_sim.valve.ppr import set_point_pa
-
-_DECAY, _MEAN = range(2)
-
-
-def _pack(values, numbers):
-    ratio = numbers.substep_s / values['time_constant_s']
-    decay = math.exp(-ratio)
-    return decay, -math.expm1(-ratio) / ratio
 
 
 def _initial(values, numbers):
@@ -59,28 +50,19 @@ EFFECT = Effect(
     reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
     states=2,
     slots=2,
-    pack=_pack,
+    pack=pack_held,
     initial=_initial,
     order=40,               # before the threshold of the main stage
 )
 
 
 @compiled
-def mean_of_lag(u, state, i, decay, mean):
-    """Return the mean of the lagged value over a physics step and advance it."""
-    distance = state[i] - u
-    state[i] = u + distance * decay
-    return u + distance * mean
-
-
-@compiled
 def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
     """Return the lagged set point of the PPR."""
-    return mean_of_lag(set_point_pa, state, i, par[k + _DECAY], par[k + _MEAN]), time_constant_s
+    return mean_of_held(set_point_pa, state, i, par, k), time_constant_s
 
 
 @compiled
 def flow_opening(fill, vent, step_s, state, i, par, k):
     """Return the lagged openings of the HSV pair."""
-    return (mean_of_lag(fill, state, i, par[k + _DECAY], par[k + _MEAN]),
-            mean_of_lag(vent, state, i + 1, par[k + _DECAY], par[k + _MEAN]))
+    return mean_of_held(fill, state, i, par, k), mean_of_held(vent, state, i + 1, par, k)

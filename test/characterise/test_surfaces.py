@@ -67,10 +67,8 @@ def test_hysteresis_is_lumped_and_its_half_distance_reported():
     # Where the pressure turns the branches meet, and the doubt stays.
     top = truth[-1] > 0.01
     assert found.half_distance[-1, top] == pytest.approx(0.0, abs=2e-5)
-    assert np.all(found.strain_u[-1, top] > 0.0024)
-    # All but a load that is lifted at the highest pressure only, on the falling branch.
-    far = np.abs(found.strain - truth) > 2.0 * found.strain_u + 1e-6
-    assert np.count_nonzero(far) <= 1 and not np.any(far[:-1])
+    assert np.all(found.strain_u[-1, top] > 0.0028)
+    assert np.all(np.abs(found.strain - truth) <= 2.0 * found.strain_u + 1e-6)
 
 
 def test_uncertainty_is_carried_to_force_and_pressure(found):

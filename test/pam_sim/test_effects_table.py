@@ -37,6 +37,11 @@ valve volume thermal heat_exchange_time_s
 muscle friction coulomb_friction force_n
 muscle friction pressure_friction force_at_400kpa_n
 muscle friction hysteresis loop_half_width_at_400kpa_n
+muscle friction hysteresis_bouc_wen loop_half_width_at_400kpa_n
+muscle friction hysteresis_prandtl_ishlinskii loop_half_width_at_400kpa_n
+muscle friction hysteresis_lugre loop_half_width_at_400kpa_n
+muscle friction history_friction loop_half_width_at_400kpa_n
+muscle friction braid_contact_friction force_at_400kpa_n
 muscle damping viscous_damping force_at_50mm_per_s_n
 muscle slow creep relaxing_stiffness_n_per_m creep_fraction_at_400kpa
 muscle slow thermal_softening gain_loss_at_20mm_per_s
@@ -61,6 +66,8 @@ def test_named_as_results_name_it(line):
     effect = effects()[name]
     assert (effect.subsystem, effect.family) == (subsystem, family)
     assert [item.name for item in effect.reported] == reported
+    if effect.variant_of:       # states what the effect states of which it is a variant
+        assert reported == [item.name for item in effects()[effect.variant_of].reported]
     for parameter in effect.parameters:
         assert parameter.unit and parameter.description
         assert parameter.lower <= parameter.nominal <= parameter.upper

@@ -176,13 +176,15 @@ def test_thermal_limits_and_time_constant():
     assert np.allclose(quick.pressure_pa, nominal.pressure_pa, rtol=1e-4)
 
 
-@pytest.mark.parametrize('fidelity, tolerance', [('averaged', 1e-6), ('switching', 1e-4)])
-def test_thermal_closes_the_balances_of_mass_and_energy(fidelity, tolerance):
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_thermal_closes_the_balances_of_mass_and_energy(fidelity):
     tau_s, gamma = 0.2, 1.4
     rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv', fidelity=fidelity).with_(effects=[
         {'name': 'thermal', 'parameters': {'heat_exchange_time_s': tau_s}}])
-    dt_s = 2e-4
-    signal = np.repeat(duties('sine', 2000), 5, axis=0)
+    # The physics step of the switching valves: the middle of two samples is a mean over
+    # one held opening, not over two across an edge of a pulse.
+    dt_s = 1e-4
+    signal = np.repeat(duties('sine', 2000), 10, axis=0)
     r = rig.simulate(signal, initial_pressure_pa=P_ATM_PA + 350e3, dt_s=dt_s)
     gained = r.air_mass_kg - r.air_mass_kg[0]
     assert np.max(np.abs(gained - r.filled_kg + r.vented_kg)) < 1e-14
@@ -198,7 +200,7 @@ def test_thermal_closes_the_balances_of_mass_and_energy(fidelity, tolerance):
     energy = r.pressure_pa * volume                        # times 1 / (gamma - 1)
     left = np.diff(energy) - enthalpy + work - heat
     turned_over = np.sum(np.abs(enthalpy)) + np.sum(np.abs(work))
-    assert abs(np.sum(left)) < tolerance * turned_over
+    assert abs(np.sum(left)) < 1e-7 * turned_over
 
 
 @pytest.mark.parametrize('name', ['flow_limit', 'valve_hysteresis'])
