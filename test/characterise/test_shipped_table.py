@@ -15,6 +15,7 @@
 """The shipped lookup table: made again by its recipe, and what it says of the rig."""
 
 from pathlib import Path
+import re
 
 import numpy as np
 from pam_actuation.bags.load import load_run
@@ -31,6 +32,7 @@ from pam_sim.muscle.registry import make_law
 import pytest
 
 SEED = 1
+NUMBER = re.compile(r'(?<![0-9a-f#])-?[0-9]+(?:[.][0-9]+)?(?![0-9a-f])')
 FIGURE_FOLDER = Path(__file__).resolve().parents[2] / 'docs' / 'figures'
 
 
@@ -102,5 +104,8 @@ def test_the_law_finds_it_by_name_and_a_rig_takes_it():
 @pytest.mark.parametrize('name', FIGURES)
 def test_the_figures_of_the_documents_show_this_table(again, name):
     printed = (FIGURE_FOLDER / f'characterise_{name[7:]}.svg').read_text(encoding='utf-8')
-    assert printed == FIGURES[name](again.surfaces)
-    assert len(printed) < 200_000
+    drawn = FIGURES[name](again.surfaces)
+    assert NUMBER.sub('#', printed) == NUMBER.sub('#', drawn) and len(printed) < 200_000
+    # Pixels; the last digit may round another way.
+    numbers = [[float(text) for text in NUMBER.findall(page)] for page in (printed, drawn)]
+    assert numbers[0] == pytest.approx(numbers[1], abs=0.11)
