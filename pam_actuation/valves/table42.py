@@ -196,7 +196,8 @@ def number_rows(result):
             if found[key] is not None:
                 cells.append(f'{found[key] * scale:.{digits}f}')
             else:
-                cells.append(f'> {found["frequencies_hz"][-1]:g}' if part == 'small_sines' else '–')
+                beyond = found.get('frequencies_hz')
+                cells.append(f'> {beyond[-1]:g}' if beyond else '–')
         rows.append((label, unit, *cells))
     for label, case in (('power off: to 10 %', 'off'),
                         ('power off, vent open: to 10 %', 'vented')):
