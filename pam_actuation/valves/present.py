@@ -18,7 +18,7 @@ import textwrap
 
 from pam_actuation.models.text import text_table
 from pam_actuation.report.figures import line, stack
-from pam_actuation.report.page import paragraph, plot, render, Section, table
+from pam_actuation.report.page import paragraph, plot, render, Section, signed, table
 from pam_actuation.valves.compare import TITLES
 from pam_actuation.valves.table42 import (
     notes, number_head, number_rows, STATEMENT_HEAD, statement_rows)
@@ -63,7 +63,7 @@ def _step_rows(result):
                      for key in ('dead_time_s', 'rise_s', 'settling_s')]
             rows.append((title, f'{step["from_pa"] / 1e3:.0f} to {step["to_pa"] / 1e3:.0f}',
                          *times, f'{100.0 * step["overshoot"]:.1f}',
-                         f'{step["error_pa"] / 1e3:.2f}'))
+                         signed(step['error_pa'] / 1e3, 2)))
     return rows
 
 
