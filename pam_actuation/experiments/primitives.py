@@ -203,6 +203,31 @@ class Staircase(Primitive):
 
 
 @dataclass
+class Increments(Primitive):
+    """Equal smooth moves to a value, each of ``move_s`` and followed by a hold of ``hold_s``."""
+
+    QUANTITIES = ('to',)
+    start: float
+    to: float
+    steps: int
+    move_s: float
+    hold_s: float
+
+    @property
+    def duration_s(self):
+        """Length of all moves and holds together."""
+        return int(self.steps) * (self.move_s + self.hold_s)
+
+    def at(self, t_s):
+        """Return value and rate: the path of least jerk in a move, rate 0 in a hold."""
+        each = self.move_s + self.hold_s
+        size = (self.to - self.start) / int(self.steps)
+        done = min(int(t_s / each), int(self.steps) - 1)
+        value, rate = Ramp(0.0, size, self.move_s).at(t_s - done * each)
+        return self.start + done * size + value, rate
+
+
+@dataclass
 class RandomSteps(Primitive):
     """Steps to uniformly random values, held for uniformly random times."""
 

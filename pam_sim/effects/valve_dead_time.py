@@ -53,6 +53,7 @@ EFFECT = Effect(
     subsystem='valve',
     sentence='The valve answers a command only after a pure delay.',
     source='Transport delay; 20-50 ms measured on electro-pneumatic regulators.',
+    equation='u(t) -> u(t - L); HSV: d_f and d_v likewise',
     parameters=(
         Parameter('delay_s', 's', 0.030, 0.0, 0.5, description='Delay from command to pressure.'),
     ),

@@ -38,6 +38,8 @@ EFFECT = Effect(
     sentence='Venting takes longer than filling.',
     source='Design choice of form; measured on proportional valves with muscles: falling steps '
            '1.5 to 2 times slower than rising ones.',
+    equation='PPR: T_m -> r T_m while p > p_set; HSV: mdot_vent -> mdot_vent / r; '
+             'r = 1 + ratio_minus_1',
     parameters=(
         Parameter('ratio_minus_1', '-', 0.4, -0.5, 9.0,
                   description='Time of venting over time of filling, less one.'),

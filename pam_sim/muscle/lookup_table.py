@@ -34,9 +34,9 @@ class LookupTable:
     Parameters
     ----------
     pressure_gauge_pa : ndarray
-        Ascending, shape (P,), P >= 3.
+        Ascending, shape (P,), P >= 4.
     load_n : ndarray
-        Ascending from 0, shape (L,), L >= 3.
+        Ascending from 0, shape (L,), L >= 4.
     strain, air_mass_kg : ndarray
         Shape (P, L). Contraction rises with pressure and falls with load (or
         rests at 0); air mass rises with pressure.
@@ -65,8 +65,8 @@ class LookupTable:
         shape = (self.pressure_gauge_pa.size, self.load_n.size)
         for name in COLUMNS[:2]:
             axis = getattr(self, name)
-            if axis.ndim != 1 or axis.size < 3 or np.any(np.diff(axis) <= 0) or axis[0] < 0:
-                raise InputError('needs at least 3 ascending values, none negative',
+            if axis.ndim != 1 or axis.size < 4 or np.any(np.diff(axis) <= 0) or axis[0] < 0:
+                raise InputError('needs at least 4 ascending values, none negative',
                                  f'lookup table, {name}')
         for name in COLUMNS[2:]:
             if getattr(self, name).shape != shape:

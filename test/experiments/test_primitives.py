@@ -31,13 +31,15 @@ EXAMPLES = {
               'duration_s': 5.0},
     'triangle': {'low_m': 0.002, 'high_m': 0.02, 'period_s': 4.0, 'cycles': 2},
     'staircase': {'low_m': 0.0, 'high_m': 0.02, 'steps': 4, 'hold_s': 1.0},
+    'increments': {'to_m': 0.02, 'steps': 3, 'move_s': 0.8, 'hold_s': 1.0},
     'random_steps': {'low_m': 0.0, 'high_m': 0.02, 'min_hold_s': 0.2, 'max_hold_s': 0.9,
                      'duration_s': 5.0, 'seed': 3},
     'multisine': {'center_m': 0.01, 'amplitude_m': 0.005, 'min_hz': 0.1, 'max_hz': 2.0,
                   'lines': 8, 'duration_s': 6.0, 'seed': 3},
 }
-SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'multisine')
-NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification')
+SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'increments', 'multisine')
+NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification',
+         'pressure_increments')
 
 
 def make(name):
@@ -66,6 +68,16 @@ def test_triangle_rate_and_turning_points():
     assert primitive.at(2.0)[0] == pytest.approx(0.02)
     assert primitive.at(3.0) == (pytest.approx(0.011), pytest.approx(-0.009))
     assert primitive.end == pytest.approx(0.002)
+
+
+def test_increments_end_where_they_should_and_hold_between():
+    primitive = make('increments')
+    assert primitive.duration_s == pytest.approx(5.4)
+    assert primitive.at(0.0) == (pytest.approx(0.003), 0.0)
+    for k in range(1, 4):
+        for t in (1.8 * k - 0.9, 1.8 * k - 1e-6):
+            assert primitive.at(t) == (pytest.approx(0.003 + 0.017 * k / 3), pytest.approx(0.0))
+    assert primitive.end == pytest.approx(0.02)
 
 
 def test_ramp_is_at_rest_at_both_ends_and_starts_where_the_last_ended():

@@ -150,7 +150,7 @@ def test_points_beyond_the_range_are_flagged_refused_or_allowed():
     ('repperger', {'k0_n_per_m': -1e5}, 'fall with contraction'),
     ('repperger', {'c1_n_s_per_m_pa': -0.5}, 'damper'),
     ('inoue_pair', {'b': 50.0}, 'neither muscle'),
-    ('lookup', None, 'table'),
+    ('lookup', {'k': 1.0}, 'table'),
     ('saroshi', None, 'did you mean `sarosi`'),
 ])
 def test_values_that_make_no_muscle_are_refused_by_name(name, values, words):

@@ -18,9 +18,11 @@ The chapter's empirical model (section 4.3): surfaces through tabulated points.
 P(air mass, load), eps(P, load) and, from these, F(eps, P). Piecewise cubic
 Hermite (PCHIP) along both axes: smooth, monotone between the points, and none
 of the overshoot that would make a muscle lengthen under rising pressure.
-No table is shipped; measure one, or compute one from another law.
+``dmsp_5_300`` is shipped, made by ``pam characterise`` from a simulation; measure your own, or
+compute one from another law.
 """
 
+from pathlib import Path
 import warnings
 
 import numpy as np
@@ -30,6 +32,7 @@ from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, Paramet
 from pam_sim.muscle.lookup_table import LookupTable, read_table
 
 STRAIN_POINTS = 41
+SHIPPED = Path(__file__).parent.parent / 'lookup_tables'
 _SMALL = 1e-7           # contraction below this counts as rest
 _ROWS, _COLUMNS, _PER_STRAIN, _HEAD = range(4)
 
@@ -145,10 +148,10 @@ class Lookup(MuscleLaw):
 
     Parameters
     ----------
-    table : LookupTable, str or Path
-        The points, or the CSV file that holds them.
+    table : LookupTable, str or Path, optional
+        The points, or the CSV file that holds them; by default the shipped ones.
     muscle : str, optional
-        Only ``table``.
+        ``table`` with a table of your own, ``dmsp_5_300`` (the default) without.
     where : str
         Place for error messages.
 
@@ -158,17 +161,25 @@ class Lookup(MuscleLaw):
     EQUATION = 'section 4.3, Figures 4.6 and 4.7'
     FORMULA = 'P = P(m_air, load); eps = eps(P, load); F = F(eps, P)'
     SOURCE = 'the chapter; interpolation after Fritsch and Carlson 1980'
-    SETS = {'table': ParameterSet({}, 'the table given; its source line says what it is')}
+    SETS = {
+        'dmsp_5_300': ParameterSet(
+            {}, 'a simulation of the nominal rig, whose force map is scaled from a measured '
+            'DMSP-10-250; no DMSP-5 was measured', Validity((0.0, 600e3), (0.0, 0.2))),
+        'table': ParameterSet({}, 'the table given; its source line says what it is')}
     CLAIMS = (1, 2, 3, 4)
     EXTRAPOLATES = False
 
     def __init__(self, table=None, muscle=None, where=''):
+        table = None if table == {} else table
+        if muscle is None:
+            muscle = 'dmsp_5_300' if table is None else 'table'
         super().__init__(None, muscle, where)
         # Imported when a table is used: it takes longer than all other laws together.
         from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
-        if table is None or isinstance(table, dict):
+        if isinstance(table, dict) or (table is None) == (muscle == 'table'):
             raise InputError('law `lookup` takes no parameters but a table: a LookupTable or '
-                             'the path of a CSV file', where)
+                             'the path of a CSV file, and no other set with it', where)
+        table = SHIPPED / f'{muscle}.csv' if table is None else table
         self.table = table if isinstance(table, LookupTable) else read_table(table)
         pressure, load = self.table.pressure_gauge_pa, self.table.load_n
         limit = float(self.table.strain.max())

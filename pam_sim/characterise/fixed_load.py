@@ -1,0 +1,168 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One fixed load: its force, its branches of rising and falling pressure."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pam_sim.characterise.holds import find_holds
+from pam_sim.errors import InputError
+from pam_sim.units import GRAVITY_M_PER_S2
+
+HANGING_STRAIN = 2e-3        # from this contraction on, the load certainly hangs on the muscle
+SAME_LOAD_N = 0.5            # closer loads are repetitions of one load
+SCATTER_N, SCATTER = 0.5, 0.02     # a load whose force varies more is not fixed
+
+
+@dataclass(frozen=True)
+class FixedLoad:
+    """
+    The settled holds under one load.
+
+    Parameters
+    ----------
+    load_n, load_u_n : float
+        Load and its standard uncertainty.
+    load_from : str
+        ``load cell``, ``rig``, ``given`` or ``table``.
+    length_m : float
+        Length of the muscle at rest.
+    holds : list of Hold
+        Settled holds in order of time.
+    unsettled : list of Hold
+        Holds that were left out.
+    path : str
+        Where they come from.
+
+    """
+
+    load_n: float
+    load_u_n: float
+    load_from: str
+    length_m: float
+    holds: list
+    unsettled: list = field(default_factory=list)
+    path: str = ''
+
+    def branch(self, name):
+        """
+        Return (pressure, strain, standard error, drift) of a branch, pressure ascending.
+
+        The hold of highest pressure belongs to both branches. Holds of one
+        pressure (closer than 1 kPa) are averaged. Pa gauge, the rest as fractions.
+        """
+        top = max(self.holds, key=lambda hold: hold.pressure_gauge_pa)
+        chosen = [hold for hold in self.holds if hold.branch == name or hold is top]
+        rows = np.array([
+            (hold.pressure_gauge_pa, hold.contraction_m / self.length_m,
+             hold.contraction_u_m / self.length_m, hold.drift_m / self.length_m)
+            for hold in sorted(chosen, key=lambda hold: hold.pressure_gauge_pa)])
+        group = np.concatenate([[0], np.cumsum(np.diff(rows[:, 0]) >= 1e3)])
+        return np.array([rows[group == k].mean(axis=0) for k in range(group[-1] + 1)]).T
+
+
+def fixed_load(run, length_m, load_n=None, rig=None):
+    """
+    Return the FixedLoad of a recording.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        The recording.
+    length_m : float
+        Length of the muscle at rest.
+    load_n : float, optional
+        The load where it is known better than from the recording.
+    rig : pam_sim.rig.Rig, optional
+        Rig of the recording; its mass is the load where no force was measured.
+
+    Raises
+    ------
+    InputError
+        Pressure or contraction missing, fewer than 3 settled pressures, the load
+        unknown or not fixed.
+
+    """
+    found = find_holds(run, length_m)
+    holds = [hold for hold in found if hold.settled]
+    levels = np.unique(np.round([hold.pressure_gauge_pa / 3e3 for hold in holds]))
+    if levels.size < 3:
+        raise InputError(
+            f'has {levels.size} settled holds of different pressure ({len(found)} holds found); '
+            f'3 or more are needed', run.path)
+    load, spread, source = _load(holds, length_m, load_n, rig, run.path)
+    return FixedLoad(load, spread, source, length_m, holds,
+                     [hold for hold in found if not hold.settled], run.path)
+
+
+def _load(holds, length_m, given, rig, path):
+    """Return (load [N], standard uncertainty [N], where it comes from)."""
+    if given is not None:
+        if not 0.0 <= given <= 1e5:
+            raise InputError(f'the load is {given:g} N; allowed is 0 to 100000 N', path)
+        return float(given), 0.0, 'given'
+    force = [hold.force_n for hold in holds if np.isfinite(hold.force_n)]
+    if force:
+        # Where the muscle is at rest, a support may carry a part of the load.
+        hanging = [hold.force_n for hold in holds if np.isfinite(hold.force_n)
+                   and hold.contraction_m > HANGING_STRAIN * length_m]
+        force = hanging if len(hanging) >= 3 else force
+        mean, spread = float(np.mean(force)), float(np.std(force))
+        if spread > max(SCATTER_N, SCATTER * abs(mean)):
+            raise InputError(
+                f'the load is not fixed: the force on the holds is {min(force):.1f} to '
+                f'{max(force):.1f} N', path)
+        if mean < -SCATTER_N:
+            raise InputError(f'the load cell reads {mean:.1f} N; pull must be positive', path)
+        return (round(max(mean, 0.0), 4), round(spread / np.sqrt(len(force)), 4), 'load cell')
+    mass = None if rig is None else rig.parameters.get('mass_kg')
+    if mass is None:
+        raise InputError('has no force and no rig with a mass; give the load with --load-n', path)
+    return mass * GRAVITY_M_PER_S2, rig.tolerance['mass_kg'] * mass * GRAVITY_M_PER_S2, 'rig'
+
+
+def by_load(loads):
+    """
+    Return the FixedLoads in ascending order, repetitions of a load put together.
+
+    Raises
+    ------
+    InputError
+        Fewer than 3 different loads, or muscles of different length.
+
+    """
+    lengths = sorted({one.length_m for one in loads})
+    if len(lengths) > 1:
+        raise InputError('the recordings are of different muscles: lengths '
+                         + ', '.join(f'{length:g}' for length in lengths) + ' m')
+    merged = []
+    for one in sorted(loads, key=lambda one: one.load_n):
+        if merged and one.load_n - merged[-1].load_n < SAME_LOAD_N:
+            last = merged[-1]
+            merged[-1] = FixedLoad(
+                0.5 * (last.load_n + one.load_n),
+                float(np.hypot(0.5 * np.hypot(last.load_u_n, one.load_u_n),
+                               0.5 * (one.load_n - last.load_n))),
+                one.load_from, one.length_m, last.holds + one.holds,
+                last.unsettled + one.unsettled, f'{last.path}, {one.path}')
+        else:
+            merged.append(one)
+    if len(merged) < 3:
+        measured = ', '.join(f'{one.load_n:.1f}' for one in sorted(
+            loads, key=lambda one: one.load_n))
+        raise InputError(
+            f'loads of {measured} N: 3 or more that differ by at least {SAME_LOAD_N:g} N are '
+            f'needed')
+    return merged

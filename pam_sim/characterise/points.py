@@ -1,0 +1,255 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Contraction on a grid of pressures and measured loads, with the parts of its uncertainty.
+
+Rising and falling pressure are averaged: the chapter's "quasi-static system
+with the hysteresis lumped into the non-linear characteristic curve". Half the
+distance of the branches is kept.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pam_sim.characterise.fixed_load import by_load
+from pam_sim.errors import InputError
+from scipy.interpolate import PchipInterpolator
+
+EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its end
+LIFTED_STRAIN = 1e-4        # contraction from which a load counts as lifted
+STUCK_STRAIN = 5e-3         # branches closer than this are never a stuck muscle
+_SURFACES = ('strain', 'half_distance', 'noise', 'settling', 'reading')
+LEAST = 4                   # points a cubic needs along an axis
+SAME_PA = 1e3               # grid pressures are rounded to this
+
+
+@dataclass(frozen=True)
+class Points:
+    """
+    Contraction and its uncertainty, surfaces of shape (P, L), contraction as a fraction.
+
+    Parameters
+    ----------
+    pressure_gauge_pa, load_n : ndarray
+        Ascending; shapes (P,), (L,).
+    load_u_n : ndarray, shape (L,)
+    strain : ndarray
+        Mean of the branches.
+    half_distance : ndarray
+        Half of falling minus rising branch; NaN where only one was measured.
+    noise, settling, reading : ndarray
+        Standard uncertainties: scatter of the means, remaining drift, and how the
+        number was read from the source (extrapolation, censored values).
+
+    """
+
+    pressure_gauge_pa: np.ndarray
+    load_n: np.ndarray
+    load_u_n: np.ndarray
+    strain: np.ndarray
+    half_distance: np.ndarray
+    noise: np.ndarray
+    settling: np.ndarray
+    reading: np.ndarray
+
+
+def points_of(loads, pressures_pa=None):
+    """
+    Return the Points of recordings.
+
+    Parameters
+    ----------
+    loads : list of FixedLoad
+        Repetitions of one load are put together.
+    pressures_pa : array_like, optional
+        Grid, gauge; by default the levels of the first load within the range of all.
+
+    Raises
+    ------
+    InputError
+        Fewer than 3 loads or pressures.
+
+    """
+    loads = by_load(loads)
+    grid = _levels(loads) if pressures_pa is None else np.asarray(pressures_pa, dtype=float)
+    columns = [_column(one, grid) for one in loads]
+    strain, half, noise, settling = (np.array(part).T for part in zip(*columns))
+    return Points(grid, np.array([one.load_n for one in loads]),
+                  np.array([one.load_u_n for one in loads]), strain, half, noise, settling,
+                  np.zeros_like(strain))
+
+
+def _levels(loads):
+    low = max(min(h.pressure_gauge_pa for h in one.holds) for one in loads)
+    high = min(max(h.pressure_gauge_pa for h in one.holds) for one in loads)
+    levels = SAME_PA * np.round(loads[0].branch('up')[0] / SAME_PA)
+    levels = np.unique(levels[(levels >= low - EDGE_PA) & (levels <= high + EDGE_PA)])
+    levels = np.maximum(levels, 0.0)
+    if levels.size < 3:
+        raise InputError(
+            f'{levels.size} pressure levels are common to all loads ({1e-3 * low:.0f} to '
+            f'{1e-3 * high:.0f} kPa); 3 or more are needed')
+    return levels
+
+
+def _column(one, grid):
+    """Return (mean, half distance, noise, settling) of one load on the grid of pressures."""
+    parts = []
+    for name in ('up', 'down'):
+        pressure, strain, noise, drift = one.branch(name)
+        if pressure.size < 3:
+            parts.append(np.full((3, grid.size), np.nan))
+            continue
+        at = np.clip(grid, pressure[0], pressure[-1])
+        curve = PchipInterpolator(pressure, strain)
+        # The mean pressure of a hold is uncertain too; its slope carries it over.
+        hold_u = np.mean([hold.pressure_u_pa for hold in one.holds])
+        total = np.hypot(np.interp(at, pressure, noise), curve(at, 1) * hold_u)
+        part = np.array([curve(at), total, np.interp(at, pressure, drift)])
+        part[:, (grid < pressure[0] - EDGE_PA) | (grid > pressure[-1] + EDGE_PA)] = np.nan
+        parts.append(part)
+    up, down = parts
+    both = np.isfinite(up[0]) & np.isfinite(down[0])
+    either = np.where(np.isfinite(up), up, down)
+    return (np.where(both, 0.5 * (up[0] + down[0]), either[0]),
+            np.where(both, 0.5 * (down[0] - up[0]), np.nan),
+            np.where(both, 0.5 * np.hypot(up[1], down[1]), either[1]),
+            np.where(both, 0.5 * (up[2] + down[2]), either[2]) / np.sqrt(3.0))
+
+
+def load_grid(load_n, step_n=None):
+    """
+    Return the loads of the surfaces [N], from 0 to the largest measured one.
+
+    Parameters
+    ----------
+    load_n : ndarray
+        Measured loads, ascending.
+    step_n : float, optional
+        Spacing; by default the measured one rounded to 1 N where it is regular,
+        else the measured loads themselves are the grid.
+
+    Raises
+    ------
+    InputError
+        Fewer than 3 loads on the grid.
+
+    """
+    spacing = np.diff(load_n)
+    usual = float(np.median(spacing))
+    if step_n is None and (np.any(np.abs(spacing[1:] - usual) > 0.2 * usual) or usual < 1.0):
+        inner = np.round(load_n[load_n > 0.05], 1)
+        return _with_middles(np.concatenate([[0.0], inner[inner > 0.25 * usual]]))
+    step = float(step_n or np.round(usual))
+    if not step > 0.0:
+        raise InputError(f'is {step:g}; allowed is above 0', '--load-step-n')
+    grid = step * np.arange(int(load_n[-1] / step + 0.02) + 1)
+    if grid.size < 3:
+        raise InputError(f'of {step:g} N makes {grid.size} loads up to {load_n[-1]:.1f} N; '
+                         f'3 or more are needed', '--load-step-n')
+    return _with_middles(grid)
+
+
+def _with_middles(axis):
+    """Return an axis; with the middles between its points where they are too few for PCHIP."""
+    if axis.size >= LEAST:
+        return axis
+    return np.sort(np.concatenate([axis, 0.5 * (axis[:-1] + axis[1:])]))
+
+
+def with_enough_pressures(points):
+    """Return Points with at least LEAST pressures; those between are interpolated."""
+    old, new = points.pressure_gauge_pa, _with_middles(points.pressure_gauge_pa)
+    if new.size == old.size:
+        return points
+    between = {name: np.array([np.interp(new, old, column) for column in
+                               getattr(points, name).T]).T for name in _SURFACES}
+    between['strain'] = PchipInterpolator(old, points.strain)(new)
+    return Points(new, points.load_n, points.load_u_n, **between)
+
+
+def without_stuck(points):
+    """
+    Return (Points, loads left out [N]): without small loads that friction alone can hold.
+
+    A load smaller than the friction inside the muscle does not pull it long
+    again; its branches lie far apart and their mean says little. Such a run is
+    told by branches more than twice as far apart as those of the next load.
+    """
+    left_out = []
+    while points.load_n.size > 3:
+        with np.errstate(invalid='ignore'):
+            apart = np.sqrt(np.mean(np.nan_to_num(points.half_distance[:, :2]) ** 2, axis=0))
+        if apart[0] < STUCK_STRAIN or apart[0] < 2.0 * apart[1]:
+            break
+        left_out.append(float(points.load_n[0]))
+        points = Points(points.pressure_gauge_pa, points.load_n[1:], points.load_u_n[1:], *(
+            getattr(points, name)[:, 1:] for name in _SURFACES))
+    return points, left_out
+
+
+def with_no_load(points):
+    """
+    Return the Points with a column of 0 N, extrapolated where no run had it.
+
+    Through the three smallest loads where they are lifted; where fewer are, with
+    the slope of the next higher pressure. The difference from a straight line, or
+    half of the step, is taken for its uncertainty.
+
+    Raises
+    ------
+    InputError
+        The smallest load is too large for that.
+
+    """
+    load = points.load_n
+    if load[0] <= 0.05:
+        return _replaced(points, np.concatenate([[0.0], load[1:]]), None)
+    if load[0] > 1.1 * np.max(np.diff(load)):
+        raise InputError(
+            f'the smallest load of {load[0]:.1f} N is too far from 0 N; measure one of at most '
+            f'{np.max(np.diff(load)):.1f} N')
+    first, second, third = points.strain[:, :3].T
+    a, b, c = load[:3]
+    line = first + a * (first - second) / (b - a)
+    bend = ((third - second) / (c - b) - (second - first) / (b - a)) / (c - a)
+    curve = line + a * b * bend
+    extrapolated, doubt = first.copy(), np.zeros_like(first)
+    slope = 0.0
+    for i in range(first.size - 1, -1, -1):
+        if third[i] > LIFTED_STRAIN:
+            extrapolated[i] = max(curve[i], first[i])
+            doubt[i] = abs(curve[i] - line[i])
+            slope = (extrapolated[i] - first[i]) / a
+        elif first[i] > LIFTED_STRAIN:
+            extrapolated[i] = first[i] + a * slope
+            doubt[i] = 0.5 * a * slope
+    return _replaced(points, np.concatenate([[0.0], load]), (extrapolated, doubt))
+
+
+def _replaced(points, load, added):
+    """Return Points with other loads and, if ``added``, one more column in front."""
+    def front(surface, column=None):
+        if added is None:
+            return surface
+        column = surface[:, 0] if column is None else column
+        return np.column_stack([column, surface])
+
+    extrapolated, doubt = added if added is not None else (None, None)
+    spread = points.load_u_n if added is None else np.concatenate(
+        [points.load_u_n[:1], points.load_u_n])
+    return Points(points.pressure_gauge_pa, load, spread, front(points.strain, extrapolated),
+                  front(points.half_distance), front(points.noise), front(points.settling),
+                  front(points.reading, doubt))

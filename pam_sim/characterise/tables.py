@@ -1,0 +1,220 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Static points measured by others, from a CSV file.
+
+Two kinds. A force map: gauge pressure, length (or contraction) and force; zeros
+of force are censored, they say that the muscle did not pull. A contraction
+table: gauge pressure, load and contraction. Lines that begin with ``#`` are
+kept as the source.
+"""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pam_sim.characterise.fixed_load import FixedLoad
+from pam_sim.characterise.holds import Hold
+from pam_sim.characterise.points import Points
+from pam_sim.errors import InputError
+from scipy.interpolate import PchipInterpolator
+
+# Column name in lower case -> (quantity, factor to SI).
+COLUMNS = {
+    'pressure_pa': ('pressure', 1.0), 'pressure_gauge_pa': ('pressure', 1.0),
+    'pressure_kpa': ('pressure', 1e3), 'pressure_gauge_kpa': ('pressure', 1e3),
+    'length_m': ('length', 1.0), 'length_mm': ('length', 1e-3),
+    'contraction_m': ('contraction', 1.0), 'contraction_mm': ('contraction', 1e-3),
+    'strain': ('strain', 1.0), 'contraction_percent': ('strain', 0.01),
+    'force_n': ('force', 1.0), 'load_n': ('load', 1.0),
+    'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
+    'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
+}
+MAP_LOADS = 16              # loads at which a force map is read
+
+
+@dataclass(frozen=True)
+class MeasuredTable:
+    """
+    A table as read: columns in SI by quantity, its source lines, ``branch`` where given.
+
+    ``kind`` is ``force map`` or ``contraction table``.
+    """
+
+    kind: str
+    columns: dict
+    branch: list
+    source: str
+    path: str
+
+
+def read_measured_table(path):
+    """
+    Return the MeasuredTable of a CSV file.
+
+    Raises
+    ------
+    InputError
+        File missing, unknown or missing column, a cell that is no number, a
+        negative pressure.
+
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding='utf-8').splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
+    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
+    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith('#')))
+    head = [name.strip().lower() for name in rows[0]] if rows else []
+    unknown = [name for name in head if name not in COLUMNS and name != 'branch']
+    if not rows:
+        raise InputError('holds no table', str(path))
+    if unknown:
+        raise InputError(
+            f'has the column `{unknown[0]}`; known are {", ".join(COLUMNS)}, branch', str(path))
+    cells, branch = {COLUMNS[name][0]: [] for name in head if name != 'branch'}, []
+    for number, row in enumerate(rows[1:], 1):
+        if len(row) != len(head):
+            raise InputError(f'has {len(row)} cells in data row {number}, not {len(head)}',
+                             str(path))
+        for name, cell in zip(head, row):
+            if name == 'branch':
+                branch.append(cell.strip())
+                continue
+            try:
+                value = float(cell) * COLUMNS[name][1]
+            except ValueError:
+                value = float('nan')
+            if not np.isfinite(value):
+                raise InputError(f'data row {number}, `{name}`: {cell!r} is no number', str(path))
+            cells[COLUMNS[name][0]].append(value)
+    columns = {name: np.array(values) for name, values in cells.items()}
+    have = set(columns)
+    way = have & {'length', 'contraction', 'strain'}
+    kind = 'force map' if 'force' in have else 'contraction table' if 'load' in have else None
+    if kind is None or not way or 'pressure' not in have or len(rows) < 2:
+        raise InputError(
+            f'needs pressure, length or contraction, and force or load; has {", ".join(head)}',
+            str(path))
+    if np.any(columns['pressure'] < -1e3):
+        raise InputError('has a negative pressure; pressures are gauge', str(path))
+    return MeasuredTable(kind, columns, branch, source, str(path))
+
+
+def strain_of(table, length_m):
+    """Return the contraction (fraction) of every row, for a length at rest [m]."""
+    columns = table.columns
+    if 'strain' in columns:
+        strain = columns['strain']
+    elif 'contraction' in columns:
+        strain = columns['contraction'] / length_m
+    else:
+        strain = 1.0 - columns['length'] / length_m
+    if np.any(strain < -0.1) or np.any(strain > 0.9):
+        raise InputError(
+            f'contractions of {100 * strain.min():.0f} to {100 * strain.max():.0f} % of the '
+            f'length of {length_m:g} m are impossible', table.path)
+    return strain
+
+
+def loads_of_table(table, length_m):
+    """Return the FixedLoads of a contraction table, one per load that it lists."""
+    columns, strain = table.columns, strain_of(table, length_m)
+    zeros = np.zeros_like(strain)
+    contraction = columns.get('contraction', strain * length_m)
+    branch = table.branch or ['up'] * strain.size
+    wrong = [name for name in branch if name not in ('up', 'down')]
+    if wrong:
+        raise InputError(f'has the branch {wrong[0]!r}; allowed: up, down', table.path)
+    loads = []
+    for load in np.unique(columns['load']):
+        rows = np.flatnonzero(columns['load'] == load)
+        holds = [Hold(
+            0.0, 0.0, columns['pressure'][k], contraction[k], float('nan'),
+            columns.get('pressure_u', zeros)[k], columns.get('contraction_u', zeros)[k], 0.0,
+            columns.get('drift', zeros)[k], branch[k], True) for k in rows]
+        if len({round(hold.pressure_gauge_pa / 3e3) for hold in holds}) < 3:
+            raise InputError(f'has fewer than 3 pressures at {load:g} N', table.path)
+        loads.append(FixedLoad(float(load), float(columns.get('load_u', zeros)[rows].mean()),
+                               'table', length_m, holds, [], table.path))
+    return loads
+
+
+def points_of_map(table, length_m, loads_n=None):
+    """
+    Return the Points of a force map: the isobars read at equal loads.
+
+    Parameters
+    ----------
+    table : MeasuredTable
+        A force map.
+    length_m : float
+        Length at rest.
+    loads_n : array_like, optional
+        Ascending from 0; by default 16 loads up to the largest force.
+
+    Raises
+    ------
+    InputError
+        Fewer than 3 pressures, or no force.
+
+    """
+    pressure, force = table.columns['pressure'], table.columns['force']
+    strain = strain_of(table, length_m)
+    levels = np.unique(pressure)
+    if levels.size < 3 or not np.any(force > 0.0):
+        raise InputError(f'has {levels.size} pressures and {np.count_nonzero(force > 0)} points '
+                         f'with a force; 3 pressures or more are needed', table.path)
+    if loads_n is None:
+        loads_n = np.linspace(0.0, force.max(), MAP_LOADS)
+    read = [_isobar(strain[pressure == level], force[pressure == level], loads_n)
+            for level in levels]
+    eps, doubt = (np.array(part) for part in zip(*read))
+    nothing = np.zeros_like(eps)
+    return Points(levels, np.asarray(loads_n, dtype=float), np.zeros(len(loads_n)), eps,
+                  np.full_like(eps, np.nan), nothing, nothing, doubt)
+
+
+def _isobar(strain, force, loads):
+    """Return (contraction, uncertainty) under each load, from one measured isobar."""
+    order = np.argsort(strain)
+    strain, force = strain[order], np.minimum.accumulate(force[order])
+    pulls = force > 0.0
+    count = np.count_nonzero(pulls)
+    if count == 0:
+        return np.zeros(loads.size), np.zeros(loads.size)
+    last = strain[count - 1]
+    slope = ((force[count - 2] - force[count - 1]) / (last - strain[count - 2])
+             if count > 1 else 0.0)
+    # The force vanishes between the last point that pulled and the first that did not.
+    end = last + force[count - 1] / slope if slope > 0.0 else np.inf
+    limit = strain[count] if count < strain.size else end
+    if not np.isfinite(limit):
+        limit = last
+    zero = min(end, limit) if count > 1 else 0.5 * (last + limit)
+    width = (limit - last) if count < strain.size else (zero - last)
+    x = np.append(strain[:count], zero)[::-1]
+    f = np.append(force[:count], 0.0)[::-1]
+    f, first = np.unique(f, return_index=True)
+    x = np.maximum(x[first], 0.0)
+    eps = np.interp(loads, f, x) if f.size < 3 else PchipInterpolator(f, x)(
+        np.clip(loads, f[0], f[-1]))
+    # A load above the force at rest is not lifted.
+    eps = np.where(loads > f[-1] + 1e-9, 0.0, np.maximum(eps, 0.0))
+    share = np.clip(1.0 - loads / force[count - 1], 0.0, 1.0)
+    doubt = np.where(loads > f[-1] + 1e-9, strain[0], share * max(width, 0.0))
+    return eps, np.maximum(doubt, 0.0) / np.sqrt(12.0)

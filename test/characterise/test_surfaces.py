@@ -1,0 +1,166 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Surfaces from recordings: right, honest about their uncertainty, and refused where senseless."""
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.characterise import against_rig, characterise_runs, Dimensions
+from pam_sim.errors import InputError
+from pam_sim.muscle.registry import make_law
+import pytest
+from stepped_runs import contraction_m, LENGTH_M, LEVELS_PA, series_of_runs, stepped_run
+
+MUSCLE = Dimensions(LENGTH_M, 0.005, 3e-6)
+
+
+@pytest.fixture(scope='module')
+def found():
+    return characterise_runs(series_of_runs(), MUSCLE)
+
+
+def test_contraction_is_recovered_at_sensor_noise(found):
+    truth = against_rig(found.surfaces, load_rig('dmsp_5_300_hanging_mass'))
+    assert truth['rms_percent'] < 0.01 and truth['max_percent'] < 0.1
+    assert truth['between_rms_percent'] < 0.2 and truth['within_2u_share'] > 0.9
+    assert found.surfaces.load_n.tolist() == list(range(0, 151, 10))
+    assert found.surfaces.pressure_gauge_pa == pytest.approx(LEVELS_PA)
+
+
+def test_the_law_of_the_table_is_the_law_of_the_muscle(found):
+    law, truth = make_law('lookup', found.table()), make_law('sarosi')
+    rng = np.random.default_rng(1)
+    pressure, load = rng.uniform(100e3, 600e3, 50), rng.uniform(0.0, 130.0, 50)
+    strain = truth.max_strain(pressure, load)
+    assert law.strain_at(pressure, load) == pytest.approx(strain, abs=2e-3)
+    lifted = strain > 0.002
+    assert law.force_n(pressure, strain)[lifted] == pytest.approx(load[lifted], abs=2.5)
+    mass = MUSCLE.air_mass_kg(pressure, strain)
+    assert law.pressure_gauge_pa(mass, load) == pytest.approx(pressure, abs=3e3)
+
+
+def test_air_is_that_of_the_rig(found):
+    rig = load_rig('dmsp_5_300_hanging_mass')
+    assert Dimensions.of_rig(rig) == MUSCLE
+    assert MUSCLE.volume_m3(0.1) == pytest.approx(rig.volume_m3(0.03))
+    assert MUSCLE.volume_m3(0.0) == pytest.approx(8.89e-6, rel=1e-3)
+
+
+def test_hysteresis_is_lumped_and_its_half_distance_reported():
+    found = characterise_runs(series_of_runs(half_m=1.5e-3), MUSCLE).surfaces
+    truth = contraction_m(found.pressure_gauge_pa[:, None], found.load_n[None, :]) / LENGTH_M
+    inside = (truth > 0.006) & (found.pressure_gauge_pa < 590e3)[:, None]
+    assert found.strain[inside] == pytest.approx(truth[inside], abs=2e-5)
+    assert found.half_distance[inside] == pytest.approx(0.005, abs=2e-5)
+    assert found.parts['hysteresis'][inside] == pytest.approx(0.005 / np.sqrt(3.0), rel=0.02)
+    # Where the pressure turns the branches meet, and the doubt stays.
+    top = truth[-1] > 0.01
+    assert found.half_distance[-1, top] == pytest.approx(0.0, abs=2e-5)
+    assert np.all(found.strain_u[-1, top] > 0.0028)
+    assert np.all(np.abs(found.strain - truth) <= 2.0 * found.strain_u + 1e-6)
+
+
+def test_uncertainty_is_carried_to_force_and_pressure(found):
+    wide = characterise_runs(series_of_runs(half_m=1.5e-3), MUSCLE).surfaces
+    i = int(np.argmin(np.abs(wide.pressure_gauge_pa - 400e3)))
+    truth = make_law('sarosi')
+    k = int(np.argmin(np.abs(wide.force_strain - 0.05)))
+    strain = wide.force_strain[k]
+    slope = (truth.force_n(400e3, strain + 1e-4) - truth.force_n(400e3, strain - 1e-4)) / 2e-4
+    assert wide.force_u_n[i, k] == pytest.approx(abs(slope) * 0.005 / np.sqrt(3), rel=0.1)
+    # A contraction larger by u holds more air at one pressure: P(m, load) is lower by u_P.
+    j = 4
+    more = MUSCLE.air_mass_kg(400e3, wide.strain[i, j] + wide.strain_u[i, j])
+    law = make_law('lookup', wide.table())
+    moved = law.pressure_gauge_pa(more, wide.load_n[j]) - 400e3
+    assert wide.pressure_u_pa[i, j] == pytest.approx(moved, rel=0.15)
+    assert np.all(found.surfaces.pressure_u_pa < wide.pressure_u_pa.max())
+
+
+def test_no_load_is_extrapolated_from_a_small_one():
+    loads = [0.98, *np.arange(10.0, 151.0, 10.0)]
+    found = characterise_runs(series_of_runs(loads), MUSCLE)
+    truth = contraction_m(found.surfaces.pressure_gauge_pa, 0.0) / LENGTH_M
+    assert found.surfaces.load_n[0] == 0.0 and any('0 N' in line for line in found.remarks)
+    assert found.surfaces.strain[:, 0] == pytest.approx(truth, abs=1e-3)
+    assert found.surfaces.parts['reading'][:, 0].max() > 1e-5
+
+
+def test_a_load_that_friction_holds_is_left_out():
+    runs = series_of_runs(np.arange(10.0, 151.0, 10.0), half_m=1e-3)
+    stuck = stepped_run(1.0, half_m=8e-3)
+    found = characterise_runs([stuck, *runs], MUSCLE)
+    assert any('friction holds it' in line for line in found.remarks)
+    without = characterise_runs(runs, MUSCLE)
+    assert np.array_equal(found.surfaces.strain, without.surfaces.strain)
+
+
+def test_one_branch_is_enough_and_said():
+    runs = series_of_runs()
+    for run in runs:
+        for series in run.topics.values():
+            keep = series.time_s(run.start_ns) < 2.0 * LEVELS_PA.size
+            series.stamp_ns = series.stamp_ns[keep]
+            series.values = {key: value[keep] for key, value in series.values.items()}
+    found = characterise_runs(runs, MUSCLE)
+    assert any('one branch only' in line for line in found.remarks)
+    truth = against_rig(found.surfaces, load_rig('dmsp_5_300_hanging_mass'))
+    assert truth['rms_percent'] < 0.01
+
+
+def test_repetitions_of_a_load_are_put_together():
+    runs = series_of_runs([0.0, 30.0, 60.0]) + [stepped_run(30.1, seed=9)]
+    assert characterise_runs(runs, MUSCLE).surfaces.load_n.tolist() == [
+        0.0, 15.0, 30.0, 45.0, 60.0]
+
+
+def rig_text(**parameters):
+    return load_rig('dmsp_5_300_hanging_mass').with_(parameters=parameters).to_yaml()
+
+
+@pytest.mark.parametrize('runs, options, words', [
+    (lambda: [], {}, 'no recording'),
+    (lambda: series_of_runs([0.0, 50.0]), {}, '3 or more'),
+    (lambda: series_of_runs([50.0, 50.1, 50.2]), {}, 'differ by at least'),
+    (lambda: series_of_runs([60.0, 70.0, 80.0]), {}, 'too far from 0 N'),
+    (lambda: series_of_runs(levels_pa=np.array([0.0, 3e5])), {}, '3 or more'),
+    (lambda: series_of_runs(leave_out=('pressure',)), {}, 'no `pressure`'),
+    (lambda: series_of_runs([120.0, 0.0, 60.0], levels_pa=np.array([0.0, 10e3, 20e3])), {},
+     'does not contract'),
+    (lambda: series_of_runs(), {'loads_n': [1.0]}, '1 loads for 16'),
+    (lambda: series_of_runs(), {'load_step_n': 100.0}, 'load-step-n'),
+])
+def test_bad_recordings_are_refused_in_one_sentence(runs, options, words):
+    with pytest.raises(InputError, match=words) as mistake:
+        characterise_runs(runs(), MUSCLE, **options)
+    assert '\n' not in str(mistake.value)
+
+
+def test_recordings_of_different_muscles_or_of_none_are_refused():
+    runs = series_of_runs([0.0, 30.0, 60.0], metadata={'rig': rig_text()})
+    assert characterise_runs(runs).dimensions == MUSCLE
+    runs[1].metadata = {'rig': rig_text(V_dead=6e-6)}
+    with pytest.raises(InputError, match='different muscles'):
+        characterise_runs(runs)
+    with pytest.raises(InputError, match='--length-m'):
+        characterise_runs(series_of_runs([0.0, 30.0, 60.0]))
+
+
+def test_without_a_force_the_mass_of_the_rig_is_the_load():
+    runs = [stepped_run(9.80665 * mass, seed=k, leave_out=('force',),
+                        metadata={'rig': rig_text(mass_kg=mass)})
+            for k, mass in enumerate((0.1, 3.0, 6.0, 9.0))]
+    found = characterise_runs(runs)
+    assert [one.load_from for one in found.loads] == ['rig'] * 4
+    assert found.loads[1].load_n == pytest.approx(29.42, abs=0.01)

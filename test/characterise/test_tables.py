@@ -1,0 +1,120 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables measured by others: force maps and contraction tables."""
+
+from importlib import resources
+
+import numpy as np
+from pam_sim.characterise import characterise_table, Dimensions
+from pam_sim.characterise.tables import points_of_map, read_measured_table
+from pam_sim.errors import InputError
+from pam_sim.muscle.registry import make_law
+import pytest
+
+
+def write(path, head, rows):
+    path.write_text('# by hand\n' + head + '\n' + '\n'.join(
+        ','.join(str(cell) for cell in row) for row in rows) + '\n')
+    return read_measured_table(path)
+
+
+@pytest.fixture
+def contraction_table(tmp_path):
+    law = make_law('sarosi')
+    rows = [(p, load, 300.0 * law.max_strain(1e3 * p, load))
+            for load in (0.0, 40.0, 80.0, 120.0) for p in range(0, 601, 50)]
+    return write(tmp_path / 'table.csv', 'pressure_kPa,load_N,contraction_mm', rows)
+
+
+def test_a_contraction_table_gives_its_own_numbers_back(contraction_table):
+    assert contraction_table.kind == 'contraction table'
+    found = characterise_table(contraction_table, Dimensions(0.3, 0.005, 3e-6))
+    law = make_law('sarosi')
+    assert found.surfaces.load_n.tolist() == [0.0, 40.0, 80.0, 120.0]
+    truth = law.max_strain(found.surfaces.pressure_gauge_pa[:, None], found.surfaces.load_n)
+    assert found.surfaces.strain == pytest.approx(truth, abs=1e-6)
+    assert 'by hand' in found.table().source
+    assert len(found.derived) == 3
+
+
+def test_without_a_bore_there_is_no_air_and_that_is_said(contraction_table):
+    found = characterise_table(contraction_table, Dimensions(0.3))
+    assert found.derived == ['F(strain, P)', 'strain(P, load)']
+    assert any('bore' in line for line in found.remarks)
+    s = found.surfaces
+    k = int(np.argmin(np.abs(s.force_strain - 0.1)))
+    assert s.force_n[-1, k] == pytest.approx(make_law('sarosi').force_n(600e3, 0.1), abs=1.0)
+    # At rest only more than the largest load of 120 N would tell.
+    assert np.isnan(s.force_n[-1, 0])
+    with pytest.raises(InputError, match='bore'):
+        found.table()
+
+
+@pytest.mark.parametrize('name, length_m, bore_m', [
+    ('dmsp_10_250', 0.25, 0.01), ('dmsp_20_300', 0.3, 0.02)])
+def test_a_measured_force_map_is_followed_through_its_points(name, length_m, bore_m):
+    path = resources.files('pam_sim.muscle').joinpath(f'{name}_force_map.csv')
+    table = read_measured_table(path)
+    found = characterise_table(table, Dimensions(length_m, bore_m))
+    pressure, force = table.columns['pressure'], table.columns['force']
+    strain = 1.0 - table.columns['length'] / length_m
+    pulled = force > 0.0
+    law = make_law('lookup', found.table())
+    error = law.force_n(pressure, np.maximum(strain, 0.0), outside='allow') - force
+    # Through 16 loads, not through the points themselves.
+    assert np.sqrt(np.mean(error[pulled] ** 2)) < 0.02 * force.max()
+    assert 'Martens' in found.table().source
+
+
+def test_zeros_of_force_are_censored_and_leave_a_doubt(tmp_path):
+    rows = [(p, 1e-3 * length, max(0.0, p / 1e4 - 2.0 * (300 - length)))
+            for p in (200000, 400000, 600000) for length in (300, 290, 280, 250)]
+    table = write(tmp_path / 'map.csv', 'pressure_Pa,length_m,force_N', rows)
+    points = points_of_map(table, 0.3, np.array([0.0, 10.0, 20.0, 30.0]))
+    # 20 N at rest, nothing left at 10 mm, zeros from there on: between 0 and 10 mm.
+    assert 0.0 < points.strain[0, 0] <= 10 / 300 and points.reading[0, 0] > 0.003
+    # 60 - 2 x vanishes at 30 mm: beyond the last point that pulled, 20 mm; known to 20..50 mm.
+    assert points.strain[2, 0] == pytest.approx(0.1, abs=1e-6)
+    assert points.reading[2, 0] == pytest.approx(0.1 / np.sqrt(12.0))
+    assert points.strain[2, 2] == pytest.approx(20 / 300, abs=1e-6)
+
+
+@pytest.mark.parametrize('head, rows, words', [
+    ('pressure_kPa,load_N', [(1, 2)], 'length or contraction'),
+    ('pressure_psi,load_N,strain', [(1, 2, 0)], 'pressure_psi'),
+    ('pressure_kPa,load_N,strain', [(1, 'x', 0)], 'no number'),
+    ('pressure_kPa,load_N,strain', [(1, 2)], '2 cells'),
+    ('pressure_kPa,load_N,strain', [(-50, 2, 0)], 'gauge'),
+])
+def test_tables_that_say_too_little_are_refused(tmp_path, head, rows, words):
+    with pytest.raises(InputError, match=words):
+        write(tmp_path / 'bad.csv', head, rows)
+
+
+def test_tables_with_too_few_points_are_refused(tmp_path):
+    two = write(tmp_path / 'two.csv', 'pressure_kPa,length_m,force_N',
+                [(p, x, 50) for p in (100, 200) for x in (0.3, 0.28)])
+    with pytest.raises(InputError, match='3 pressures'):
+        characterise_table(two, Dimensions(0.3))
+    few = write(tmp_path / 'few.csv', 'pressure_kPa,load_N,strain',
+                [(p, load, 1e-4 * p) for p in (100, 200) for load in (0, 10, 20)])
+    with pytest.raises(InputError, match='fewer than 3 pressures'):
+        characterise_table(few, Dimensions(0.3))
+    with pytest.raises(InputError, match='impossible'):
+        characterise_table(two, Dimensions(0.2))
+    with pytest.raises(InputError, match='no such|cannot be read'):
+        read_measured_table(tmp_path / 'missing.csv')
+    with pytest.raises(InputError, match='allowed is'):
+        Dimensions(-0.3)

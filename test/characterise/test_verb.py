@@ -1,0 +1,126 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam characterise`` as a user meets it: bags and tables in, a folder out, exit codes."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+from pam_actuation.cli.main import main
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.load_series import LOADS_N, simulate_loads, with_sensor_noise
+from pam_actuation.report.svg import ticks
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.muscle.laws.lookup import SHIPPED
+from pam_sim.muscle.lookup_table import read_table
+from pam_sim.muscle.registry import make_law
+import pytest
+
+SHORT = """
+name: few_increments
+domain: pressure
+segments:
+  - rest: {duration_s: 2.0}
+  - increments: {to_pa: 701325.0, steps: 6, move_s: 0.7, hold_s: 1.4}
+  - increments: {to_pa: 101325.0, steps: 6, move_s: 0.7, hold_s: 1.4}
+"""
+MAP = SHIPPED.parent / 'dmsp_10_250_force_map.csv'
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """Return three simulated bags and the file of their experiment."""
+    folder = tmp_path_factory.mktemp('series')
+    experiment = folder / 'short.yaml'
+    experiment.write_text(SHORT)
+    rig = with_sensor_noise(load_rig('dmsp_5_300_hanging_mass'))
+    return simulate_loads(rig, folder, seed=3, loads_n=(0.0, 30.0, 60.0), jobs=1,
+                          experiment=str(experiment))
+
+
+def test_bags_become_a_table_numbers_figures_and_a_page(bags, tmp_path, capsys):
+    assert main(['characterise', *bags, '--out', str(tmp_path / 'out'), '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found['holds'] == 39 and found['holds_left_out'] == 0
+    assert found['measured_loads_n'] == pytest.approx([0.98, 30.0, 60.0], abs=0.02)
+    assert set(found['files']) == {
+        'lookup.csv', 'holds.csv', 'characterise.json', 'report.html', 'figure_4_2.svg',
+        'figure_4_6.svg', 'figure_4_7.svg'}
+    table = read_table(tmp_path / 'out' / 'lookup.csv')
+    truth = make_law('sarosi').max_strain(table.pressure_gauge_pa[:, None], table.load_n)
+    known = [0, 2, 4]          # measured; 15 and 45 N are interpolated between them
+    error = (table.strain - truth)[:, known]
+    assert 100.0 * np.sqrt(np.mean(error ** 2)) < 0.2
+    everything = json.loads((tmp_path / 'out' / 'characterise.json').read_text())
+    shape = (len(everything['pressure_gauge_pa']), len(everything['load_n']))
+    for name in ('strain', 'strain_u', 'pressure_u_pa', 'half_distance_strain'):
+        assert np.array(everything[name], dtype=float).shape == shape
+    for name in ('figure_4_2', 'figure_4_6', 'figure_4_7'):
+        text = (tmp_path / 'out' / f'{name}.svg').read_text()
+        assert ElementTree.fromstring(text).tag.endswith('svg') and len(text) < 200_000
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert page.count('<svg') >= 3 and 'src="http' not in page
+
+
+def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
+    assert main(['characterise', str(MAP), '--length-m', '0.25', '--out', str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert 'force map' in text and 'The bore is not known' in text
+    assert not (tmp_path / 'lookup.csv').exists() and (tmp_path / 'figure_4_7.svg').exists()
+    assert not (tmp_path / 'figure_4_6.svg').exists()
+
+
+@pytest.mark.parametrize('arguments, words', [
+    ([], 'give bags'),
+    ([str(MAP)], '--length-m'),
+    ([str(MAP), str(MAP), '--length-m', '0.25'], 'comes alone'),
+    ([str(MAP), '--simulate', 'dmsp_5_300_realistic'], 'takes no bags'),
+    (['--simulate', 'dmsp_5_300_isometric'], 'no hanging mass'),
+    (['--simulate', 'dmsp_5_300_realistic', '--experiment', 'step_10mm'], 'pressure domain'),
+    (['--simulate', 'dmsp_5_300_realistic', '--load-n', '0', '10', '5'], 'ascending'),
+    (['no_such_bag'], 'no_such_bag'),
+])
+def test_mistakes_are_one_sentence_and_write_nothing(arguments, words, tmp_path, capsys):
+    assert main(['characterise', *arguments, '--out', str(tmp_path / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count('\n') == 1
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_series_is_that_of_the_chapter_and_never_overwrites(bags, tmp_path):
+    assert LOADS_N == tuple(range(0, 151, 10))
+    (tmp_path / 'load_010_0_n').mkdir()
+    with pytest.raises(InputError, match='exists already'):
+        simulate_loads(load_rig('dmsp_5_300_hanging_mass'), tmp_path, loads_n=(0.0, 10.0, 20.0))
+    assert load_experiment('pressure_increments').domain == 'pressure'
+
+
+def test_noise_is_added_only_where_a_rig_has_none():
+    nominal = with_sensor_noise(load_rig('dmsp_5_300_hanging_mass'))
+    assert nominal.sensors == load_rig('dmsp_5_300_realistic').sensors
+    own = load_rig('dmsp_5_300_hanging_mass').with_(sensors={'pressure_noise_pa': 50.0})
+    assert with_sensor_noise(own).sensors == own.sensors
+
+
+@pytest.mark.parametrize('low, high', [(0.0, 1.0), (0.0, 19.94), (7.1, 87.0), (0.0, 600.0)])
+def test_ticks_are_round_and_inside(low, high):
+    found = ticks(low, high)
+    assert 3 <= found.size <= 12 and found[0] >= low and found[-1] <= high + 1e-9
+    steps = np.diff(found)
+    assert steps == pytest.approx(steps[0])
+    assert steps[0] / 10.0 ** np.floor(np.log10(steps[0]) + 1e-9) == pytest.approx(
+        min((1.0, 2.0, 2.5, 5.0), key=lambda k: abs(
+            k - steps[0] / 10.0 ** np.floor(np.log10(steps[0]) + 1e-9))))
