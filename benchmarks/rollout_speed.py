@@ -39,7 +39,7 @@ STEPS = 10_000
 STEP_S = 1e-3
 REPEATS = 40
 BATCH_RIGS, BATCH_RECORDS = 20, 10
-BATCH_REPEATS = 6
+BATCH_REPEATS = 12
 FIRST_CALLS = 6
 VALVES = (('PPR', 'ppr', 'averaged'), ('HSV averaged', 'hsv', 'averaged'),
           ('HSV switching', 'hsv', 'switching'))
