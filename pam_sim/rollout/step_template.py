@@ -416,52 +416,53 @@ def cell_force(external, state, par):
 
 
 @inlined
-def observe(force, a, state, par, out):
-    """Fill ``out`` from ``state`` and what ``cell_force`` returned for it."""
+def observe(force, a, state, par, out, o):
+    """Fill ``out[o…]`` from ``state`` and what ``cell_force`` returned for it."""
     p = state[S_PRESSURE]
     x = state[S_CONTRACTION]
-    out[OUT_TIME] = state[S_TIME]
-    out[OUT_VELOCITY] = state[S_VELOCITY]
+    out[o + OUT_TIME] = state[S_TIME]
+    out[o + OUT_VELOCITY] = state[S_VELOCITY]
     if par[PAR_VALVE] == VALVE_PPR:
-        out[OUT_AIR_MASS] = p * air_volume(p, x, state, par) * par[PAR_INVERSE_RT]
+        out[o + OUT_AIR_MASS] = p * air_volume(p, x, state, par) * par[PAR_INVERSE_RT]
     else:
-        out[OUT_AIR_MASS] = state[S_AIR_MASS]
-    out[OUT_SUPPLY] = state[S_SUPPLY]
-    out[OUT_TRUE_PRESSURE] = p
-    out[OUT_TRUE_CONTRACTION] = x
-    out[OUT_TRUE_FORCE] = force
-    out[OUT_FILLED] = state[S_FILLED]
-    out[OUT_VENTED] = state[S_VENTED]
-    out[OUT_ACCELERATION] = a
+        out[o + OUT_AIR_MASS] = state[S_AIR_MASS]
+    out[o + OUT_SUPPLY] = state[S_SUPPLY]
+    out[o + OUT_TRUE_PRESSURE] = p
+    out[o + OUT_TRUE_CONTRACTION] = x
+    out[o + OUT_TRUE_FORCE] = force
+    out[o + OUT_FILLED] = state[S_FILLED]
+    out[o + OUT_VENTED] = state[S_VENTED]
+    out[o + OUT_ACCELERATION] = a
     read_p, read_x, read_f = apply_sensor(p, x, force, state, par)
-    out[OUT_PRESSURE] = read_p
-    out[OUT_CONTRACTION] = read_x
-    out[OUT_FORCE] = read_f
+    out[o + OUT_PRESSURE] = read_p
+    out[o + OUT_CONTRACTION] = read_x
+    out[o + OUT_FORCE] = read_f
 
 
 @inlined
-def step_body(state, par, inp, out):
-    """Advance ``state`` by one step of ``par[PAR_DT]`` and fill ``out``."""
+def step_body(state, par, inp, i, out, o):
+    """Advance ``state`` by one step of ``par[PAR_DT]`` with ``inp[i…]`` and fill ``out[o…]``."""
     dt = par[PAR_DT]
-    signal_0, signal_1 = apply_command(inp[INP_SIGNAL_0], inp[INP_SIGNAL_1], dt, state, par)
+    signal_0, signal_1 = apply_command(
+        inp[i + INP_SIGNAL_0], inp[i + INP_SIGNAL_1], dt, state, par)
     count = int(par[PAR_SUBSTEPS])
     h = par[PAR_SUBSTEP]
     start = state[S_CONTRACTION]
-    travel = inp[INP_CONTRACTION] - start
+    travel = inp[i + INP_CONTRACTION] - start
     for j in range(count):
-        target = inp[INP_CONTRACTION] if j == count - 1 else start + travel * ((j + 1) / count)
-        physics_step(signal_0, signal_1, inp[INP_EXTERNAL_FORCE], target,
+        target = inp[i + INP_CONTRACTION] if j == count - 1 else start + travel * ((j + 1) / count)
+        physics_step(signal_0, signal_1, inp[i + INP_EXTERNAL_FORCE], target,
                      state[S_TIME] + j * h, state, par)
     state[S_STEPS] += 1.0
     state[S_TIME] = state[S_STEPS] * dt
-    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
+    force, a = cell_force(inp[i + INP_EXTERNAL_FORCE], state, par)
     apply_sensor_commit(
         state[S_PRESSURE], state[S_CONTRACTION], force, dt, state, par)
-    observe(force, a, state, par, out)
+    observe(force, a, state, par, out, o)
 
 
 @inlined
-def look_body(state, par, inp, out):
-    """Fill ``out`` from ``state`` without advancing anything."""
-    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
-    observe(force, a, state, par, out)
+def look_body(state, par, inp, i, out, o):
+    """Fill ``out[o…]`` from ``state`` without advancing anything."""
+    force, a = cell_force(inp[i + INP_EXTERNAL_FORCE], state, par)
+    observe(force, a, state, par, out, o)
