@@ -15,7 +15,6 @@
 """Model files and presets: YAML in, Rig out, and back."""
 
 from dataclasses import replace
-from importlib import resources
 import os
 
 from pam_sim.effects.registry import get_effect
@@ -23,6 +22,7 @@ from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
+from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import check_parameters
 from pam_sim.rig import EffectSetting, Rig, rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -30,18 +30,13 @@ from pam_sim.valve import hsv
 
 KEYS = ('name', 'rig', 'muscle', 'law', 'load', 'valve', 'fidelity', 'parameters', 'tolerance',
         'effects', 'sensors')
+_PRESETS = NamedFiles('presets')
 _MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
 
 
 def preset_names():
     """Return the names of the presets, sorted."""
-    return sorted(item.name[:-5] for item in resources.files('pam_sim.presets').iterdir()
-                  if item.name.endswith('.yaml'))
-
-
-def _preset(name):
-    text = resources.files('pam_sim.presets').joinpath(f'{name}.yaml').read_text('utf-8')
-    return load_yaml(text, name=f'{name}.yaml')
+    return _PRESETS.names()
 
 
 def load_rig(source, valve=None, fidelity=None):
@@ -70,7 +65,7 @@ def load_rig(source, valve=None, fidelity=None):
     elif isinstance(source, Located):
         rig = _from_mapping(source, None, ())
     elif isinstance(source, str) and source in preset_names():
-        rig = _from_mapping(_preset(source), source, (source,))
+        rig = _from_mapping(_PRESETS.read(source), source, (source,))
     elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
             and ': ' not in source and not source.endswith(('.yaml', '.yml')):
         raise InputError(f'rig `{source}` is neither a preset nor a file; presets: '
@@ -93,7 +88,7 @@ def _from_mapping(data, name, seen):
         base_name = data.require('rig', str, choices=preset_names())
         if base_name in seen:
             raise data.error(f'`{base_name}` is made from itself', 'rig')
-        base = _from_mapping(_preset(base_name), base_name, (*seen, base_name))
+        base = _from_mapping(_PRESETS.read(base_name), base_name, (*seen, base_name))
         for key in ('muscle', 'load'):
             if key in data:
                 raise data.error(f'`{key}` is given by `rig: {base_name}`', key)

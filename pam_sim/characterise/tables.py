@@ -21,15 +21,14 @@ table: gauge pressure, load and contraction. Lines that begin with ``#`` are
 kept as the source.
 """
 
-import csv
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pam_sim.characterise.fixed_load import FixedLoad
 from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
 from pam_sim.errors import InputError
+from pam_sim.muscle.lookup_table import read_commented_csv
 from scipy.interpolate import PchipInterpolator
 
 # Column name in lower case -> (quantity, factor to SI).
@@ -72,13 +71,7 @@ def read_measured_table(path):
         negative pressure.
 
     """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding='utf-8').splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
-    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
-    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith('#')))
+    rows, source = read_commented_csv(path)
     head = [name.strip().lower() for name in rows[0]] if rows else []
     unknown = [name for name in head if name not in COLUMNS and name != 'branch']
     if not rows:

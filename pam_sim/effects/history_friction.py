@@ -34,16 +34,18 @@ Trans. Automatic Control 45(4). It depends on the travel alone, not on the rate.
 import math
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.loop_level import (
+    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
 from pam_sim.parameters import Parameter
 
 _DEPTH = 8              # turning points remembered, the start included
-_FORCE, _PER_PA, _ATMOSPHERE, _INVERSE_WIDTH, _DRY = range(5)
+_INVERSE_WIDTH, _DRY = range(LEVEL_SLOTS, LEVEL_SLOTS + 2)
 _COUNT, _DIRECTION, _X, _H = range(4)       # then x, h of the next turn, and so on
 
 
 def _pack(values, numbers):
-    return (values['force_n'], values['force_per_pa'], numbers.parameters['p_atm'],
+    return (*pack_level(values, numbers),
             1.0 / values['width_m'], values['dry_share'])
 
 
@@ -63,21 +65,16 @@ EFFECT = Effect(
     equation='F -= (F0 + k_p p_g) (d sgn(v) + (1 - d) h), '
              'h = h_t + 2 sgn(dx) (1 - exp(-|x - x_t| / 2 W)) since the turn (x_t, h_t)',
     parameters=(
-        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
-                  description='Full friction at zero gauge pressure.'),
-        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
-                  description='Growth of the full friction with gauge pressure.'),
+        *level_parameters('full friction'),
         Parameter('width_m', 'm', 0.75e-3, 1e-5, 2e-2,
                   description='Travel W in which friction builds up.'),
         Parameter('dry_share', '-', 0.3, 0.0, 1.0,
                   description='Share d that acts against the motion at once.'),
     ),
-    amplitude=('force_n', 'force_per_pa'),
-    reported=(Reported(
-        'loop_half_width_at_400kpa_n', 'N',
-        lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),),
+    amplitude=LEVEL_AMPLITUDE,
+    reported=LOOP_REPORTED,
     states=2 + 2 * _DEPTH,
-    slots=5,
+    slots=LEVEL_SLOTS + 2,
     pack=_pack,
     initial=_initial,
 )
@@ -139,7 +136,7 @@ def travelled(x_m, dx_m, state, i, inverse_width):
 @compiled
 def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
     """Return the friction level with the dry share added."""
-    full = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    full = loop_level_n(pressure_pa, par, k)
     return level_n + par[k + _DRY] * max(full, 0.0)
 
 
@@ -147,7 +144,7 @@ def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state
 def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
                  state, i, par, k):
     """Return the force less the share with memory."""
-    full = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    full = loop_level_n(pressure_pa, par, k)
     if full <= 0.0:
         return force_n
     h, _, _, _ = travelled(contraction_m, dx_m, state, i, par[k + _INVERSE_WIDTH])

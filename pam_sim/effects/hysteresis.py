@@ -22,14 +22,16 @@ Automatic Control 50(11); for muscles Vo-Minh et al. (2011), Mechatronics 21.
 """
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.loop_level import (
+    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
 from pam_sim.parameters import Parameter
 
 # Break-away travel and weight of each element, design values.
 WIDTHS_M = (0.1e-3, 0.4e-3, 1.2e-3, 3.0e-3)
 WEIGHTS = (0.25, 0.30, 0.25, 0.20)
 _ELEMENTS = len(WIDTHS_M)
-_FORCE, _PER_PA, _ATMOSPHERE, _TABLE = range(4)
+_TABLE = LEVEL_SLOTS
 
 
 def _pack(values, numbers):
@@ -37,7 +39,7 @@ def _pack(values, numbers):
     table = []
     for width, weight in zip(WIDTHS_M, WEIGHTS):
         table += [1.0 / (width * scale), weight]
-    return (values['force_n'], values['force_per_pa'], numbers.parameters['p_atm'], *table)
+    return (*pack_level(values, numbers), *table)
 
 
 EFFECT = Effect(
@@ -48,19 +50,14 @@ EFFECT = Effect(
     source='Maxwell slip, Al-Bender et al. 2005; Vo-Minh et al. 2011.',
     equation='F -> F - (F_0 + k_p p_g) sum_j w_j z_j, dz_j = dx / W_j clipped to -1 <= z_j <= 1',
     parameters=(
-        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
-                  description='Half width of the loop at zero gauge pressure.'),
-        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
-                  description='Growth of the half width with gauge pressure.'),
+        *level_parameters(),
         Parameter('width_scale', '-', 1.0, 0.1, 10.0,
                   description='Scale of the break-away travels 0.1, 0.4, 1.2, 3.0 mm.'),
     ),
-    amplitude=('force_n', 'force_per_pa'),
-    reported=(Reported(
-        'loop_half_width_at_400kpa_n', 'N',
-        lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),),
+    amplitude=LEVEL_AMPLITUDE,
+    reported=LOOP_REPORTED,
     states=_ELEMENTS,
-    slots=3 + 2 * _ELEMENTS,
+    slots=LEVEL_SLOTS + 2 * _ELEMENTS,
     pack=_pack,
 )
 
@@ -69,7 +66,7 @@ EFFECT = Effect(
 def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
                  state, i, par, k):
     """Return the force less the slip elements' share at travel ``dx_m`` from the step start."""
-    level = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    level = loop_level_n(pressure_pa, par, k)
     if level <= 0.0:
         return force_n
     total = 0.0

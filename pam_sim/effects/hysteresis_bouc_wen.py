@@ -26,16 +26,18 @@ large one does not close on itself, unlike Maxwell slip.
 """
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.loop_level import (
+    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
 from pam_sim.parameters import Parameter
 
-_FORCE, _PER_PA, _ATMOSPHERE, _INVERSE_WIDTH, _EXPONENT, _BACK = range(6)
+_INVERSE_WIDTH, _EXPONENT, _BACK = range(LEVEL_SLOTS, LEVEL_SLOTS + 3)
 _LONGEST = 0.05         # of one midpoint step, in widths: z is good to 0.002
 _FAR = 20.0             # widths after which z no longer depends on where it began
 
 
 def _pack(values, numbers):
-    return (values['force_n'], values['force_per_pa'], numbers.parameters['p_atm'],
+    return (*pack_level(values, numbers),
             1.0 / values['width_m'], values['exponent'], 2.0 * values['sigma'] - 1.0)
 
 
@@ -49,10 +51,7 @@ EFFECT = Effect(
            'and Rodellar (2007). Sizes: design values.',
     equation='F -= (F0 + k_p p_g) z, W dz = dx (1 - |z|^n (sigma sgn(z dx) + 1 - sigma))',
     parameters=(
-        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
-                  description='Half width of the loop at zero gauge pressure.'),
-        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
-                  description='Growth of the half width with gauge pressure.'),
+        *level_parameters(),
         Parameter('width_m', 'm', 0.8e-3, 1e-5, 2e-2,
                   description='Travel in which the force would be up at its initial slope.'),
         Parameter('exponent', '-', 1.0, 1.0, 5.0,
@@ -60,12 +59,10 @@ EFFECT = Effect(
         Parameter('sigma', '-', 0.5, 0.5, 1.0,
                   description='Slope after a reversal; 0.5 is a straight return to zero.'),
     ),
-    amplitude=('force_n', 'force_per_pa'),
-    reported=(Reported(
-        'loop_half_width_at_400kpa_n', 'N',
-        lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),),
+    amplitude=LEVEL_AMPLITUDE,
+    reported=LOOP_REPORTED,
     states=1,
-    slots=6,
+    slots=LEVEL_SLOTS + 3,
     pack=_pack,
 )
 
@@ -97,7 +94,7 @@ def loaded(z, widths, exponent, back):
 def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
                  state, i, par, k):
     """Return the force less the loop's share at travel ``dx_m`` from the step start."""
-    level = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    level = loop_level_n(pressure_pa, par, k)
     if level <= 0.0:
         return force_n
     return force_n - level * loaded(

@@ -32,14 +32,16 @@ instead of closing.
 import math
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.loop_level import (
+    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
 from pam_sim.parameters import Parameter
 
-_FORCE, _PER_PA, _ATMOSPHERE, _STIFFNESS, _DAMPING, _EXCESS, _INVERSE_SPEED = range(7)
+_STIFFNESS, _DAMPING, _EXCESS, _INVERSE_SPEED = range(LEVEL_SLOTS, LEVEL_SLOTS + 4)
 
 
 def _pack(values, numbers):
-    return (values['force_n'], values['force_per_pa'], numbers.parameters['p_atm'],
+    return (*pack_level(values, numbers),
             values['stiffness_n_per_m'], values['bristle_damping_n_s_per_m'],
             values['static_ratio'] - 1.0, 1.0 / values['stribeck_m_per_s'])
 
@@ -55,10 +57,7 @@ EFFECT = Effect(
     equation='F -= sigma0 z + sigma1 dz/dt, dz/dt = v - sigma0 |v| z / g, '
              'g = (F0 + k_p p_g) (1 + (s - 1) exp(-(v / v_s)^2))',
     parameters=(
-        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
-                  description='Sliding friction at zero gauge pressure.'),
-        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
-                  description='Growth of the sliding friction with gauge pressure.'),
+        *level_parameters('sliding friction'),
         Parameter('stiffness_n_per_m', 'N/m', 2.2e3, 10.0, 1e7,
                   description='Stiffness sigma0 of the bristles.'),
         Parameter('bristle_damping_n_s_per_m', 'N s/m', 5.0, 0.0, 200.0,
@@ -68,12 +67,10 @@ EFFECT = Effect(
         Parameter('stribeck_m_per_s', 'm/s', 2e-3, 1e-4, 1.0,
                   description='Speed v_s at which the friction falls to the sliding one.'),
     ),
-    amplitude=('force_n', 'force_per_pa'),
-    reported=(Reported(
-        'loop_half_width_at_400kpa_n', 'N',
-        lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),),
+    amplitude=LEVEL_AMPLITUDE,
+    reported=LOOP_REPORTED,
     states=1,
-    slots=7,
+    slots=LEVEL_SLOTS + 4,
     pack=_pack,
 )
 
@@ -81,7 +78,7 @@ EFFECT = Effect(
 @compiled
 def bending_when_sliding(pressure_pa, velocity_m_per_s, par, k):
     """Return the bristles' bending [m] in steady sliding, g / sigma0; 0 without friction."""
-    level = par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    level = loop_level_n(pressure_pa, par, k)
     if level <= 0.0:
         return 0.0
     square = (velocity_m_per_s * par[k + _INVERSE_SPEED]) ** 2

@@ -14,7 +14,6 @@
 
 """Model files and presets of joints: YAML in, JointRig out, and back."""
 
-from importlib import resources
 import os
 
 from pam_sim.errors import InputError
@@ -22,23 +21,16 @@ from pam_sim.joint.parameters import NAME, PARAMETERS
 from pam_sim.joint.rig import JointRig, SIDES
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 from pam_sim.model_file import load_rig
+from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import check_parameters
 
+_PRESETS = NamedFiles('joint/presets')
 KEYS = ('name', 'joint', 'load', 'flexor', 'extensor', 'parameters')
-
-
-def _presets():
-    return resources.files('pam_sim.joint').joinpath('presets')
 
 
 def joint_preset_names():
     """Return the names of the presets, sorted."""
-    return sorted(item.name[:-5] for item in _presets().iterdir() if item.name.endswith('.yaml'))
-
-
-def _preset(name):
-    text = _presets().joinpath(f'{name}.yaml').read_text('utf-8')
-    return load_yaml(text, name=f'{name}.yaml')
+    return _PRESETS.names()
 
 
 def load_joint(source, valve=None, fidelity=None):
@@ -67,7 +59,7 @@ def load_joint(source, valve=None, fidelity=None):
     elif isinstance(source, Located):
         joint = _from_mapping(source, None)
     elif isinstance(source, str) and source in joint_preset_names():
-        joint = _from_mapping(_preset(source), source)
+        joint = _from_mapping(_PRESETS.read(source), source)
     elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
             and ': ' not in source and not source.endswith(('.yaml', '.yml')):
         raise InputError(f'joint `{source}` is neither a preset nor a file; presets: '

@@ -105,6 +105,25 @@ class LookupTable:
         os.replace(temporary, path)
 
 
+def read_commented_csv(path):
+    """
+    Return (rows, text of the ``#`` lines) of a CSV file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read as text.
+
+    """
+    try:
+        lines = Path(path).read_text(encoding='utf-8').splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
+    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
+    return list(csv.reader(
+        line for line in lines if line.strip() and not line.startswith('#'))), source
+
+
 def read_table(path):
     """
     Return the LookupTable of a CSV file with the header of ``COLUMNS``; ``#`` lines are source.
@@ -115,13 +134,7 @@ def read_table(path):
         File missing, wrong columns, not a number, or points missing from the grid.
 
     """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding='utf-8').splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
-    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
-    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith('#')))
+    rows, source = read_commented_csv(path)
     if not rows or tuple(rows[0]) != COLUMNS:
         raise InputError(f'first row must be {",".join(COLUMNS)}', str(path))
     try:

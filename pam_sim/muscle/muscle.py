@@ -26,13 +26,14 @@ from pathlib import Path
 
 import numpy as np
 from pam_sim.errors import InputError
-from pam_sim.located_yaml import load_yaml, Located
+from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
 from pam_sim.muscle.lookup_table import LookupTable, read_table
 from pam_sim.muscle.registry import make_law
+from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import Parameter
 
-_FOLDER = Path(__file__).parent / 'sizes'
+_SIZES = NamedFiles('muscle/sizes')
 DIMENSIONS = (
     Parameter('length_m', 'm', 0.300, 0.02, 9.0, 0.0, 'Length at rest, L0.', 'chapter'),
     Parameter('bore_m', 'm', 0.005, 0.001, 0.1, 0.0, 'Inner diameter at rest.', 'chapter'),
@@ -159,7 +160,7 @@ class Muscle:
 
 def muscle_names():
     """Return the names of the muscles there are, sorted."""
-    return sorted(path.stem for path in _FOLDER.glob('*.yaml'))
+    return _SIZES.names()
 
 
 @lru_cache(maxsize=None)
@@ -175,7 +176,7 @@ def get_muscle(name):
     """
     if name not in muscle_names():
         raise InputError(f'muscle `{name}` is not known; allowed: {", ".join(muscle_names())}')
-    return read_muscle(load_yaml(_FOLDER / f'{name}.yaml'), name)
+    return read_muscle(_SIZES.read(name), name)
 
 
 def read_muscle(data, name='muscle'):

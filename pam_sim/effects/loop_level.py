@@ -1,0 +1,52 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The level of friction that the effects with a loop share: F_h = F0 + k_p p_g.
+
+An effect lists ``level_parameters`` first, packs ``pack_level`` first, and finds its own
+packed values from ``par[k + LEVEL_SLOTS]`` on.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Reported
+from pam_sim.parameters import Parameter
+
+LEVEL_AMPLITUDE = ('force_n', 'force_per_pa')
+LEVEL_SLOTS = 3
+_FORCE, _PER_PA, _ATMOSPHERE = range(LEVEL_SLOTS)
+LOOP_REPORTED = (Reported(
+    'loop_half_width_at_400kpa_n', 'N',
+    lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),)
+
+
+def level_parameters(what='half width of the loop'):
+    """Return the two Parameters of the level, for people called ``what``."""
+    return (
+        Parameter('force_n', 'N', 0.5, 0.0, 50.0,
+                  description=f'{what.capitalize()} at zero gauge pressure.'),
+        Parameter('force_per_pa', 'N/Pa', 4.5e-6, 0.0, 2e-4,
+                  description=f'Growth of the {what} with gauge pressure.'),
+    )
+
+
+def pack_level(values, numbers):
+    """Return the packed values of the level."""
+    return values['force_n'], values['force_per_pa'], numbers.parameters['p_atm']
+
+
+@compiled
+def loop_level_n(pressure_pa, par, k):
+    """Return the level [N] at an absolute pressure [Pa]; it may be negative far below one bar."""
+    return par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])

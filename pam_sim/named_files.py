@@ -1,0 +1,45 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Presets: YAML files of one folder of the package, each found by its name."""
+
+from pathlib import Path
+
+from pam_sim.located_yaml import load_yaml
+
+_HERE = Path(__file__).parent
+
+
+class NamedFiles:
+    """
+    The YAML files of a folder.
+
+    Parameters
+    ----------
+    folder : str
+        Inside this package.
+
+    """
+
+    def __init__(self, folder):
+        self._folder = _HERE / folder
+
+    def names(self):
+        """Return the names, sorted."""
+        return sorted(path.stem for path in self._folder.glob('*.yaml'))
+
+    def read(self, name):
+        """Return the content of a file as a Located mapping."""
+        path = self._folder / f'{name}.yaml'
+        return load_yaml(path.read_text(encoding='utf-8'), name=path.name)
