@@ -26,6 +26,7 @@ import io
 import numpy as np
 
 SIZE_IN = (7.5, 5.0)
+MESHES = (32, 20)           # at most along a surface's rows and columns: files stay small
 INK, SOFT, RULE = '#1c2126', '#5c6670', '#d9dee3'
 # Text stays text; the fixed salt and the missing date make equal figures equal files.
 STYLE = {
@@ -90,7 +91,7 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
     ----------
     x, y, z : ndarray, shape (M, N)
         Corners of the surface's meshes, in the units of the axes; of a fine grid
-        only every second, third, … line is drawn.
+        (see ``MESHES``) only every second, third, … line is drawn.
     titles : tuple of str
         Titles of x, y and z with units.
     title : str
@@ -103,8 +104,8 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
         axes = figure.add_axes((0.0, 0.03, 1.0, 1.0), projection='3d', azim=turn_deg,
                                elev=tilt_deg, proj_type='ortho')
         axes.set_box_aspect((4.0, 4.0, 3.0), zoom=1.0)
-        surface = axes.plot_surface(x, y, z, cmap='viridis', edgecolor=(0.0, 0.0, 0.0, 0.3),
-                                    linewidth=0.3)
+        surface = axes.plot_surface(x, y, z, rcount=MESHES[0], ccount=MESHES[1], cmap='viridis',
+                                    edgecolor=(0.0, 0.0, 0.0, 0.3), linewidth=0.3)
         surface.set_gid('surface')
         for name, values, words in zip('xyz', (x, y, z), titles):
             low, high = np.nanmin(values), np.nanmax(values)

@@ -105,7 +105,8 @@ def test_the_law_finds_it_by_name_and_a_rig_takes_it():
 def test_the_figures_of_the_documents_show_this_table(again, name):
     page = (FIGURE_FOLDER / f'characterise_{name[7:]}.svg').read_text(encoding='utf-8')
     printed, drawn = Picture(page), Picture(FIGURES[name](again.surfaces))
-    assert len(page) < 200_000 and printed.words() == drawn.words()
+    assert len(page) < 200_000
+    assert sorted(printed.words()) == sorted(drawn.words())
     assert printed.distance(drawn) < 1e-3
     other = replace(again.surfaces, strain=1.1 * again.surfaces.strain + 0.002,
                     air_mass_kg=again.surfaces.air_mass_kg ** 1.1)

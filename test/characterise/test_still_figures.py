@@ -62,6 +62,12 @@ def test_what_is_not_known_of_a_surface_is_left_out():
     assert sorted(corners) == [3] * 5 + [4] * 15
 
 
+def test_a_fine_grid_becomes_a_small_file():
+    x, y = np.meshgrid(np.linspace(0.0, 150.0, 40), np.linspace(0.0, 600.0, 64))
+    text = surface_chart(x, y, x * y, TITLES, 'fine')
+    assert len(Picture(text).shapes('surface')) == 32 * 20 and len(text) < 300_000
+
+
 def test_lines_dots_and_bars_are_read_off_the_axes():
     x = np.linspace(0.0, 20.0, 30)
     points = np.array([[2.0, 90.0, 0.5], [15.0, 40.0, 1.5]])
