@@ -64,6 +64,11 @@ TEST_REQUIRES = [
     'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
 ]
 
+# Only to compare speeds; nothing in the package imports it.
+BENCH_REQUIRES = [
+    'mujoco>=3.2',
+]
+
 
 def shared_files():
     """Return (target folder, files) pairs that put SHARED_FOLDERS below share/pam_actuation."""
@@ -92,7 +97,7 @@ setup(
     ],
     python_requires='>=3.11,<3.13',
     install_requires=RUN_REQUIRES,
-    extras_require={'ros': ROS_REQUIRES, 'test': TEST_REQUIRES},
+    extras_require={'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',
     maintainer_email='pam_actuation@example.org',

@@ -26,3 +26,8 @@ from numba import njit
 compiled = njit(error_model='numpy', nogil=True, _nrt=False)
 # For the few functions on the path of every step: no call is left of them.
 inlined = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)
+
+
+def interpreted(function):
+    """Return the Python function behind a compiled one: for a single call, not worth compiling."""
+    return getattr(function, 'py_func', function)

@@ -17,7 +17,7 @@
 import numpy as np
 from pam_sim.rollout import layout
 
-_COLUMNS = {
+COLUMNS = {
     'time_s': layout.OUT_TIME,
     'pressure_pa': layout.OUT_PRESSURE,
     'contraction_m': layout.OUT_CONTRACTION,
@@ -58,8 +58,9 @@ class Response:
 
     """
 
-    def __init__(self, outputs):
+    def __init__(self, outputs, columns=COLUMNS):
         self.outputs = outputs
+        self._columns = columns     # name -> column of what was kept
 
     def __len__(self):
         """Return the number of samples, N + 1."""
@@ -67,14 +68,15 @@ class Response:
 
     def __getattr__(self, name):
         """Return a signal by name."""
-        if name in _COLUMNS:
-            return self.outputs[:, _COLUMNS[name]]
+        if name != '_columns' and name in self._columns:
+            return self.outputs[:, self._columns[name]]
         raise AttributeError(name)
 
     def __dir__(self):
         """List the signals too."""
-        return [*super().__dir__(), *_COLUMNS]
+        return [*super().__dir__(), *self._columns]
 
     def as_dict(self):
         """Return name -> ndarray of all signals."""
-        return {name: np.ascontiguousarray(self.outputs[:, c]) for name, c in _COLUMNS.items()}
+        return {name: np.ascontiguousarray(self.outputs[:, column])
+                for name, column in self._columns.items()}

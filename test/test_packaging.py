@@ -186,6 +186,16 @@ def test_ros_wheels_are_an_extra_only(setup_keywords):
     assert all(r.startswith('ros-jazzy-') for r in setup_keywords['extras_require']['ros'])
 
 
+def test_benchmarks_need_no_more_than_their_extra(setup_keywords):
+    bench = requirement_names(setup_keywords['extras_require']['bench'])
+    assert not bench & requirement_names(setup_keywords['install_requires'])
+    page = (ROOT / 'docs' / 'dependencies.md').read_text(encoding='utf-8')
+    assert all(f'| {name} |' in page for name in bench)
+    own = {path.stem for path in (ROOT / 'benchmarks').glob('*.py')} | {'pam_sim'}
+    allowed = bench | requirement_names(setup_keywords['install_requires'])
+    assert set(imported_modules('benchmarks')) - own <= allowed
+
+
 def test_only_nodes_import_ros():
     package = ROOT / 'pam_actuation'
     # The session that starts the nodes has one node of its own, to talk to them.

@@ -54,7 +54,7 @@ th:first-child, td:first-child { text-align: left; }
 thead th { color: var(--soft); font-weight: 600; }
 table.facts td { text-align: left; overflow-wrap: anywhere; } table.facts td:first-child {
   color: var(--soft); white-space: nowrap; }
-td.text, th.text { text-align: left; }
+td.text, th.text, table.words th, table.words td { text-align: left; }
 .plot { width: 100%; margin: 4px 0 0; } figure { margin: 8px 0 4px; }
 details { margin: .5rem 0; } summary { cursor: pointer; color: var(--accent); }
 pre { overflow-x: auto; font-size: .82rem; background: var(--bg); padding: 10px; margin: 6px 0;

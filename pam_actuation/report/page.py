@@ -124,7 +124,14 @@ def render(title, lead, sections, numbers=(), footer=''):
             f'<header class="top"><h1>{text(title)}</h1>{paragraph(lead, "lead")}'
             f'<nav>{links}</nav>{key_numbers(numbers) if numbers else ""}</header>'
             f'<main>{"".join(parts)}</main><footer>{text(footer)}</footer>'
-            f'<script>{plotly_script()}</script><script>{SCRIPT}</script></body></html>\n')
+            f'{_drawing(sections)}</body></html>\n')
+
+
+def _drawing(sections):
+    """Return the scripts that draw the plots; a page without plots carries none."""
+    if not any('class="plot"' in section.body for section in sections):
+        return ''
+    return f'<script>{plotly_script()}</script><script>{SCRIPT}</script>'
 
 
 def plotly_script():

@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='The rubber tube resists contraction like a spring beside the braid.',
     source='Linear parallel spring; size: design choice.',
+    equation='F -> F - k x',
     parameters=(
         Parameter('stiffness_n_per_m', 'N/m', 200.0, -2e3, 1e4,
                   description='Parallel stiffness, relaxed at zero contraction.'),

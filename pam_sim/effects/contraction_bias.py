@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The contraction reading is off by a constant.',
     source='Zero error of a sensor; size: design choice.',
+    equation='x_read = x + b',
     parameters=(
         Parameter('bias_m', 'm', 0.2e-3, -0.02, 0.02, description='Offset of the reading.'),
     ),

@@ -30,6 +30,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The contraction sensor follows its signal with a lag of its own.',
     source='First order filter of a sensor; size: design choice.',
+    equation='x_read = y, tau dy/dt = x - y',
     parameters=(
         Parameter('time_constant_s', 's', 0.010, 0.0, 1.0, description='Lag of the sensor.'),
     ),

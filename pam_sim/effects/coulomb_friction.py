@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='Dry friction inside the muscle holds it until the force exceeds a constant level.',
     source="Coulomb's law of friction.",
+    equation='F -> F - F_f, |F_f| <= F_c at rest, F_f = F_c sign(v) sliding',
     parameters=(
         Parameter('force_n', 'N', 2.0, 0.0, 50.0, description='Friction level.'),
     ),

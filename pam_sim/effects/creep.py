@@ -49,6 +49,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='At constant pressure the muscle goes on moving for seconds: the rubber relaxes.',
     source='Generalised Maxwell solid with two branches.',
+    equation='F -> F - sum_j k_j (x - q_j), dq_j/dt = (x - q_j) / tau_j, j = 1, 2',
     parameters=(
         Parameter('stiffness_1_n_per_m', 'N/m', 57.0, 0.0, 5e3,
                   description='Relaxing spring of the fast branch.'),

@@ -25,6 +25,7 @@ EFFECT = Effect(
     sentence='Tube and fittings hold more air than modelled: the same flow changes the pressure '
              'less.',
     source='Ideal gas; the parameter V_dead by another name.',
+    equation='V -> V + V_extra',
     parameters=(
         Parameter('extra_volume_m3', 'm3', 2e-6, 0.0, 1e-3, description='Volume not modelled.'),
     ),

@@ -16,7 +16,6 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
 from pam_sim.parameters import check_parameters
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
@@ -179,10 +178,10 @@ class Effect:
             par[k - 1:k + self.slots] = 0.0
             return
         par[k - 1] = 1.0
-        par[k:k + self.slots] = np.asarray(self.pack(values, numbers), dtype=float)
-        first = np.asarray(self.initial(values, numbers), dtype=float)
-        state[i:i + self.states] = 0.0
+        par[k:k + self.slots] = self.pack(values, numbers)
+        first = self.initial(values, numbers)
         state[i:i + len(first)] = first
+        state[i + len(first):i + self.states] = 0.0
 
     def report(self, values, rig):
         """Return reported name -> (value, unit) for a rig."""

@@ -34,6 +34,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='The tapered ends shorten the part that contracts: force falls faster with strain.',
     source='Tondu and Lopez (2000), IEEE Control Systems Magazine 20(2), parameter k.',
+    equation='F(p, eps) -> F(p, k eps), k = 1 + k_minus_1',
     parameters=(
         Parameter('k_minus_1', '-', 0.05, -0.3, 1.0, description='Strain factor less one.'),
     ),

@@ -55,6 +55,8 @@ EFFECT = Effect(
     subsystem='valve',
     sentence='The regulator cannot fill or vent faster than choked flow allows.',
     source='ISO 6358, b = 0.3; model of an electro-pneumatic regulator with orifice flow caps.',
+    equation='-r_v G(p, p_atm) <= dp/dt <= r_f G(p_s, p), G = g V400 / (g400 V), g(p1, p2) '
+             '= p1 psi(p2 / p1), b = 0.3',
     parameters=(
         Parameter('fill_rate_at_400kpa_pa_per_s', 'Pa/s', 1.5e6, 0.0, 1e9,
                   description='Highest filling rate at 400 kPa gauge and 10 mm; 0 for no limit.'),

@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The force reading is off by a constant.',
     source='Zero error of a sensor; size: design choice.',
+    equation='F_read = F_cell + b',
     parameters=(
         Parameter('bias_n', 'N', 1.0, -50.0, 50.0, description='Offset of the reading.'),
     ),

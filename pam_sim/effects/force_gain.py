@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The force reading is off by a factor.',
     source='Scale error of a sensor; size: design choice.',
+    equation='F_read = (1 + e) F_cell',
     parameters=(
         Parameter('gain_error', '-', 0.02, -0.5, 1.0, description='Scale less one.'),
     ),

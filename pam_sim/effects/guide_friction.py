@@ -24,6 +24,8 @@ EFFECT = Effect(
     subsystem='load',
     sentence='Dry friction of rail or joint holds the load; the load cell reads it.',
     source="Coulomb's law of friction.",
+    equation='m dv/dt = F - c v - m g - F_ext - F_guide, |F_guide| <= F_c at rest, F_guide '
+             '= F_c sign(v) sliding; F_cell -> F_cell + F_guide',
     parameters=(
         Parameter('force_n', 'N', 2.0, 0.0, 50.0, description='Friction level of the guide.'),
     ),

@@ -46,6 +46,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='The force depends on the path: presliding friction of the braid with memory.',
     source='Maxwell slip, Al-Bender et al. 2005; Vo-Minh et al. 2011.',
+    equation='F -> F - (F_0 + k_p p_g) sum_j w_j z_j, dz_j = dx / W_j clipped to -1 <= z_j <= 1',
     parameters=(
         Parameter('force_n', 'N', 0.5, 0.0, 50.0,
                   description='Half width of the loop at zero gauge pressure.'),

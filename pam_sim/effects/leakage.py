@@ -50,6 +50,8 @@ EFFECT = Effect(
     subsystem='valve',
     sentence='Air escapes from the muscle or a fitting.',
     source='ISO 6358 orifice to the atmosphere.',
+    equation='mdot_leak = C rho0 p psi(p_atm / p), b = 0.5; dp/dt -> dp/dt - R T mdot_leak '
+             '/ (V + V_dead)',
     parameters=(
         Parameter('conductance_m3_per_s_pa', 'm3/(s Pa)', 2.0e-13, 0.0, 1e-9,
                   description='Sonic conductance of the leak.'),

@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='load',
     sentence='A spring beside the mass pulls against contraction; the load cell reads it.',
     source='Linear spring; size: design choice.',
+    equation='m dv/dt = F - c v - m g - F_ext - k x, F_cell -> F_cell + k x',
     parameters=(
         Parameter('stiffness_n_per_m', 'N/m', 300.0, 0.0, 1e4,
                   description='Stiffness of the spring.'),

@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The pressure reading is off by a constant.',
     source='Zero error of a sensor; size: design choice.',
+    equation='p_read = p + b',
     parameters=(
         Parameter('bias_pa', 'Pa', 2e3, -100e3, 100e3, description='Offset of the reading.'),
     ),

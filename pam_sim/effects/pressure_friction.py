@@ -34,6 +34,7 @@ EFFECT = Effect(
     sentence='Dry friction inside the muscle grows with pressure.',
     source='Tondu and Lopez (2000), IEEE Control Systems Magazine 20(2): contact pressure times '
            'a constant friction coefficient.',
+    equation='F -> F - F_f, |F_f| <= F400 p_g / 400 kPa at rest, equal to it against v sliding',
     parameters=(
         Parameter('force_at_400kpa_n', 'N', 2.0, 0.0, 100.0,
                   description='Friction level at 400 kPa gauge.'),

@@ -25,6 +25,7 @@ EFFECT = Effect(
     subsystem='sensor',
     sentence='The gauge pressure reading is off by a factor.',
     source='Scale error of a sensor; size: design choice.',
+    equation='p_read = p_atm + (1 + e) p_g',
     parameters=(
         Parameter('gain_error', '-', 0.02, -0.5, 1.0, description='Scale less one.'),
     ),

@@ -52,6 +52,8 @@ EFFECT = Effect(
     subsystem='valve',
     sentence='The supply pressure falls with use until a compressor refills the reservoir.',
     source='Mass balance of the reservoir; two-point control of the compressor (design values).',
+    equation='V_r dp_s/dt = R T (mdot_compressor - mdot_fill), compressor on below p_s0 - '
+             'band, off at p_s0',
     parameters=(
         Parameter('reservoir_volume_m3', 'm3', 1e-3, 0.0, 10.0,
                   description='Volume of the reservoir; 0 for a supply that does not fall.'),

@@ -36,6 +36,7 @@ REFERENCE_MASS_KG = 8e-5
 CV = GAS_CONSTANT_AIR / (GAMMA - 1.0)
 _CONDUCTANCE, _AMBIENT_RT = range(2)        # hA / cv [kg/s]; R T_0 [J/kg]
 _RT, _STAGE = range(2)                      # R T at the start and at a stage of the step
+_SMALL_LOSS = 0.02
 
 
 def _pack(values, numbers):
@@ -54,6 +55,8 @@ EFFECT = Effect(
              'heat.',
     source='First law for an open volume, e.g. Richer and Hurmuzlu (2000), ASME J. Dynamic '
            'Systems, Measurement, and Control 122(3).',
+    equation='d(m cv T)/dt = mdot_fill cp T_0 - mdot_vent cp T - p dV/dt + hA (T_0 - T), hA '
+             '= m_ref cv / tau',
     parameters=(
         Parameter('heat_exchange_time_s', 's', 0.2, 0.0, 1e3,
                   description='Time constant of the heat exchange at 8e-5 kg; 0 is isothermal.'),
@@ -84,12 +87,16 @@ def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
         inflow_kg_per_s + (GAMMA - 1.0) * outflow_kg_per_s + par[k + _CONDUCTANCE]) + (
         GAMMA - 1.0) * 2.0 * (volume_m3 - start_m3) / (volume_m3 + start_m3)
     source = share * (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT]
-    decay = math.exp(-loss)
-    mean = 1.0 - 0.5 * loss
-    if abs(loss) > 1e-6:
-        mean = (1.0 - decay) / loss
-    state[i + _STAGE] = before * decay + source * mean
-    return state[i + _STAGE]
+    if abs(loss) < _SMALL_LOSS:
+        # (1 - exp(-loss)) / loss as a series, to the last bits; in pairs, which need not wait.
+        square = loss * loss
+        mean = (1.0 - loss * (1.0 / 2.0)) + square * (
+            (1.0 / 6.0 - loss * (1.0 / 24.0)) + square * (1.0 / 120.0 - loss * (1.0 / 720.0)))
+    else:
+        mean = (1.0 - math.exp(-loss)) / loss
+    after = before + (source - loss * before) * mean
+    state[i + _STAGE] = after
+    return after
 
 
 @compiled

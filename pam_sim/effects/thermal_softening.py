@@ -43,6 +43,7 @@ EFFECT = Effect(
     sentence='The force gain falls over minutes as the muscle works and warms.',
     source='Design choice of form and size: drift over long cycling is reported qualitatively, '
            'about -0.1 % of force per kelvin.',
+    equation='F -> (1 - a w) F, tau dw/dt = |v| / (20 mm/s) - w',
     parameters=(
         Parameter('gain_loss_at_20mm_per_s', '-', 0.02, -0.2, 0.5,
                   description='Share of the force lost in the steady state of 20 mm/s.'),

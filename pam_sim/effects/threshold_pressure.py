@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='Part of the pressure only brings the bladder to the braid and gives no force.',
     source='Radial expansion of the bladder, e.g. Davis et al. (2003), Int. J. Robotics Research.',
+    equation='F(p_g, eps) -> F(p_g - p_th, eps)',
     parameters=(
         Parameter('pressure_pa', 'Pa', 10e3, -100e3, 200e3, description='Pressure without force.'),
     ),

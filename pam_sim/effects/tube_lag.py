@@ -43,6 +43,7 @@ EFFECT = Effect(
     sentence='Line or pilot stage add a lag of their own between command and flow.',
     source='First order lag; pilot stage of an electro-pneumatic regulator, tube of 1-2 m '
            '(design value).',
+    equation='tau dy/dt = u - y, y for u (PPR: set point; HSV: opening of each valve)',
     parameters=(
         Parameter('time_constant_s', 's', 0.020, 0.0, 1.0, description='Extra time constant.'),
     ),

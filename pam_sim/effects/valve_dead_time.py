@@ -41,7 +41,10 @@ def _pack(values, numbers):
 
 def _initial(values, numbers):
     signal = tuple(numbers.signal) + (0.0, 0.0)
-    return np.repeat([0.0, signal[0], signal[1]], (1, SLOTS, SLOTS))
+    remembered = np.zeros(1 + 2 * SLOTS)
+    remembered[1:1 + SLOTS] = signal[0]
+    remembered[1 + SLOTS:] = signal[1]
+    return remembered
 
 
 EFFECT = Effect(
@@ -50,6 +53,7 @@ EFFECT = Effect(
     subsystem='valve',
     sentence='The valve answers a command only after a pure delay.',
     source='Transport delay; 20-50 ms measured on electro-pneumatic regulators.',
+    equation='u(t) -> u(t - L); HSV: d_f and d_v likewise',
     parameters=(
         Parameter('delay_s', 's', 0.030, 0.0, 0.5, description='Delay from command to pressure.'),
     ),

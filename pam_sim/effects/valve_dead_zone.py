@@ -40,6 +40,8 @@ EFFECT = Effect(
     sentence='The valve ignores small commands: threshold of a regulator, opening and closing '
              'times of switching valves.',
     source='Valve overlap; switching times of MHE2-class valves 1.7 ms and 2.0 ms.',
+    equation='PPR: T_m dp_g/dt = e - clip(e, -w, w), e = K_m u - p_g; HSV: open from t_open '
+             'to d T_pwm + t_close, shut if d T_pwm <= t_open',
     parameters=(
         Parameter('half_width_pa', 'Pa', 0.0, 0.0, 100e3,
                   description='PPR: distance of set point and pressure that does not move it.'),

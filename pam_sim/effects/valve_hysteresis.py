@@ -33,6 +33,7 @@ EFFECT = Effect(
              'came.',
     source='Play operator, e.g. Visintin (1994), Differential Models of Hysteresis; size: design '
            'value, below 0.5 % of full scale.',
+    equation='p_set -> y, y = clip(y_before, p_set - w, p_set + w)',
     parameters=(
         Parameter('half_width_pa', 'Pa', 2e3, 0.0, 100e3, description='Half of the play.'),
     ),

@@ -23,6 +23,14 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.parameters import Parameter
 
+_RATIO, _INVERSE = range(2)
+
+
+def _pack(values, numbers):
+    ratio = 1.0 + values['ratio_minus_1']
+    return ratio, 1.0 / ratio
+
+
 EFFECT = Effect(
     name='vent_asymmetry',
     family='valve_nonlinearity',
@@ -30,6 +38,8 @@ EFFECT = Effect(
     sentence='Venting takes longer than filling.',
     source='Design choice of form; measured on proportional valves with muscles: falling steps '
            '1.5 to 2 times slower than rising ones.',
+    equation='PPR: T_m -> r T_m while p > p_set; HSV: mdot_vent -> mdot_vent / r; '
+             'r = 1 + ratio_minus_1',
     parameters=(
         Parameter('ratio_minus_1', '-', 0.4, -0.5, 9.0,
                   description='Time of venting over time of filling, less one.'),
@@ -37,6 +47,8 @@ EFFECT = Effect(
     amplitude=('ratio_minus_1',),
     reported=(Reported(
         'vent_to_fill_time_ratio', '-', lambda values, rig: 1.0 + values['ratio_minus_1']),),
+    slots=2,
+    pack=_pack,
     order=60,               # after what changes the set point
 )
 
@@ -45,11 +57,11 @@ EFFECT = Effect(
 def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
     """Return the time constant longer while venting."""
     if set_point_pa < pressure_pa:
-        return set_point_pa, time_constant_s * (1.0 + par[k])
+        return set_point_pa, time_constant_s * par[k + _RATIO]
     return set_point_pa, time_constant_s
 
 
 @compiled
 def valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, i, par, k):
     """Return the vent flow smaller."""
-    return fill_kg_per_s, vent_kg_per_s / (1.0 + par[k])
+    return fill_kg_per_s, vent_kg_per_s * par[k + _INVERSE]

@@ -24,6 +24,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='The muscle resists fast motion more (or less) than the nominal damping says.',
     source='Linear damper; the parameter damping_n_s_per_m by another name.',
+    equation='F -> F - c v',
     parameters=(
         Parameter('damping_n_s_per_m', 'N s/m', 20.0, -200.0, 1000.0,
                   description='Damping on top of the nominal one.'),

@@ -15,6 +15,9 @@
 """Contraction prescribed over time; the load cell reads the force the muscle transmits."""
 
 NAME = 'driven'
+SENTENCE = 'The contraction is prescribed over time; the muscle pulls on what moves it.'
+EQUATION = 'x = x(t) given, F_cell = F - c v'
+SOURCE = 'Prescribed motion; the cell reads what the muscle transmits.'
 MOVES_FREELY = False
 NEEDS_CONTRACTION = True
 

@@ -22,6 +22,10 @@ from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'hanging_mass'
+SENTENCE = 'A mass hangs on the muscle on a vertical rail, between inelastic end stops.'
+EQUATION = ('m dv/dt = F - c v - m g - F_ext for 0 < x < max_strain L0, '
+            'F_cell = m (dv/dt + g) + F_ext')
+SOURCE = 'Rig of the chapter, Fig. 4.5; Newton.'
 MOVES_FREELY = True
 NEEDS_CONTRACTION = False
 

@@ -17,6 +17,9 @@
 from pam_sim.parameters import Parameter
 
 NAME = 'isometric'
+SENTENCE = 'Both ends are held: the contraction is constant and the muscle only pulls.'
+EQUATION = 'x = contraction_m, v = 0, F_cell = F'
+SOURCE = 'Prescribed length; the cell reads what the muscle transmits.'
 MOVES_FREELY = False
 NEEDS_CONTRACTION = False
 

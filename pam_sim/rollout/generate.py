@@ -50,6 +50,7 @@ from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.muscle.registry import laws
 from pam_sim.rollout.layout import *
+from pam_sim.rollout.step_template import step_body as nominal_step_body
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
@@ -63,13 +64,16 @@ _TAIL = '''
 @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def step(state, par, inp, out):
     """Advance ``state`` by one step and fill ``out`` (see pam_sim.rollout.layout)."""
-    step_body(state, par, inp, out)
+    if par[PAR_BEYOND_NOMINAL] > 0.0:
+        step_body(state, par, inp, out)
+    else:
+        nominal_step_body(state, par, inp, out)
 
 
 @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def look(state, par, inp, out):
     """Fill ``out`` from ``state`` without a step."""
-    observe(state, par, inp, out)
+    look_body(state, par, inp, out)
 
 
 @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
@@ -126,10 +130,14 @@ def rollout(state, par, inputs, outputs):
         inp[j] = inputs[0, j]
     look(state, par, inp, out)
     outputs[0, :] = out
+    nominal = par[PAR_BEYOND_NOMINAL] == 0.0
     for i in range(inputs.shape[0]):
         for j in range(INP_SIZE):
             inp[j] = inputs[i, j]
-        step(state, par, inp, out)
+        if nominal:                 # in line: the call would cost a tenth of the step
+            nominal_step_body(state, par, inp, out)
+        else:
+            step(state, par, inp, out)
         for j in range(OUT_SIZE):
             outputs[i + 1, j] = out[j]
 '''
@@ -185,6 +193,7 @@ def _law_dispatchers():
 
 def _dispatchers():
     places, _, _ = effect_layout()
+    # Flags are 0 or 1; `> 0.0` is one branch, `!= 0.0` two, as it must tell NaN.
     lines = []
     for name, effect in registry.effects().items():
         for hook in effect.hooks:
@@ -201,7 +210,7 @@ def _dispatchers():
             for name, (k, i) in users:
                 own = ', '.join(arguments[:-2] + ['state', str(i), 'par', str(k)])
                 assign = f'{result} = ' if returned else ''
-                lines += [f'    if par[{k - 1}] != 0.0:',
+                lines += [f'    if par[{k - 1}] > 0.0:',
                           f'        {assign}_{name}_{hook}({own})']
             if returned:
                 lines.append(f'    return {result}')
@@ -209,13 +218,13 @@ def _dispatchers():
         lines += ['', '', '@inlined', f'def apply_{hook}({given}):']
         if users:
             give_back = 'return ' if returned else ''
-            lines += [f'    if par[{hook_flag(hook)}] != 0.0:',
+            lines += [f'    if par[{hook_flag(hook)}] > 0.0:',
                       f'        {give_back}_run_{hook}({given})']
         if returned or not users:
             lines.append(f'    return {result}' if returned else '    pass')
-    for hook in ('pressure_rate', 'valve_flow', 'air_rt'):
+    for hook in ('pressure_rate', 'valve_flow', 'mass_flow', 'air_rt'):
         lines += ['', '', '@inlined', f'def {hook}_active(par):',
-                  f'    return par[{hook_flag(hook)}] != 0.0']
+                  f'    return par[{hook_flag(hook)}] > 0.0']
     return '\n'.join(lines + _law_dispatchers()) + '\n'
 
 
@@ -231,7 +240,8 @@ def kernel_hash():
     digest = hashlib.sha256()
     digest.update(f'{sys.version_info[:2]} {numba.__version__}'.encode())
     digest.update(kernel_source().encode())
-    files = [_PACKAGE / 'compiled.py', _PACKAGE / 'rollout' / 'layout.py']
+    files = [_PACKAGE / 'compiled.py', _PACKAGE / 'rollout' / 'layout.py',
+             _PACKAGE / 'rollout' / 'hooks.py']
     for folder in ('muscle', 'valve', 'load'):
         files += sorted((_PACKAGE / folder).glob('*.py'))
     for path in files + law_files() + registry.effect_files():

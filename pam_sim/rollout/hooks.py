@@ -119,6 +119,12 @@ def apply_mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state,
 
 
 @inlined
+def mass_flow_active(par):
+    """Return whether any effect changes the net flow (else it is that of the valves)."""
+    return False
+
+
+@inlined
 def apply_volume(volume_m3, pressure_pa, contraction_m, state, par):
     """Return the air volume [m^3]."""
     return volume_m3

@@ -91,7 +91,9 @@ PAR_INVERSE_MASS = 24       # 1/kg
 PAR_INVERSE_RT = 25         # kg/J
 PAR_LAW = 26                # which force law, see generate.law_codes
 PAR_LAW_DAMPER = 27         # 1: the law has a damper of its own
-PAR_BASE = 28
+PAR_LAW_PLACE = 28          # where in par the numbers of the law begin
+PAR_BEYOND_NOMINAL = 29     # 1: an effect acts or the law is another than the nominal one
+PAR_BASE = 30
 
 VALVE_PPR = 0
 VALVE_HSV_AVERAGED = 1

@@ -18,8 +18,9 @@ from dataclasses import replace
 import math
 
 import numpy as np
+from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.rollout import kernel, layout
@@ -31,6 +32,7 @@ from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
 _PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
 _LAW_CODES = law_codes()
+_FLAGS = {name: [hook_flag(hook) for hook in effect.hooks] for name, effect in effects().items()}
 
 
 def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
@@ -55,11 +57,11 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
 def _pack_effects(rig, numbers, state, par):
     for setting in rig.effects:
         k, i = _PLACES[setting.name]
-        effect = get_effect(setting.name)
-        effect.pack_into(setting.parameters, numbers, par, k, state, i)
+        effects()[setting.name].pack_into(setting.parameters, numbers, par, k, state, i)
         if par[k - 1] != 0.0:
-            for hook in effect.hooks:
-                par[hook_flag(hook)] = 1.0
+            par[layout.PAR_BEYOND_NOMINAL] = 1.0
+            for place in _FLAGS[setting.name]:
+                par[place] = 1.0
 
 
 def _numbers(rig, dt_s, pressure, contraction, signal):
@@ -108,7 +110,7 @@ def _substep(rig, dt_s):
         return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
     smallest = rig.volume_m3(0.0)
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
-    slope = flow_function(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
+    slope = interpreted(flow_function)(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
     rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
     count = max(1, math.ceil(dt_s * max(rate / 0.5, fastest)))
     if rig.fidelity == 'switching':
@@ -155,6 +157,8 @@ def _pack_base(rig, numbers, state, par):
             (layout.PAR_INVERSE_MASS, 1.0 / mass),
             (layout.PAR_INVERSE_RT, 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K)),
             (layout.PAR_LAW, _LAW_CODES[muscle.law.name]),
+            (layout.PAR_LAW_PLACE, _PAR_SIZE),
+            (layout.PAR_BEYOND_NOMINAL, _LAW_CODES[muscle.law.name] != 0.0),
             (layout.PAR_LAW_DAMPER, type(muscle.law.law).COMPILED_DAMPER is not None)):
         par[index] = number
     state[layout.S_PRESSURE] = numbers.pressure_pa

@@ -33,16 +33,23 @@ STRAIN_RANGE = (-0.05, 0.5)
 
 def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
     """Return the Response; arguments and errors as of ``Rig.simulate``."""
-    inputs, start = input_array(rig, valve_signal, external_force_n, contraction_m)
-    if start is not None and initial.get('initial_contraction_m') is None:
-        initial = {**initial, 'initial_contraction_m': start}
-    state, par = rig.pack(dt_s=dt_s, **initial)
-    if start is None:
-        inputs[:, layout.INP_CONTRACTION] = state[layout.S_CONTRACTION]
+    state, par, inputs = prepare(
+        rig, valve_signal, external_force_n, contraction_m, dt_s, initial)
     outputs = np.empty((len(inputs) + 1, layout.OUT_SIZE))
     kernel.rollout(state, par, inputs, outputs)
     check_outputs(rig, outputs)
     return Response(outputs)
+
+
+def prepare(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
+    """Return (state, par, inputs) of a rollout; arguments and errors as of ``Rig.simulate``."""
+    inputs, start = input_array(rig, valve_signal, external_force_n, contraction_m)
+    if start is not None and initial.get('initial_contraction_m') is None:
+        initial = {**initial, 'initial_contraction_m': start}
+    state, par = rig.pack(dt_s=dt_s, **initial)
+    if start is None and not LOADS[rig.load].MOVES_FREELY:
+        inputs[:, layout.INP_CONTRACTION] = state[layout.S_CONTRACTION]
+    return state, par, inputs
 
 
 def check_outputs(rig, outputs):

@@ -38,19 +38,20 @@ from pam_sim.rollout.hooks import (
     apply_flow_opening, apply_load_force, apply_load_friction, apply_map_input,
     apply_map_output, apply_mass_flow, apply_muscle_force, apply_muscle_friction, apply_opening,
     apply_pressure_rate, apply_sensor, apply_sensor_commit, apply_set_point, apply_supply,
-    apply_switch_times, apply_valve_flow, apply_volume, pressure_rate_active, valve_flow_active)
+    apply_switch_times, apply_valve_flow, apply_volume, mass_flow_active, pressure_rate_active,
+    valve_flow_active)
 from pam_sim.rollout.layout import (
     INP_CONTRACTION, INP_EXTERNAL_FORCE, INP_SIGNAL_0, INP_SIGNAL_1, OUT_ACCELERATION,
     OUT_AIR_MASS, OUT_CONTRACTION, OUT_FILLED, OUT_FORCE, OUT_PRESSURE, OUT_SUPPLY, OUT_TIME,
     OUT_TRUE_CONTRACTION, OUT_TRUE_FORCE, OUT_TRUE_PRESSURE, OUT_VELOCITY, OUT_VENTED,
-    PAR_ATMOSPHERE, PAR_BASE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
+    PAR_ATMOSPHERE, PAR_CONDUCTANCE, PAR_CRITICAL_RATIO, PAR_DAMPING, PAR_DEAD_VOLUME,
     PAR_DECAY_HALF, PAR_DT, PAR_FORCE_GAIN, PAR_FREE_LOAD, PAR_GAIN_PPR, PAR_INVERSE_4_PI_N2,
-    PAR_INVERSE_LENGTH, PAR_INVERSE_MASS, PAR_INVERSE_RT, PAR_LAW_DAMPER, PAR_LENGTH, PAR_MASS,
-    PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP, PAR_SUBSTEPS, PAR_SUPPLY,
-    PAR_THREAD_SQUARED, PAR_TIME_CONSTANT, PAR_VALVE, PAR_WEIGHT, S_AIR_MASS, S_CONTRACTION,
-    S_DIRECTION, S_FILL_OFF, S_FILL_ON, S_FILLED, S_MUSCLE_FORCE, S_PERIOD, S_PRESSURE,
-    S_STEPS, S_SUPPLY, S_TIME, S_VELOCITY, S_VENT_OFF, S_VENT_ON, S_VENTED, VALVE_HSV_AVERAGED,
-    VALVE_PPR)
+    PAR_INVERSE_LENGTH, PAR_INVERSE_MASS, PAR_INVERSE_RT, PAR_LAW_DAMPER, PAR_LAW_PLACE,
+    PAR_LENGTH, PAR_MASS, PAR_MAX_CONTRACTION, PAR_PWM_PERIOD, PAR_RT, PAR_SUBSTEP,
+    PAR_SUBSTEPS, PAR_SUPPLY, PAR_THREAD_SQUARED, PAR_TIME_CONSTANT, PAR_VALVE, PAR_WEIGHT,
+    S_AIR_MASS, S_CONTRACTION, S_DIRECTION, S_FILL_OFF, S_FILL_ON, S_FILLED, S_MUSCLE_FORCE,
+    S_PERIOD, S_PRESSURE, S_STEPS, S_SUPPLY, S_TIME, S_VELOCITY, S_VENT_OFF, S_VENT_ON,
+    S_VENTED, VALVE_HSV_AVERAGED, VALVE_PPR)
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
@@ -59,7 +60,7 @@ from pam_sim.valve.ppr import set_point_pa
 @inlined
 def law_tension(gauge, strain, par):
     """Return the value of the force law [N], negative where it would push."""
-    return tension_n(gauge, strain, par, PAR_BASE)
+    return tension_n(gauge, strain, par, int(par[PAR_LAW_PLACE]))
 
 
 @inlined
@@ -94,7 +95,7 @@ def map_tension(p, x, state, par):
 def muscle_force(tension, p, x, v, dx, elapsed, state, par):
     """Return the force the muscle transmits [N], its dry friction excepted."""
     force = tension - par[PAR_DAMPING] * v
-    if par[PAR_LAW_DAMPER] != 0.0 and tension > 0.0:
+    if par[PAR_LAW_DAMPER] > 0.0 and tension > 0.0:
         force -= law_damper(
             v, p - par[PAR_ATMOSPHERE], x * par[PAR_INVERSE_LENGTH], par)
     return apply_muscle_force(force, p, x, v, dx, elapsed, state, par)
@@ -124,10 +125,14 @@ def valve_flows(fill, vent, p, supply, altered, state, par):
 
 
 @inlined
-def pressure_per_kg(mass, inflow, net, p, volume, elapsed, state, par):
-    """Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p."""
+def pressure_per_kg(mass, inflow, net, p, volume, per_m3, elapsed, state, par):
+    """
+    Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p.
+
+    ``per_m3`` is 1 / V, which is known before the flows are.
+    """
     return apply_air_rt(
-        par[PAR_RT], mass, inflow, inflow - net, p, volume, elapsed, state, par) / volume
+        par[PAR_RT], mass, inflow, inflow - net, p, volume, elapsed, state, par) * per_m3
 
 
 @inlined
@@ -215,7 +220,7 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     x0 = state[S_CONTRACTION]
     v0 = state[S_VELOCITY]
     p0 = state[S_PRESSURE]
-    free = par[PAR_FREE_LOAD] != 0.0
+    free = par[PAR_FREE_LOAD] > 0.0
     inverse_mass = par[PAR_INVERSE_MASS]
     top = par[PAR_MAX_CONTRACTION]
     supply = apply_supply(par[PAR_SUPPLY], state, par)
@@ -251,10 +256,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
     fill = 0.0
     vent = 0.0
     altered = False
+    flowing = False
     warm = False
     mass0 = 0.0
-    gained = 0.0
-    filled = 0.0
+    net_flow = 0.0
+    inflow = 0.0
     q1 = 0.0
     q2 = 0.0
     q3 = 0.0
@@ -272,20 +278,25 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         mass0 = state[S_AIR_MASS]
         altered = valve_flow_active(par)
         warm = air_rt_active(par)
-        in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
-        q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
+        # Both valves shut and no air lost: the mass stays, and no stage needs a flow.
+        flowing = fill > 0.0 or vent > 0.0 or altered or mass_flow_active(par)
+        if flowing:
+            in1, out1 = valve_flows(fill, vent, p0, supply, altered, state, par)
+            q1 = apply_mass_flow(in1 - out1, p0, x0, supply, state, par)
         volume = air_volume(p0, x_mid, state, par)
-        density = par[PAR_RT] / volume                                 # Pa/kg
+        per_m3 = 1.0 / volume
+        density = par[PAR_RT] * per_m3                                 # Pa/kg
         if warm:
-            density = pressure_per_kg(mass0, in1, q1, p0, volume, g, state, par)
+            density = pressure_per_kg(mass0, in1, q1, p0, volume, per_m3, g, state, par)
         p_mid = (mass0 + g * q1) * density
-        in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
-        q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
-        if warm:
-            density = pressure_per_kg(mass0, in2, q2, p0, volume, g, state, par)
-        p_mid = (mass0 + g * q2) * density
-        in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
-        q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
+        if flowing:
+            in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
+            q2 = apply_mass_flow(in2 - out2, p_mid, x_mid, supply, state, par)
+            if warm:
+                density = pressure_per_kg(mass0, in2, q2, p0, volume, per_m3, g, state, par)
+            p_mid = (mass0 + g * q2) * density
+            in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, state, par)
+            q3 = apply_mass_flow(in3 - out3, p_mid, x_mid, supply, state, par)
     a_mid = 0.0
     if moving:
         v_mid = v0 + g * a0
@@ -314,22 +325,24 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
         x1 = min(max(x1, 0.0), top)
     if not is_ppr:
         volume = air_volume(p_mid, x1, state, par)
-        density = par[PAR_RT] / volume
+        per_m3 = 1.0 / volume
+        density = par[PAR_RT] * per_m3
         if warm:
-            density = pressure_per_kg(mass0, in3, q3, p0, volume, h, state, par)
+            density = pressure_per_kg(mass0, in3, q3, p0, volume, per_m3, h, state, par)
         p_end = (mass0 + h * q3) * density
-        in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
-        q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
-        gained = sixth * (q1 + 2.0 * (q2 + q3) + q4)
-        filled = sixth * (in1 + 2.0 * (in2 + in3) + in4)
-        mass1 = mass0 + gained
-        state[S_AIR_MASS] = mass1
-        state[S_FILLED] += filled
-        state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
-        if warm:
-            density = pressure_per_kg(
-                mass0, filled / h, gained / h, p0, volume, h, state, par)
-        p_end = mass1 * density
+        if flowing:
+            in4, out4 = valve_flows(fill, vent, p_end, supply, altered, state, par)
+            q4 = apply_mass_flow(in4 - out4, p_end, x1, supply, state, par)
+            net_flow = (q1 + 2.0 * (q2 + q3) + q4) * (1.0 / 6.0)
+            inflow = (in1 + 2.0 * (in2 + in3) + in4) * (1.0 / 6.0)
+            mass1 = mass0 + h * net_flow
+            state[S_AIR_MASS] = mass1
+            state[S_FILLED] += h * inflow
+            state[S_VENTED] += sixth * (out1 + 2.0 * (out2 + out3) + out4)
+            if warm:
+                density = pressure_per_kg(
+                    mass0, inflow, net_flow, p0, volume, per_m3, h, state, par)
+            p_end = mass1 * density
     tension = map_tension(p_end, x1, state, par)
     if moving:
         dx = x1 - x0
@@ -362,10 +375,11 @@ def physics_step(signal_0, signal_1, external, x_target, time_s, state, par):
                 tension = map_tension(p_end, x1, state, par)
             if not is_ppr:
                 volume = air_volume(p_end, x1, state, par)
-                density = par[PAR_RT] / volume
+                per_m3 = 1.0 / volume
+                density = par[PAR_RT] * per_m3
                 if warm:
                     density = pressure_per_kg(
-                        mass0, filled / h, gained / h, p0, volume, h, state, par)
+                        mass0, inflow, net_flow, p0, volume, per_m3, h, state, par)
                 p_end = state[S_AIR_MASS] * density
     state[S_PRESSURE] = p_end
     state[S_CONTRACTION] = x1
@@ -402,11 +416,10 @@ def cell_force(external, state, par):
 
 
 @inlined
-def observe(state, par, inp, out):
-    """Fill ``out`` from ``state`` without advancing anything."""
+def observe(force, a, state, par, out):
+    """Fill ``out`` from ``state`` and what ``cell_force`` returned for it."""
     p = state[S_PRESSURE]
     x = state[S_CONTRACTION]
-    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
     out[OUT_TIME] = state[S_TIME]
     out[OUT_VELOCITY] = state[S_VELOCITY]
     if par[PAR_VALVE] == VALVE_PPR:
@@ -444,4 +457,11 @@ def step_body(state, par, inp, out):
     force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
     apply_sensor_commit(
         state[S_PRESSURE], state[S_CONTRACTION], force, dt, state, par)
-    observe(state, par, inp, out)
+    observe(force, a, state, par, out)
+
+
+@inlined
+def look_body(state, par, inp, out):
+    """Fill ``out`` from ``state`` without advancing anything."""
+    force, a = cell_force(inp[INP_EXTERNAL_FORCE], state, par)
+    observe(force, a, state, par, out)

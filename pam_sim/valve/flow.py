@@ -65,9 +65,15 @@ def mass_flow_kg_per_s(upstream_pa, downstream_pa, conductance_kg_per_s_pa, crit
         b of ISO 6358.
 
     """
-    choked = conductance_kg_per_s_pa * upstream_pa
     if downstream_pa <= critical_ratio * upstream_pa:
-        return choked
+        return conductance_kg_per_s_pa * upstream_pa
     if downstream_pa >= upstream_pa:
         return 0.0
-    return choked * flow_function(downstream_pa / upstream_pa, critical_ratio)
+    # p1 psi(p2 / p1) in factors, 1 - ((r - b) / (1 - b))^2 = (1 - r) (1 - 2 b + r) / (1 - b)^2:
+    # no quotient of pressures, which every stage of a step would wait for.
+    scale = conductance_kg_per_s_pa / (1.0 - critical_ratio)
+    drop_pa = upstream_pa - downstream_pa
+    twice = 1.0 - 2.0 * critical_ratio
+    if downstream_pa < RATIO_LINEAR * upstream_pa:
+        return scale * math.sqrt(drop_pa * (twice * upstream_pa + downstream_pa))
+    return scale * math.sqrt((twice + RATIO_LINEAR) / (1.0 - RATIO_LINEAR)) * drop_pa

@@ -24,6 +24,10 @@ from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'hsv'
+SENTENCE = 'Pair of high-speed on/off valves: one fills from the supply, one vents.'
+EQUATION = ('dp/dt = (R T (d_f mdot(p_s, p) - d_v mdot(p, p_atm)) - p dV/dt) / (V + V_dead), '
+            'mdot(p1, p2) = C rho0 p1 sqrt(T0 / T) psi(p2 / p1)')
+SOURCE = 'ISO 6358-1:2013 (choked and unchoked flow); mass balance of an isothermal ideal gas.'
 SIGNAL_NAMES = ('fill_duty', 'vent_duty')
 FIDELITIES = ('averaged', 'switching')
 SWITCHING_STEP_S = 1e-4

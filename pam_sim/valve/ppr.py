@@ -24,6 +24,9 @@ from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'ppr'
+SENTENCE = 'Proportional pressure regulator: the pressure follows the command voltage with a lag.'
+EQUATION = 'T_m dp_g/dt = K_m sat(u, 0, 6 V) - p_g'
+SOURCE = 'Situm and Herceg 2008 (first order lag of command and pressure).'
 SIGNAL_NAMES = ('ppr_voltage',)
 MAX_VOLTAGE_V = 6.0
 # Beyond 6 V the regulator saturates; beyond these a number is no voltage of such a valve.

@@ -1,0 +1,57 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam models``: the laws, valves, loads, effects, sensors and rigs the simulator knows."""
+
+from pam_actuation.cli.common import emit, EXIT_DONE
+
+HELP = 'List muscle laws, valves, loads and effects with equations, parameters and sources.'
+EXAMPLE = 'pam models hysteresis'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('name', nargs='?', default=None, help='show this entry in full')
+    parser.add_argument('--html', metavar='FILE', default=None,
+                        help='write all entries as one HTML page')
+    parser.add_argument('--markdown', metavar='FILE', default=None,
+                        help='write all entries as a Markdown page')
+
+
+def run(args):
+    """List the catalogue, or one entry in full; write the pages asked for."""
+    from pam_actuation.models.text import in_full, overview
+    from pam_sim.catalogue import catalogue, find
+    entries = catalogue()
+    if args.name is not None:
+        entries = find(entries, args.name)
+    written = _pages(args, entries)
+    shown = overview(entries) if args.name is None else in_full(entries)
+    payload = {'schema': 1, 'models': entries, 'written': written}
+    emit(args, payload, '\n'.join(f'page: {path}' for path in written) if written else shown)
+    return EXIT_DONE
+
+
+def _pages(args, entries):
+    """Write the pages asked for; return their paths."""
+    written = []
+    if args.html is not None:
+        from pam_actuation.models import page
+        from pam_actuation.report.page import write_text
+        written.append(str(write_text(args.html, page.page(entries))))
+    if args.markdown is not None:
+        from pam_actuation.models import markdown
+        from pam_actuation.report.page import write_text
+        written.append(str(write_text(args.markdown, markdown.page(entries))))
+    return written

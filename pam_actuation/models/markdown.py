@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The catalogue of models as a Markdown page for the documentation."""
+
+from pam_actuation.models.cells import facts, groups, tables
+
+_INTRODUCTION = """# Models
+
+Every muscle law, valve, load, effect and sensor setting the simulator knows. This page is made
+from the code by `pam models --markdown docs/models.md`; do not edit it. A file of yours in a
+folder named by `PAM_EFFECTS_PATH` or `PAM_MUSCLE_LAWS_PATH` is listed by `pam models` too.
+
+Symbols: p absolute and p_g gauge pressure in the muscle, x contraction, eps = x / L0, v = dx/dt,
+F muscle tension, F_cell load cell, u voltage of the regulator, d_f and d_v fill and vent duty,
+V inner volume, mdot mass flow, psi the flow function of ISO 6358. An arrow says what an effect
+puts in the place of a term of the nominal rig. All numbers are SI.
+"""
+
+
+def page(entries):
+    """Return the whole page."""
+    parts = [_INTRODUCTION]
+    for heading, chosen in groups(entries):
+        parts.append(f'## {heading}\n')
+        parts += [_entry(entry) for entry in chosen]
+    return '\n'.join(parts)
+
+
+def _entry(entry):
+    lines = [f'### {entry["name"]}', '', _escaped(entry['sentence']), '']
+    for what, value in facts(entry):
+        lines.append(f'- {what}: `{value}`' if what == 'equation'
+                     else f'- {what}: {_escaped(value)}')
+    if entry['kind'] != 'rig':          # its parameters stand with muscle, valve and load
+        for head, rows in tables(entry):
+            lines += ['', _row(head), '|---' * len(head) + '|',
+                      *(_row((f'`{row[0]}`', *map(_escaped, row[1:]))) for row in rows)]
+    return '\n'.join(lines).rstrip() + '\n'
+
+
+def _row(cells):
+    return '| ' + ' | '.join(cells) + ' |'
+
+
+def _escaped(value):
+    for character in ('\\', '|', '*', '_', '<', '`'):
+        value = value.replace(character, '\\' + character)
+    return value

@@ -1,0 +1,257 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Many simulations at once: parameter sets on records, on all cores.
+
+The compiled rollout holds no lock, so threads share the work; each takes the
+next run when it has done one and reuses one buffer, so that memory grows with
+what is kept and not with what is simulated. A run does not depend on the
+others: results equal those of ``Rig.simulate`` to the bit, in order, with any
+number of workers.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+import os
+import threading
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.response import COLUMNS, Response
+from pam_sim.rollout import kernel, layout
+from pam_sim.rollout.sampling import Placed
+from pam_sim.rollout.simulate import check_outputs, prepare
+from pam_sim.units import P_ATM_PA
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """
+    What one simulation is given; fields as the arguments of ``Rig.simulate``.
+
+    Parameters
+    ----------
+    valve_signal : array_like, shape (N,) or (N, 2)
+        PPR voltage [V], or HSV fill and vent duty [0..1].
+    external_force_n, contraction_m, initial_contraction_m, initial_signal : optional
+    initial_pressure_pa : float
+        Absolute, Pa.
+    dt_s : float
+        Step, s.
+
+    """
+
+    valve_signal: object
+    external_force_n: object = None
+    contraction_m: object = None
+    initial_pressure_pa: float = P_ATM_PA
+    dt_s: float = 0.001
+    initial_contraction_m: float = None
+    initial_signal: object = None
+
+    def prepare(self, rig):
+        """Return (state, par, inputs) of the rollout with a rig."""
+        return prepare(rig, self.valve_signal, self.external_force_n, self.contraction_m,
+                       self.dt_s, {'initial_pressure_pa': self.initial_pressure_pa,
+                                   'initial_contraction_m': self.initial_contraction_m,
+                                   'initial_signal': self.initial_signal})
+
+
+def simulate_batch(rigs, records, workers=None, keep=None, every=1):
+    """
+    Simulate many runs.
+
+    Parameters
+    ----------
+    rigs : Rig or sequence of Rig
+        The parameter sets.
+    records : Record or sequence of Record
+        Rigs and records of equal number go in pairs; one of either goes with all of
+        the other. For every rig on every record, pair them with ``itertools.product``.
+    workers : int, optional
+        Threads; by default one per core this process may use.
+    keep : sequence of str, optional
+        Signals of the Response to keep, for instance ``('pressure_pa', 'force_n')``;
+        all by default.
+    every : int
+        Keep the start and each so many steps after it.
+
+    Returns
+    -------
+    list of Response
+        One per run, in order.
+
+    Raises
+    ------
+    InputError
+        As of ``Rig.simulate``, with the number of the run, counted from 0; numbers of
+        rigs and records that do not fit; an unknown signal.
+
+    """
+    names = tuple(COLUMNS) if keep is None else tuple(keep)
+    for name in names:
+        if name not in COLUMNS:
+            raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'keep')
+    if every < 1:
+        raise InputError(f'is {every}; at least 1 is needed', 'every')
+    places = {name: place for place, name in enumerate(names)}
+
+    def kept(index, outputs):
+        rows = outputs[::every]
+        if keep is None:
+            return Response(rows.copy())
+        chosen = np.empty((len(names), len(rows)))
+        for place, name in enumerate(names):
+            chosen[place] = rows[:, COLUMNS[name]]
+        return Response(chosen.T, places)
+
+    return _run_all(_pairs(rigs, records), kept, workers)
+
+
+def sample_batch(rigs, records, measured, workers=None):
+    """
+    Simulate many runs and return only the simulated values at the measured instants.
+
+    Parameters
+    ----------
+    rigs, records, workers
+        As of :func:`simulate_batch`.
+    measured : sequence of Measured, or sequence of such sequences
+        What every run is compared with, or one sequence per run.
+
+    Returns
+    -------
+    list of tuple of numpy.ndarray
+        Per run one array per ``Measured``, linear between the steps.
+
+    Raises
+    ------
+    InputError
+        As of :func:`simulate_batch`; an instant outside the record.
+
+    """
+    pairs = _pairs(rigs, records)
+    places = _placed(measured, pairs)
+
+    def sampled(index, outputs):
+        return tuple(place.sample(outputs) for place in places[index])
+
+    return _run_all(pairs, sampled, workers)
+
+
+def residual_sums(rigs, records, measured, workers=None):
+    """
+    Simulate many runs and return only the weighted sums of squared residuals.
+
+    Arguments and errors as of :func:`sample_batch`.
+
+    Returns
+    -------
+    numpy.ndarray, shape (runs, signals)
+        Sum of (weight (simulated - measured))^2 of every ``Measured``.
+
+    """
+    pairs = _pairs(rigs, records)
+    places = _placed(measured, pairs)
+
+    def summed(index, outputs):
+        return [place.residual_sum(outputs) for place in places[index]]
+
+    return np.array(_run_all(pairs, summed, workers))
+
+
+def default_workers():
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
+
+
+def _pairs(rigs, records):
+    """Return the (rig, record) of every run."""
+    rigs = list(rigs) if isinstance(rigs, (list, tuple)) else [rigs]
+    records = list(records) if isinstance(records, (list, tuple)) else [records]
+    count = max(len(rigs), len(records))
+    if min(len(rigs), len(records)) == 0 or {len(rigs), len(records)} - {1, count}:
+        raise InputError(f'{len(rigs)} rigs and {len(records)} records; equal numbers or one of '
+                         'either expected', 'batch')
+    return list(zip(rigs * (count // len(rigs)), records * (count // len(records))))
+
+
+def _placed(measured, pairs):
+    """Return per run the measured signals with their places between the steps."""
+    measured = list(measured)
+    if not measured:
+        raise InputError('is empty; at least one signal is needed', 'measured')
+    if not isinstance(measured[0], (list, tuple)):
+        measured = [tuple(measured)] * len(pairs)
+    if len(measured) != len(pairs):
+        raise InputError(f'has {len(measured)} entries for {len(pairs)} runs', 'measured')
+    known, placed = {}, []
+    for index, ((_, record), signals) in enumerate(zip(pairs, measured)):
+        key = (id(signals), len(record.valve_signal), record.dt_s)
+        if key not in known:
+            try:
+                known[key] = [Placed(one, *key[1:]) for one in signals]
+            except InputError as error:
+                raise _of_run(index, error) from None
+        placed.append(known[key])
+    return placed
+
+
+def _run_all(pairs, finish, workers):
+    """Return ``finish(index, outputs)`` of every run, in order."""
+    workers = default_workers() if workers is None else workers
+    if workers < 1:
+        raise InputError(f'is {workers}; at least 1 is needed', 'workers')
+    workers = min(workers, len(pairs))
+    results, errors, stop = [None] * len(pairs), {}, threading.Event()
+    queue = iter(range(len(pairs)))     # taking the next is atomic
+
+    def work():
+        buffer = np.empty((0, layout.OUT_SIZE))
+        for index in queue:
+            # A run before the first mistake is still made: it may hold an earlier one.
+            if stop.is_set() or index > min(tuple(errors), default=index):
+                return
+            rig, record = pairs[index]
+            try:
+                state, par, inputs = record.prepare(rig)
+                if len(buffer) <= len(inputs):
+                    buffer = np.empty((len(inputs) + 1, layout.OUT_SIZE))
+                outputs = buffer[:len(inputs) + 1]
+                kernel.rollout(state, par, inputs, outputs)
+                check_outputs(rig, outputs)
+                results[index] = finish(index, outputs)
+            except InputError as error:
+                errors[index] = error
+
+    if workers == 1:
+        work()
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            try:
+                for done in [pool.submit(work) for _ in range(workers)]:
+                    done.result()
+            finally:
+                stop.set()
+    if errors:
+        first = min(errors)
+        raise _of_run(first, errors[first])
+    return results
+
+
+def _of_run(index, error):
+    """Return the error with the number of its run."""
+    return InputError(error.problem, f'run {index}: {error.where}' if error.where
+                      else f'run {index}')

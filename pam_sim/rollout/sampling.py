@@ -1,0 +1,124 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A simulation compared with measured samples, in compiled code."""
+
+from dataclasses import dataclass
+
+from numba import njit
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.response import COLUMNS
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """
+    Samples of one signal.
+
+    Parameters
+    ----------
+    signal : str
+        Name in the Response, for instance ``pressure_pa``.
+    time_s : array_like, shape (M,)
+        Seconds since the start of the record, in any order.
+    value : array_like, shape (M,)
+        SI unit of the signal.
+    weight : float or array_like, shape (M,)
+        Of the residuals, usually one over the standard deviation of the noise.
+
+    """
+
+    signal: str
+    time_s: object
+    value: object
+    weight: object = 1.0
+
+
+class Placed:
+    """
+    Measured samples with their places between the steps of a simulation.
+
+    Parameters
+    ----------
+    measured : Measured
+    steps : int
+        Steps of the simulation.
+    dt_s : float
+        Step, s.
+
+    Raises
+    ------
+    InputError
+        Unknown signal, arrays that do not fit, a number not finite, an instant outside
+        the simulation.
+
+    """
+
+    def __init__(self, measured, steps, dt_s):
+        name = measured.signal
+        if name not in COLUMNS:
+            raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'measured')
+        self._column = COLUMNS[name]
+        time_s = np.atleast_1d(np.asarray(measured.time_s, dtype=float))
+        self._value = np.ascontiguousarray(measured.value, dtype=float)
+        if time_s.ndim != 1 or self._value.shape != time_s.shape:
+            raise InputError(f'`time_s` has shape {time_s.shape} and `value` '
+                             f'{self._value.shape}; equal ones are needed', name)
+        try:
+            weight = np.broadcast_to(np.asarray(measured.weight, dtype=float), time_s.shape)
+        except ValueError:
+            raise InputError(f'`weight` has shape {np.shape(measured.weight)}; one number or '
+                             f'{time_s.shape} expected', name) from None
+        self._weight = np.ascontiguousarray(weight)
+        if not (np.isfinite(self._value).all() and np.isfinite(weight).all()):
+            raise InputError('a measured value or its weight is not finite', name)
+        end_s = steps * dt_s
+        outside = ~((time_s >= -1e-9) & (time_s <= end_s + 1e-9))
+        if outside.any():
+            raise InputError(f'`time_s` is {time_s[outside][0]:g}; allowed 0 to {end_s:g} s', name)
+        place = time_s / dt_s
+        self._row = np.clip(np.floor(place), 0, steps - 1).astype(np.int64)
+        self._share = np.clip(place - self._row, 0.0, 1.0)
+
+    def sample(self, outputs):
+        """Return the simulated values at the instants, shape (M,)."""
+        found = np.empty_like(self._value)
+        sample_into(outputs, self._column, self._row, self._share, found)
+        return found
+
+    def residual_sum(self, outputs):
+        """Return the sum of (weight (simulated - measured))^2."""
+        return residual_sum(outputs, self._column, self._row, self._share, self._value,
+                            self._weight)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def sample_into(outputs, column, row, share, found):
+    """Fill ``found`` with one column of the rollout, linear between its rows."""
+    for j in range(row.size):
+        low = outputs[row[j], column]
+        found[j] = low + share[j] * (outputs[row[j] + 1, column] - low)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def residual_sum(outputs, column, row, share, value, weight):
+    """Return the weighted sum of squares of one column less the measured values."""
+    total = 0.0
+    for j in range(row.size):
+        low = outputs[row[j], column]
+        residual = weight[j] * (
+            low + share[j] * (outputs[row[j] + 1, column] - low) - value[j])
+        total += residual * residual
+    return total

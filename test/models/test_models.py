@@ -1,0 +1,127 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Terminal text, Markdown and HTML of the catalogue; the committed page is what the code says."""
+
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+from pam_actuation.models import markdown, page
+from pam_actuation.models.text import in_full, overview
+from pam_sim.catalogue import catalogue, find
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ENTRIES = catalogue()
+PLUG_INS = ('PAM_EFFECTS_PATH', 'PAM_MUSCLE_LAWS_PATH')
+
+
+@pytest.mark.skipif(any(os.environ.get(name) for name in PLUG_INS), reason='plug-ins are set')
+def test_the_committed_page_is_what_the_registries_say():
+    committed = (ROOT / 'docs' / 'models.md').read_text(encoding='utf-8')
+    assert committed == markdown.page(ENTRIES), 'run: pam models --markdown docs/models.md'
+
+
+def test_overview_names_everything_within_the_terminal(monkeypatch):
+    monkeypatch.setenv('COLUMNS', '80')
+    lines = overview(ENTRIES).splitlines()
+    assert max(map(len, lines)) <= 80
+    first_words = {line.split()[0] for line in lines if re.match('  [a-z]', line)}
+    assert {entry['name'] for entry in ENTRIES} <= first_words
+
+
+def test_one_entry_in_full():
+    shown = in_full(find(ENTRIES, 'leakage'))
+    for part in ('rho0 p psi(p_atm / p)', 'conductance_m3_per_s_pa', 'm3/(s Pa)', '0 to 1e-09',
+                 'ISO 6358', 'mass_flow_at_400kpa_kg_per_s', 'family: loss'):
+        assert part in shown
+    assert 'rests on' in in_full(find(ENTRIES, 'sarosi'))
+
+
+def test_html_is_whole_escaped_and_light():
+    content = page.page([*ENTRIES, {
+        'kind': 'load', 'name': 'odd', 'sentence': '<b>bold</b>.', 'equation': 'a < b',
+        'source': 'x', 'parameters': []}])
+    assert '<b>bold' not in content and '&lt;b&gt;bold' in content
+    assert not re.search(r'<(script|link|img|iframe)\b', content)     # no plot, hence no script
+    assert len(content) < 300_000
+    for entry in ENTRIES:
+        assert f'id="{entry["kind"]}-{entry["name"]}"' in content
+
+
+EFFECT_FILE = """
+import math
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+EFFECT = Effect(
+    name='notched_rail', family='friction', subsystem='load',
+    sentence='Notches in the rail pull the load to and fro.', source='made up for a test',
+    equation='m dv/dt = F - c v - m g - F_n sin(x / 0.6 mm)',
+    parameters=(Parameter('force_n', 'N', 1.0, 0.0, 10.0, description='Depth of a notch.'),),
+    amplitude=('force_n',),
+    reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),))
+@compiled
+def load_force(force_n, x, v, dx, elapsed, state, i, par, k):
+    return force_n + par[k] * math.sin(x / 0.0006)
+"""
+LAW_FILE = """'Force proportional to pressure.'
+from pam_sim.muscle.law import MuscleLaw
+from pam_sim.parameters import Parameter
+class Proportional(MuscleLaw):
+    NAME, FORMULA, SOURCE = 'proportional', 'F = g p', 'made up for a test'
+    PARAMETERS = (Parameter('g', 'N/Pa', 1e-4, 0.0, 1.0, description='Gain.'),)
+LAW = Proportional
+"""
+ROLLOUT = """
+import numpy as np
+from pam_sim import load_rig
+rig = load_rig('rig.yaml')
+ours = rig.simulate(np.full(60, 4.0), initial_pressure_pa=501325.0)
+bare = rig.with_(effects=[]).simulate(np.full(60, 4.0), initial_pressure_pa=501325.0)
+print(abs(ours.contraction_m - bare.contraction_m).max() > 1e-6)
+"""
+
+
+def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
+    for name, content in (('effects/notched_rail.py', EFFECT_FILE),
+                          ('laws/proportional.py', LAW_FILE),
+                          ('rig.yaml', 'rig: dmsp_5_300_hanging_mass\n'
+                                       'effects: [{name: notched_rail}]\n')):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(content)
+    environment = {
+        **os.environ, 'PAM_EFFECTS_PATH': str(tmp_path / 'effects'), 'NUMBA_DISABLE_JIT': '1',
+        'PAM_MUSCLE_LAWS_PATH': str(tmp_path / 'laws'), 'PAM_CACHE_DIR': str(tmp_path / 'cache'),
+        'PYTHONPATH': os.pathsep.join([str(ROOT), *sys.path])}
+
+    def run(*arguments):
+        done = subprocess.run(
+            [sys.executable, *arguments], capture_output=True, text=True, timeout=200,
+            cwd=tmp_path, env=environment, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    verb = ('-m', 'pam_actuation.cli.main', 'models')
+    listed = run(*verb)
+    assert 'notched_rail' in listed and 'Force proportional to pressure.' in listed
+    shown = run(*verb, 'notched_rail')
+    assert 'sin(x / 0.6 mm)' in shown and 'Depth of a notch.' in shown
+    run(*verb, '--html', 'models.html')
+    assert 'id="effect-notched_rail"' in (tmp_path / 'models.html').read_text()
+    assert run('-c', ROLLOUT).strip() == 'True'

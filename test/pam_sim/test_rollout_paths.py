@@ -1,0 +1,111 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The short cuts of the compiled step: same numbers as the long way."""
+
+import math
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.effects.registry import effects, get_effect
+from pam_sim.rollout import kernel, layout
+from pam_sim.rollout.generate import hook_flag
+from pam_sim.rollout.simulate import input_array
+from pam_sim.valve.flow import flow_function, mass_flow_kg_per_s
+import pytest
+
+STEPS = 600
+VALVES = (('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching'))
+
+
+def rolled(rig, par_changes=()):
+    """Return the outputs of a rollout with some entries of ``par`` set by hand."""
+    phase = np.arange(STEPS) * 0.02
+    signal = 3.0 + 2.0 * np.sin(phase)
+    if rig.valve == 'hsv':
+        drive = 0.5 * np.sin(phase)
+        signal = np.stack([np.clip(drive, 0.0, 1.0), np.clip(-drive, 0.0, 1.0)], axis=1)
+    inputs, _ = input_array(rig, signal, 2.0 * np.cos(phase))
+    state, par = rig.pack(initial_pressure_pa=300e3)
+    for index, value in par_changes:
+        par[index] = value
+    outputs = np.empty((STEPS + 1, layout.OUT_SIZE))
+    kernel.rollout(state, par, inputs, outputs)
+    return outputs
+
+
+@pytest.mark.parametrize('valve, fidelity', VALVES)
+@pytest.mark.parametrize('hooks', [(), ('mass_flow', 'volume', 'muscle_force', 'sensor')])
+def test_the_nominal_step_has_the_bits_of_the_step_with_hooks(valve, fidelity, hooks):
+    rig = load_rig('dmsp_5_300_hanging_mass', valve=valve, fidelity=fidelity)
+    changes = [(layout.PAR_BEYOND_NOMINAL, 1.0), *((hook_flag(hook), 1.0) for hook in hooks)]
+    nominal = rolled(rig)
+    assert np.ptp(nominal[:, layout.OUT_CONTRACTION]) > 2e-3
+    assert np.array_equal(nominal, rolled(rig, changes))
+
+
+def test_only_the_nominal_rig_takes_the_short_way():
+    def beyond(rig):
+        return rig.pack()[1][layout.PAR_BEYOND_NOMINAL]
+
+    nominal = load_rig('dmsp_5_300_hanging_mass')
+    assert beyond(nominal) == 0.0
+    assert beyond(nominal.with_(law='tondu_lopez')) == 1.0
+    assert beyond(nominal.with_(effects=['pressure_bias'])) == 1.0
+    silent = {'name': 'pressure_bias', 'parameters': {'bias_pa': 0.0}}
+    assert beyond(nominal.with_(effects=[silent])) == 0.0
+
+
+@pytest.mark.parametrize('ratio', [0.05, 0.3, 0.5, 0.9])
+def test_the_flow_in_factors_is_that_of_the_flow_function(ratio):
+    for r in (0.0, ratio, ratio + 1e-9, 0.5 * (ratio + 1.0), 0.998999, 0.999, 0.9995, 1.0, 1.2):
+        wanted = 2e-10 * 7e5 * flow_function(r, ratio)
+        assert mass_flow_kg_per_s(7e5, r * 7e5, 2e-10, ratio) == pytest.approx(
+            wanted, rel=1e-11, abs=1e-25)
+
+
+def test_the_flow_is_continuous_where_the_law_changes():
+    for r in (0.38, 0.999):
+        below, above = (mass_flow_kg_per_s(1.0, r * (1.0 + s), 1.0, 0.38) for s in (-1e-9, 1e-9))
+        assert below == pytest.approx(above, rel=1e-5)
+
+
+@pytest.mark.parametrize('scale', [-1.0, 1.0])
+def test_the_heat_exchange_by_series_is_that_by_exponential(scale):
+    from pam_sim.effects import thermal
+    par, state = np.array([0.0, 84_148.0]), np.array([80_000.0, 0.0])
+    found = {}
+    for name, factor in (('series', 0.99), ('exponential', 1.01)):
+        # A loss a little to either side of the limit between the two, by the volume alone.
+        loss = scale * factor * thermal._SMALL_LOSS
+        grown = (2.0 + loss / 0.4) / (2.0 - loss / 0.4)
+        start_m3 = 1e-4 * state[0] / 4e5
+        found[name] = thermal.air_rt(
+            84_148.0, 1e-4, 0.0, 0.0, 4e5, grown * start_m3, 1e-3, state, 0, par, 0)
+        assert found[name] == pytest.approx(state[0] * math.exp(-loss), rel=1e-12)
+    assert found['series'] != found['exponential']
+
+
+def test_every_effect_at_once_stays_within_the_numbers():
+    sizes = {'valve_dead_zone': {
+        'half_width_pa': 2e3, 'open_time_s': 1.7e-3, 'close_time_s': 2e-3}}
+    every = [{'name': name, 'parameters': sizes.get(name, {})} for name in effects()]
+    for valve, fidelity in VALVES:
+        rig = load_rig('dmsp_5_300_hanging_mass', valve=valve, fidelity=fidelity)
+        outputs = rolled(rig.with_(effects=every))
+        assert np.isfinite(outputs).all()
+        here = [name for name in effects() if valve in get_effect(name).valves]
+        state, par = rig.with_(effects=every).pack()
+        assert len(here) > 20 and par[layout.PAR_BEYOND_NOMINAL] == 1.0
+        assert np.abs(outputs - rolled(rig)).max() > 1.0
