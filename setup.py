@@ -38,6 +38,7 @@ RUN_REQUIRES = [
     'zstandard>=0.22',
     'rosbags>=0.10.4',
     'plotly>=5.15',
+    'matplotlib>=3.6',
     'joblib>=1.3',
     'tqdm>=4.66',
 ]

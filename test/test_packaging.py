@@ -44,8 +44,8 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
 ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
-    'numba': 'python3-numba', 'numpy': 'python3-numpy', 'rosbags': 'python3-rosbags-pip',
-    'scipy': 'python3-scipy',
+    'matplotlib': 'python3-matplotlib', 'numba': 'python3-numba', 'numpy': 'python3-numpy',
+    'rosbags': 'python3-rosbags-pip', 'scipy': 'python3-scipy',
     'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml', 'zstandard': 'mcap-ros2-support',
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.

@@ -19,6 +19,7 @@ Write what ``pam characterise`` found: table, numbers, the chapter's figures, a 
 ``figure_4_7.svg`` and ``report.html``, each written whole or not at all.
 """
 
+import base64
 import csv
 import io
 import json
@@ -205,8 +206,7 @@ def _page(result, pictures):
         numbers.append((f'{result.truth["rms_percent"]:.3f} %', 'error against the rig',
                         'rms of contraction on the grid',
                         'good' if result.truth['rms_percent'] <= 0.2 else 'bad'))
-    drawn = ''.join(f'<figure>{text}<figcaption>{CAPTIONS[name]}</figcaption></figure>'
-                    for name, text in pictures.items())
+    drawn = ''.join(_picture(text, CAPTIONS[name]) for name, text in pictures.items())
     sections = [Section('figures', 'Surfaces', drawn),
                 Section('uncertainty', 'Uncertainty', _uncertainty(s))]
     if result.loads:
@@ -218,6 +218,13 @@ def _page(result, pictures):
         paragraph(line) for line in result.provenance + result.remarks)))
     return render('Characteristic surfaces', 'Quasi-static, the hysteresis lumped into the '
                   'mean curve.', sections, numbers, FOOTER)
+
+
+def _picture(text, caption):
+    """Return a figure whose image is in the page; inline, its style would reach the page."""
+    data = base64.b64encode(text.encode('utf-8')).decode('ascii')
+    return (f'<figure><img style="max-width:100%" src="data:image/svg+xml;base64,{data}" '
+            f'alt="{caption}"><figcaption>{caption}</figcaption></figure>')
 
 
 def _uncertainty(s):

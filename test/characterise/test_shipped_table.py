@@ -14,9 +14,10 @@
 
 """The shipped lookup table: made again by its recipe, and what it says of the rig."""
 
+from dataclasses import replace
 from pathlib import Path
-import re
 
+from drawn import Picture
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.experiments.load_series import simulate_load, with_sensor_noise
@@ -32,7 +33,6 @@ from pam_sim.muscle.registry import make_law
 import pytest
 
 SEED = 1
-NUMBER = re.compile(r'(?<![0-9a-f#])-?[0-9]+(?:[.][0-9]+)?(?![0-9a-f])')
 FIGURE_FOLDER = Path(__file__).resolve().parents[2] / 'docs' / 'figures'
 
 
@@ -103,9 +103,27 @@ def test_the_law_finds_it_by_name_and_a_rig_takes_it():
 
 @pytest.mark.parametrize('name', FIGURES)
 def test_the_figures_of_the_documents_show_this_table(again, name):
-    printed = (FIGURE_FOLDER / f'characterise_{name[7:]}.svg').read_text(encoding='utf-8')
-    drawn = FIGURES[name](again.surfaces)
-    assert NUMBER.sub('#', printed) == NUMBER.sub('#', drawn) and len(printed) < 200_000
-    # Pixels; the last digit may round another way.
-    numbers = [[float(text) for text in NUMBER.findall(page)] for page in (printed, drawn)]
-    assert numbers[0] == pytest.approx(numbers[1], abs=0.11)
+    page = (FIGURE_FOLDER / f'characterise_{name[7:]}.svg').read_text(encoding='utf-8')
+    printed, drawn = Picture(page), Picture(FIGURES[name](again.surfaces))
+    assert len(page) < 200_000
+    assert sorted(printed.words()) == sorted(drawn.words())
+    assert printed.distance(drawn) < 1e-3
+    other = replace(again.surfaces, strain=1.1 * again.surfaces.strain + 0.002,
+                    air_mass_kg=again.surfaces.air_mass_kg ** 1.1)
+    assert printed.distance(Picture(FIGURES[name](other))) > 1e-2
+
+
+def test_the_printed_force_figure_read_off_its_axes_is_the_table(again):
+    printed = Picture((FIGURE_FOLDER / 'characterise_4_2.svg').read_text(encoding='utf-8'))
+    surfaces = again.surfaces
+    for k, pressure_pa in enumerate(np.arange(1, 7) * 1e5):
+        row = int(np.argmin(np.abs(surfaces.pressure_gauge_pa - pressure_pa)))
+        lifted = surfaces.strain[row] > 0.0
+        strain_percent = 100.0 * surfaces.strain[row, lifted]
+        x, y = printed.read_off(f'points_{k}').T
+        assert x == pytest.approx(strain_percent, abs=0.01)
+        assert y == pytest.approx(surfaces.load_n[lifted], abs=0.05)
+        ends = printed.read_off(f'bars_{k}')[:, 0].reshape(-1, 2)
+        half = 200.0 * surfaces.strain_u[row, lifted]
+        assert ends == pytest.approx(
+            np.column_stack([strain_percent - half, strain_percent + half]), abs=0.01)
