@@ -20,7 +20,8 @@ import numpy as np
 from pam_sim.errors import InputError
 
 # Signals that hold their value until the next message (zero-order hold).
-HELD_TOPICS = ('valve_signal', 'reference', 'pressure_command', 'controller_state')
+HELD_TOPICS = (
+    'valve_signal', 'valve_command', 'reference', 'pressure_command', 'controller_state')
 
 
 @dataclass

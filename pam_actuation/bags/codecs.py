@@ -41,6 +41,7 @@ TOPIC_TYPES = {
     'reference': _JOINTS,
     'reference_trajectory': _TRAJECTORY,
     'pressure_command': _PRESSURE,
+    'valve_command': _JOINTS,
     'valve_signal': _JOINTS,
     'pressure': _PRESSURE,
     'supply_pressure': _PRESSURE,
@@ -52,7 +53,8 @@ TOPIC_TYPES = {
 }
 
 # JointState field that carries a value of each topic, for topics with named entries.
-NAMED_FIELD = {'valve_signal': 'effort', 'controller_state': 'position'}
+NAMED_FIELD = {
+    'valve_command': 'effort', 'valve_signal': 'effort', 'controller_state': 'position'}
 
 MUSCLE = ('muscle',)
 
@@ -245,6 +247,7 @@ _ENCODERS = {
     'reference': _encode_motion,
     'reference_trajectory': _encode_trajectory,
     'pressure_command': _encode_pressure,
+    'valve_command': _encode_valve_signal,
     'valve_signal': _encode_valve_signal,
     'pressure': _encode_pressure,
     'supply_pressure': _encode_pressure,
@@ -263,6 +266,7 @@ _DECODERS = {
 _FROM_VALUES = {
     'reference': lambda stamp_ns, values: messages.Reference(stamp_ns, **values),
     'pressure_command': _decode_pressure,
+    'valve_command': _decode_valve_signal,
     'valve_signal': _decode_valve_signal,
     'pressure': _decode_pressure,
     'supply_pressure': _decode_pressure,

@@ -205,7 +205,7 @@ def read_series(short, topic, remarks):
         remarks.append(f'{topic.name}: {same} messages repeat the stamp before, kept.')
     if short == 'valve_signal':
         stamp_ns, values = _held(stamp_ns, values, topic.name, remarks)
-    elif short != 'controller_state' and len(stamp_ns):
+    elif short not in ('controller_state', 'valve_command') and len(stamp_ns):
         _remark_not_finite(values, topic.name, remarks)
     return Series(stamp_ns, values, {name: unit_of(name) for name in values})
 

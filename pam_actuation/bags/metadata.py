@@ -23,7 +23,7 @@ UNITS = (
     'pressure, pressure_command, supply_pressure: Pa absolute; '
     'contraction, reference, reference_trajectory: m, m/s; '
     'force, external_force: N; '
-    'valve_signal: ppr_voltage V, fill_duty and vent_duty 1; '
+    'valve_signal, valve_command: ppr_voltage V, fill_duty and vent_duty 1; '
     'time: header.stamp, ns'
 )
 VALVES = ('ppr', 'hsv')

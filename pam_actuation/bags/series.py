@@ -33,6 +33,7 @@ VALUES = {
     'external_force': ('force_n',),
     'contraction': ('contraction_m', 'velocity_m_per_s'),
     'reference': ('contraction_m', 'velocity_m_per_s'),
+    'valve_command': (),
     'valve_signal': (),
     'controller_state': (),
 }

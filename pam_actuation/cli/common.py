@@ -88,7 +88,7 @@ def load_setup(args):
     """
     Return (experiment, rig, controller) that the options name.
 
-    The controller is None for an experiment in the pressure domain.
+    The controller is None where the experiment is not in contraction.
 
     Raises
     ------

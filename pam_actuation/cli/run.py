@@ -50,13 +50,15 @@ def run(args):
     counted = '' if result.failure else f', {published} published'
     lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {recorded} messages '
              f'recorded{counted}', f'bag: {result.bag}']
+    remarks = list(experiment.remarks(rig.valve))
+    lines += [f'remark: {text}' for text in remarks]
     if result.failure:
         lines.append(f'not completed: {result.failure}')
     lines += [f'finding: {text}' for text in result.findings]
     lines.append(f'next: pam report {result.bag}')
     emit(args, {
         'bag': result.bag, 'complete': result.complete, 'failure': result.failure,
-        'findings': result.findings, 'published': result.published,
+        'findings': result.findings, 'remarks': remarks, 'published': result.published,
         'recorded': result.recorded, 'exit_codes': result.exit_codes,
         'cpu_share': result.cpu_share}, '\n'.join(lines))
     return EXIT_DONE if result.complete and not result.findings else EXIT_FINDING

@@ -43,8 +43,10 @@ def run(args):
             overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n))
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
+    result['remarks'] = list(experiment.remarks(rig.valve))
+    remarks = ''.join(f'remark: {text}\n' for text in result['remarks'])
     emit(args, result, (
         f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig.name} '
-        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n'
+        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{remarks}'
         f'next: pam report {result["bag"]}'))
     return EXIT_DONE

@@ -81,6 +81,12 @@ FAULT_TABLE = (
     Fault('command_below_atmosphere', 'Command below the atmosphere',
           'command below 101.325 kPa absolute', CLAMP, False,
           'warning ends 1 s after the last such command'),
+    Fault('valve_command_at_limit', 'Valve command fills above the pressure limit (HSV)',
+          'filling duty commanded and a valid reading at or above max_pressure_gauge_pa', CLAMP,
+          False, 'the filling valve stays shut until the reading is below the limit'),
+    Fault('valve_command_interrupted', 'Valve command interrupted (HSV)',
+          'any fault of this table that vents, while another valve_command than venting is '
+          'followed', VENT, True, 'service ~/reset, then the next command'),
     Fault('no_pressure', 'No measured pressure yet',
           'no valid pressure since start: HSV', VENT, False, 'first valid reading, ' + _RAMP),
     Fault('no_pressure_ppr', 'No measured pressure at all',

@@ -82,6 +82,23 @@ class DriverLoop:
         """Take a pressure_command; ``sequence`` is the publisher's message number, if known."""
         self.safety.on_command(message.stamp_ns, message.pressure_pa, sequence)
 
+    def on_valve_command(self, message: ValveSignal):
+        """
+        Take a valve_command: the wanted raw signal, supervised like a pressure command.
+
+        PPR: the voltage is the pressure command of its static gain. HSV: both valves are
+        never open together, what counts is filling minus venting duty; a missing entry
+        makes the command invalid.
+        """
+        efforts = dict(zip(message.names, message.efforts))
+        names = HSV_NAMES if self.is_hsv else PPR_NAMES
+        wanted = [efforts.get(name, math.nan) for name in names]
+        if self.is_hsv:
+            self.safety.on_duty(message.stamp_ns, wanted[0] - wanted[1])
+        else:
+            pressure_pa = P_ATM_PA + self.config.ppr.gain_pa_per_v * wanted[0]
+            self.safety.on_command(message.stamp_ns, pressure_pa)
+
     def on_pressure(self, message: Pressure):
         """Take a measured pressure."""
         self.safety.on_pressure(message.stamp_ns, message.pressure_pa)
@@ -141,13 +158,14 @@ class DriverLoop:
         elapsed = 1
         if self._law_ns is not None:
             elapsed = round((now_ns - self._law_ns) / (self.period_s * _NS))
-        if elapsed == 0 and decision.pressure_pa is not None and self._efforts != (0.0, 1.0):
+        followed = decision.pressure_pa is not None or decision.duty is not None
+        if elapsed == 0 and followed and self._efforts != (0.0, 1.0):
             return self._efforts      # called within a period: the running one goes on
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
             self.law.hold(*self._efforts, supply_pa=supply_pa)
             self.safety.flow(self.law.flow_pa)
         if decision.pressure_pa is None:
-            efforts = self._safe_efforts()
+            efforts = self._imposed(decision.duty)
             if elapsed != 0:
                 self.law.hold(*efforts, measured, supply_pa, age_s)
         else:
@@ -157,6 +175,11 @@ class DriverLoop:
             self.safety.flow(self.law.flow_pa)
         self._used_stamp_ns = self.safety.pressure.stamp_ns
         return tuple(float(effort) for effort in efforts)
+
+    def _imposed(self, duty):
+        if duty is None:
+            return self._safe_efforts()
+        return max(duty, 0.0), max(-duty, 0.0)
 
     def _new_measurement(self):
         channel = self.safety.pressure
@@ -185,7 +208,6 @@ class DriverLoop:
 
     def _status(self, now_ns, decision):
         safety = self.safety
-        target = decision.pressure_pa
         command_age_ms = math.nan
         if safety.command_stamp_ns is not None:
             command_age_ms = (now_ns - safety.command_stamp_ns) * 1e-6
@@ -195,7 +217,7 @@ class DriverLoop:
             ('valve_type', self.valve_type),
             ('rate_hz', f'{self._rate_measured_hz:.1f}'),
             ('late_ticks', str(self.late_ticks)),
-            ('target_kpa_gauge', 'vent' if target is None else f'{gauge_kpa(target):.1f}'),
+            ('target_kpa_gauge', _target_text(decision)),
             ('command_kpa_gauge', f'{gauge_kpa(safety.command_pa):.1f}'),
             ('command_age_ms', f'{command_age_ms:.1f}'),
             ('pressure_kpa_gauge', f'{gauge_kpa(safety.pressure.pressure_pa):.1f}'),
@@ -212,3 +234,9 @@ class DriverLoop:
         if safety.supply.received:
             values.append(('supply_kpa_gauge', f'{gauge_kpa(safety.supply.pressure_pa):.1f}'))
         return Status(now_ns, decision.level, 'valve_driver', decision.message, tuple(values))
+
+
+def _target_text(decision):
+    if decision.duty is not None:
+        return f'duty {decision.duty:.3f}'
+    return 'vent' if decision.pressure_pa is None else f'{gauge_kpa(decision.pressure_pa):.1f}'

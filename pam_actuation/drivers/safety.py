@@ -37,6 +37,8 @@ EMERGENCY_STOP = 'emergency_stop'
 
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
 
+LATCHING = ('emergency_stop', 'over_pressure', 'valve_command_interrupted')
+
 _NS = 1_000_000_000
 _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
@@ -74,8 +76,10 @@ class Decision:
     """
     The outcome of one tick.
 
-    ``pressure_pa`` is the absolute pressure to follow, None = vent; ``fault`` is the
-    key in ``FAULTS`` of the reason ('' if none), ``level`` that of a diagnostic status.
+    ``pressure_pa`` is the absolute pressure to follow, None = vent; ``duty`` is the
+    opening to send as it is (-1 vents, 0 shuts, 1 fills), None = the law decides;
+    ``fault`` is the key in ``FAULTS`` of the reason ('' if none), ``level`` that of a
+    diagnostic status.
     """
 
     state: str
@@ -84,6 +88,7 @@ class Decision:
     message: str
     fault: str = ''
     warnings: tuple = ()
+    duty: float | None = None
 
 
 def _without_figures(fault):
@@ -112,6 +117,7 @@ class SafetySupervisor:
         self.publishers = 1
         self.command_stamp_ns = None
         self.command_pa = math.nan
+        self.command_duty = None       # of a pair of valves, where it is commanded itself
         self.commands_received = 0
         self.commands_ignored = 0
         self.commands_clamped = 0
@@ -131,7 +137,11 @@ class SafetySupervisor:
 
     def on_command(self, stamp_ns, pressure_pa, sequence=None):
         """Queue a command for the next tick; ``sequence`` is its publisher's number, if known."""
-        self._pending['command'].append((stamp_ns, pressure_pa, sequence))
+        self._pending['command'].append((stamp_ns, pressure_pa, sequence, False))
+
+    def on_duty(self, stamp_ns, duty):
+        """Queue a commanded opening of a pair of valves: -1 vents, 0 shuts, 1 fills."""
+        self._pending['command'].append((stamp_ns, duty, None, True))
 
     def on_pressure(self, stamp_ns, pressure_pa):
         """Queue a measured absolute pressure [Pa] for the next tick."""
@@ -169,6 +179,7 @@ class SafetySupervisor:
         self._seen_command = False
         self.command_stamp_ns = None
         self.command_pa = math.nan
+        self.command_duty = None
         self._pending['command'].clear()
         return True, f'Reset; it was: {text}. Waiting for a new pressure_command.'
 
@@ -181,9 +192,11 @@ class SafetySupervisor:
         elif fault is None:
             fault = self._standing_fault(now_ns)
         if fault is not None:
-            return self._vent(fault)
+            return self._vent(self._latched_if_raw(fault))
         if self._fault is not None:
             self._start_ramp()
+        if self.command_duty is not None:
+            return self._follow_duty(now_ns)
         return self._follow(now_ns)
 
     # -- inputs ---------------------------------------------------------------------
@@ -225,8 +238,8 @@ class SafetySupervisor:
                 self._check_over_pressure(value)
         for stamp_ns, value in self._take('supply'):
             self.supply.offer(stamp_ns, value, now_ns)
-        for stamp_ns, value, sequence in self._take('command'):
-            self._take_command(stamp_ns, value, sequence, now_ns)
+        for stamp_ns, value, sequence, is_duty in self._take('command'):
+            self._take_command(stamp_ns, value, sequence, is_duty, now_ns)
 
     def _take(self, name):
         queue = self._pending[name]
@@ -243,7 +256,7 @@ class SafetySupervisor:
     def _latch(self, key, text):
         self._latched = (key, text + '; call the service reset to go on')
 
-    def _take_command(self, stamp_ns, value, sequence, now_ns):
+    def _take_command(self, stamp_ns, value, sequence, is_duty, now_ns):
         lim = self.limits
         self.commands_received += 1
         problem = stamp_problem(stamp_ns, now_ns, lim.command_timeout_s, lim.stamp_ahead_s)
@@ -262,6 +275,10 @@ class SafetySupervisor:
         self.command_stamp_ns, self.command_pa = stamp_ns, value
         self._command_problem = ''
         self._seen_command = True
+        self.command_duty = None
+        if is_duty:
+            self.command_pa, self.command_duty = math.nan, min(max(value, -1.0), 1.0)
+            return
         highest = P_ATM_PA + lim.max_pressure_gauge_pa
         if value > highest:
             self.commands_clamped += 1
@@ -340,7 +357,7 @@ class SafetySupervisor:
             self._fault = fault
         self._ramp_pa = None
         key, text = self._fault
-        if key in ('emergency_stop', 'over_pressure'):
+        if key in LATCHING:
             return Decision(EMERGENCY_STOP, None, LEVEL_ERROR, text, key)
         if key in ('no_command', 'no_pressure'):
             return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)
@@ -350,6 +367,25 @@ class SafetySupervisor:
         measured = self.pressure.pressure_pa
         self._ramp_pa = max(measured, P_ATM_PA) if math.isfinite(measured) else P_ATM_PA
         self._fault = None
+
+    def _latched_if_raw(self, fault):
+        # What an opening does depends on all that went before: it is not taken up again.
+        if self._latched is None and self._fault is None and (
+                self.command_duty is not None and self.command_duty > -1.0):
+            self._latch('valve_command_interrupted', (
+                f'{fault[1]}; an interrupted valve command is not taken up again'))
+            return self._latched
+        return fault
+
+    def _follow_duty(self, now_ns):
+        duty, gauge_pa = self.command_duty, self.pressure.pressure_pa - P_ATM_PA
+        self._ramp_pa = None
+        if duty > 0.0 and gauge_pa >= self.limits.max_pressure_gauge_pa:
+            duty = 0.0
+            self._warn('valve_command_at_limit', (
+                f'the filling valve stays shut: {gauge_pa * 1e-3:.0f} kPa gauge measured, '
+                f'limit {self.limits.max_pressure_gauge_pa * 1e-3:.0f} kPa'), now_ns)
+        return self._following('following the valve command', now_ns, duty=duty)
 
     def _follow(self, now_ns):
         lim = self.limits
@@ -361,6 +397,10 @@ class SafetySupervisor:
             else:
                 target = self._ramp_pa
         self._watch_supply(target, now_ns)
+        return self._following('following the pressure command', now_ns, target)
+
+    def _following(self, what, now_ns, target=None, duty=None):
+        lim = self.limits
         if self.publishers > 1:
             self._warn('second_publisher_seen', (
                 f'{self.publishers} publishers of pressure_command are on the graph'), now_ns)
@@ -372,8 +412,8 @@ class SafetySupervisor:
                           if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}
         texts += [text for text, _ in self._warnings.values()]
         level = LEVEL_WARN if self._warnings else LEVEL_OK
-        message = '; '.join(texts) if texts else 'following the pressure command'
-        return Decision(OK, target, level, message, '', tuple(self._warnings))
+        message = '; '.join(texts) if texts else what
+        return Decision(OK, target, level, message, '', tuple(self._warnings), duty)
 
     def _watch_supply(self, target_pa, now_ns):
         channel = self.supply

@@ -14,20 +14,14 @@
 
 """An experiment file: a domain and a chain of primitives, checked before it runs."""
 
-import bisect
-
-from pam_actuation.experiments.primitives import make_primitive, Sine, Triangle
+from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE
+from pam_actuation.experiments.limits import check_rig
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
-from pam_sim.located_yaml import dump_yaml, load_yaml, Located
-from pam_sim.units import P_ATM_PA
+from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located
 
-# What a value means, its unit suffix in files, its rest value and its allowed range.
-DOMAINS = {
-    'contraction': ('m', 0.0, 0.0, 0.25),
-    'pressure': ('pa', P_ATM_PA, P_ATM_PA, 1_300_000.0),
-}
-KEYS = ('name', 'description', 'domain', 'segments')
+KEYS = ('name', 'description', 'domain', 'needs', 'segments', 'disturbance')
+NEEDS = ('pressure', 'contraction', 'force', 'supply_pressure')
 
 
 class Experiment:
@@ -38,11 +32,18 @@ class Experiment:
     ----------
     name, description : str
         Name used in bags, and a sentence for people.
-    domain : {'contraction', 'pressure'}
-        Whether values are wanted contraction [m] or wanted pressure [Pa absolute];
-        a pressure experiment runs without a controller.
+    domain : str
+        What the values are: wanted contraction [m], wanted pressure [Pa absolute], or
+        the raw valve signal (``ppr_voltage`` [V], ``hsv_duty``); all but ``contraction``
+        run without a controller.
     segments : list of (name, arguments, where)
         The primitives in order, with the keys of the file and ``file:line``.
+    where : str
+        ``file:line`` for mistakes in the whole.
+    disturbance : list of (name, arguments, where), optional
+        Primitives of a force on the load [N], against contraction positive.
+    needs : sequence of str, optional
+        Measured topics without which the experiment tells nothing.
 
     Raises
     ------
@@ -51,70 +52,68 @@ class Experiment:
 
     """
 
-    def __init__(self, name, description, domain, segments, where=''):
+    def __init__(self, name, description, domain, segments, where='', disturbance=(), needs=()):
         if domain not in DOMAINS:
             raise InputError(
                 f'domain is "{domain}"; allowed: {", ".join(DOMAINS)}', where)
         if not segments:
             raise InputError('segments is empty; an experiment needs at least one', where)
         self.name, self.description, self.domain = name, description, domain
-        suffix, rest, self._lower, self._upper = DOMAINS[domain]
-        self._raw = [(n, dict(a or {})) for n, a, _ in segments]
-        self.segments, self._starts = [], []
-        value, t = rest, 0.0
-        for n, arguments, place in segments:
-            primitive = make_primitive(n, arguments, value, rest, suffix, place)
-            self._check_range(primitive, n, suffix, place)
-            self.segments.append(primitive)
-            self._starts.append(t)
-            t += primitive.duration_s
-            value = primitive.end
-        self.duration_s = t
-
-    def _check_range(self, primitive, name, suffix, where):
-        for k in range(201):
-            t = primitive.duration_s * k / 200
-            value = primitive.at(t)[0]
-            if not self._lower - 1e-9 <= value <= self._upper + 1e-9:
-                raise InputError(
-                    f'{name} reaches {value:.6g} {suffix} after {t:.3g} s; allowed for '
-                    f'{self.domain} is {self._lower:g} to {self._upper:g} {suffix}', where)
+        self.needs = tuple(needs)
+        self.chain = Chain(DOMAINS[domain], segments)
+        self.disturbance = Chain(FORCE, disturbance) if disturbance else None
+        self.duration_s = self.chain.duration_s
+        if self.disturbance and self.disturbance.duration_s > self.duration_s + 1e-9:
+            raise InputError(
+                f'disturbance lasts {self.disturbance.duration_s:g} s, the experiment only '
+                f'{self.duration_s:g} s', disturbance[0][2])
 
     def at(self, t_s):
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
-        if t_s < 0.0:
-            return self.segments[0].at(0.0)[0], 0.0
-        if t_s >= self.duration_s:
-            return self.segments[-1].end, 0.0
-        k = bisect.bisect_right(self._starts, t_s) - 1
-        return self.segments[k].at(t_s - self._starts[k])
+        return self.chain.at(t_s)
+
+    def shuts_valve(self, t_s):
+        """Tell whether both valves of a pair are shut at t_s, whatever the value."""
+        return self.chain.shuts_valve(t_s)
+
+    def external_force_n(self, t_s):
+        """Return the disturbance on the load [N], against contraction positive; 0 outside."""
+        if self.disturbance is None or not 0.0 <= t_s < self.disturbance.duration_s:
+            return 0.0
+        return self.disturbance.at(t_s)[0]
+
+    def sends_valve_command(self, valve):
+        """Tell whether some part of it speaks to a valve of this type directly."""
+        if self.domain in ('contraction', 'pressure'):
+            return valve == 'hsv' and any(s.SHUTS_VALVE for s in self.chain.segments)
+        return True
 
     @property
     def cycles(self):
         """Return (start_s, period_s, count) of the first periodic primitive, or None."""
-        for start, segment in zip(self._starts, self.segments):
-            if isinstance(segment, Sine):
-                return start, 1.0 / segment.frequency_hz, int(segment.cycles)
-            if isinstance(segment, Triangle):
-                return start, segment.period_s, int(segment.cycles)
-        return None
+        return self.chain.cycles
 
     def check_reachable(self, rig):
-        """Raise InputError where the experiment asks for more than the rig's stroke."""
-        if self.domain != 'contraction':
-            return
-        stroke = rig.muscle.stroke_m
-        steps = max(int(self.duration_s / 0.01), 1)
-        worst = max(self.at(k * 0.01)[0] for k in range(steps + 1))
-        if worst > stroke:
-            raise InputError(
-                f'experiment "{self.name}" asks for {1e3 * worst:.1f} mm of contraction; '
-                f'{rig.name} allows 0 to {1e3 * stroke:.1f} mm')
+        """Raise InputError where the experiment asks for what the rig cannot do."""
+        check_rig(self, rig)
+
+    def remarks(self, valve):
+        """Return sentences a person should read about this experiment on this valve."""
+        if valve == 'ppr' and any(s.SHUTS_VALVE for s in self.chain.segments):
+            return (
+                'decay: a pressure regulator has no shut state; it holds the last command and '
+                'refills what leaks, so this recording shows nothing of a leak',)
+        return ()
 
     def to_dict(self):
         """Return the experiment as plain data, as it stands in a file."""
-        return {'name': self.name, 'description': self.description, 'domain': self.domain,
-                'segments': [{n: a} for n, a in self._raw]}
+        data = {'name': self.name, 'description': self.description, 'domain': self.domain}
+        if self.needs:
+            data['needs'] = list(self.needs)
+        data['segments'] = self.chain.plain()
+        if self.disturbance:
+            data['disturbance'] = self.disturbance.plain()
+        return data
 
     def to_yaml(self):
         """Return YAML text from which ``load_experiment`` makes the same experiment."""
@@ -135,16 +134,25 @@ def load_experiment(source):
         source = find_config('experiments', source)
     data = load_yaml(source)
     data.check_keys(KEYS)
-    items = data.require('segments', list)
-    segments = [_segment(items, k) for k in range(len(items))]
     return Experiment(
         data.require('name', str), data.get('description', str, ''),
-        data.get('domain', str, 'contraction', choices=tuple(DOMAINS)), segments,
-        data.where('segments'))
+        data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
+        _segments(data.require('segments', list)), data.where('segments'),
+        _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())))
+
+
+def _needs(items):
+    """Return the names of the topics an experiment needs."""
+    return tuple(check_value(item, f'item {k + 1} of `needs`', items.where(k), str, choices=NEEDS)
+                 for k, item in enumerate(items))
+
+
+def _segments(items):
+    """Return (name, arguments, where) of every entry of a list of segments."""
+    return [_segment(items, k) for k in range(len(items))]
 
 
 def _segment(items, index):
-    """Return (name, arguments, where) of one entry of the list of segments."""
     item, where = items[index], items.where(index)
     if isinstance(item, str):
         return item, {}, where

@@ -64,7 +64,7 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     Parameters
     ----------
     experiment : Experiment
-        What to ask for. In the pressure domain the controller is not used.
+        What to ask for. Only the domain contraction uses the controller.
     rig : pam_sim.rig.Rig
         The simulated rig, valve included.
     controller : object or None
@@ -90,7 +90,7 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     Raises
     ------
     InputError
-        The experiment asks for more than the rig's stroke; the bag directory exists.
+        The experiment asks for what the rig cannot do; the bag directory exists.
 
     """
     experiment.check_reachable(rig)
@@ -111,7 +111,7 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
 def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace):
     """Call every loop at its rate, in order of time, until the experiment is over."""
     plant = PlantLoop(rig, seed=seed)
-    reference = ReferenceLoop(experiment)
+    reference = ReferenceLoop(experiment, valve=rig.valve)
     driver = DriverLoop(rig.valve, driver_config(rig))
     control = None
     if experiment.domain == 'contraction':
@@ -135,6 +135,10 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
             recorder.write(topic, message, now)
             if topic == 'pressure_command':
                 driver.on_command(message)
+            elif topic == 'valve_command':
+                driver.on_valve_command(message)
+            elif topic == 'external_force':
+                plant.set_external_force(message)
             else:
                 getattr(control, f'on_{topic}')(message)
 

@@ -14,7 +14,8 @@
 
 """Turn an experiment into reference messages on a clock."""
 
-from pam_actuation.messages import Pressure, Reference, ReferenceTrajectory
+from pam_actuation.messages import (
+    Force, Pressure, Reference, ReferenceTrajectory, ValveSignal)
 
 POINT_NS = 20_000_000          # points of the trajectory, at most 20 ms apart on the wire
 POINTS = 31                    # horizon 0.6 s; the wire asks for 0.5 s or more
@@ -31,15 +32,20 @@ class ReferenceLoop:
     Parameters
     ----------
     experiment : Experiment
-        What to ask for; domain ``pressure`` gives pressure commands instead.
+        What to ask for; domain ``pressure`` gives pressure commands, the raw valve
+        signals valve commands instead.
     rate_hz : float
         Ticks per second, 100 by default.
+    valve : {'ppr', 'hsv'}
+        Valve of the rig.
 
     """
 
-    def __init__(self, experiment, rate_hz=100.0):
+    def __init__(self, experiment, rate_hz=100.0, valve='ppr'):
         self.experiment = experiment
+        self.valve = valve
         self.rate_hz = float(rate_hz)
+        self._speaks_to_valve = experiment.sends_valve_command(valve)
         self.start_ns = None
         self._next_trajectory_ns = 0
 
@@ -56,18 +62,62 @@ class ReferenceLoop:
         Return the messages due now as a dict of short topic name to message.
 
         Domain ``contraction``: ``reference``, and every 0.1 s ``reference_trajectory``.
-        Domain ``pressure``: ``pressure_command``.
+        Domain ``pressure``: ``pressure_command``, or ``valve_command`` while a pair of valves
+        is to be shut. Raw valve signals: ``valve_command``, after the end the one that vents.
+        With a disturbance ``external_force`` as well, first.
         """
         if self.start_ns is None:
             self.start_ns = self._next_trajectory_ns = now_ns
-        value, rate = self.experiment.at(self.elapsed_s(now_ns))
-        if self.experiment.domain == 'pressure':
-            return {'pressure_command': Pressure(now_ns, value)}
-        out = {'reference': Reference(now_ns, value, rate)}
-        if now_ns >= self._next_trajectory_ns:
-            out['reference_trajectory'] = self.trajectory(now_ns)
-            self._next_trajectory_ns += TRAJECTORY_EVERY_NS
+        elapsed_s = self.elapsed_s(now_ns)
+        value, rate = self.experiment.at(elapsed_s)
+        out = {}
+        if self.experiment.disturbance:
+            out['external_force'] = Force(now_ns, self.experiment.external_force_n(elapsed_s))
+        if self.experiment.domain == 'contraction':
+            out['reference'] = Reference(now_ns, value, rate)
+            if now_ns >= self._next_trajectory_ns:
+                out['reference_trajectory'] = self.trajectory(now_ns)
+                self._next_trajectory_ns += TRAJECTORY_EVERY_NS
+        elif self.experiment.domain != 'pressure':
+            out['valve_command'] = self._valve_command(now_ns, value)
+        elif self._speaks_to_valve and self.experiment.shuts_valve(elapsed_s):
+            out['valve_command'] = _duty_command(now_ns, 0.0)
+        else:
+            out['pressure_command'] = Pressure(now_ns, value)
         return out
+
+    @property
+    def topics(self):
+        """Return the topics it may send on, the one with the wanted value first."""
+        domain = self.experiment.domain
+        if domain == 'contraction':
+            topics = ('reference', 'reference_trajectory')
+        else:
+            topics = ('pressure_command',) if domain == 'pressure' else ()
+            topics += ('valve_command',) if self._speaks_to_valve else ()
+        return (*topics, 'external_force') if self.experiment.disturbance else topics
+
+    def safe_messages(self, now_ns):
+        """Return the messages that end an experiment early: no disturbance, valve vented."""
+        out = {}
+        if self.experiment.disturbance:
+            out['external_force'] = Force(now_ns, 0.0)
+        if self._speaks_to_valve:
+            out['valve_command'] = self._vent(now_ns)
+        return out
+
+    def _valve_command(self, now_ns, value):
+        if self.finished(now_ns):
+            return self._vent(now_ns)
+        if self.experiment.domain == 'ppr_voltage':
+            return ValveSignal(now_ns, ('ppr_voltage',), (value,))
+        shut = self.experiment.shuts_valve(self.elapsed_s(now_ns))
+        return _duty_command(now_ns, 0.0 if shut else value)
+
+    def _vent(self, now_ns):
+        if self.valve == 'hsv':
+            return _duty_command(now_ns, -1.0)
+        return ValveSignal(now_ns, ('ppr_voltage',), (0.0,))
 
     def trajectory(self, now_ns):
         """Return the next 0.6 s of the reference as one message."""
@@ -75,3 +125,8 @@ class ReferenceLoop:
         points = [self.experiment.at(self.elapsed_s(now_ns + o)) for o in offsets]
         return ReferenceTrajectory(
             now_ns, offsets, tuple(p[0] for p in points), tuple(p[1] for p in points))
+
+
+def _duty_command(now_ns, duty):
+    """Return the valve command of a pair of valves: above 0 fills, below 0 vents."""
+    return ValveSignal(now_ns, ('fill_duty', 'vent_duty'), (max(duty, 0.0), max(-duty, 0.0)))

@@ -46,6 +46,7 @@ MESSAGE_TYPES = {
     'reference': JointState,
     'reference_trajectory': JointTrajectory,
     'pressure_command': FluidPressure,
+    'valve_command': JointState,
     'valve_signal': JointState,
     'pressure': FluidPressure,
     'supply_pressure': FluidPressure,
@@ -110,6 +111,7 @@ _READERS = {
     'reference': _read_reference,
     'reference_trajectory': _read_trajectory,
     'pressure_command': _read_pressure,
+    'valve_command': _read_valve_signal,
     'valve_signal': _read_valve_signal,
     'pressure': _read_pressure,
     'supply_pressure': _read_pressure,
@@ -158,7 +160,7 @@ class RosWriter:
         self._points = []
         self._fill = getattr(self, '_fill_' + {
             'pressure_command': 'pressure', 'supply_pressure': 'pressure',
-            'external_force': 'force'}.get(topic, topic))
+            'external_force': 'force', 'valve_command': 'valve_signal'}.get(topic, topic))
         if topic in ('reference', 'contraction'):
             self._message.name = [muscle]
         elif topic == 'reference_trajectory':

@@ -28,14 +28,18 @@ class ReferenceGenerator(ManagedNode):
     """
     Play one experiment; afterwards keep sending its last value.
 
-    An experiment in the pressure domain sends ``pressure_command`` itself and runs
-    without a controller.
+    An experiment in the pressure domain sends ``pressure_command`` itself, one in the raw
+    valve signal ``valve_command``; both run without a controller. The disturbance of an
+    experiment goes out on ``external_force``.
     """
 
     NAME = 'reference_generator'
     PARAMETERS = (
         NodeParameter(
             'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file.'),
+        NodeParameter(
+            'valve_type', 'ppr', 'Valve of the rig, for experiments that speak to it.',
+            choices=('ppr', 'hsv')),
         NodeParameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
         NodeParameter(
             'await_receiver', False, 'Wait before the experiment starts until some node besides '
@@ -45,15 +49,17 @@ class ReferenceGenerator(ManagedNode):
         NodeParameter('exit_when_finished', False, 'End the process when the experiment is over.'),
     )
 
+    loop = None
+    begin_ns = None
+
     def setup(self):
         """Load the experiment, create the topics of its domain."""
         from pam_actuation.experiments import load_experiment
         from pam_actuation.experiments.reference import ReferenceLoop
         self.experiment = load_experiment(self.value('experiment'))
-        self.loop = ReferenceLoop(self.experiment, self.value('rate_hz'))
-        in_pressure = self.experiment.domain == 'pressure'
-        topics = ('pressure_command',) if in_pressure else ('reference', 'reference_trajectory')
-        for topic in topics:
+        self.loop = ReferenceLoop(
+            self.experiment, self.value('rate_hz'), self.value('valve_type'))
+        for topic in self.loop.topics:
             self.add_publisher(topic)
         self.main_topic = self.publishers_counted[0].topic
 
@@ -87,10 +93,20 @@ class ReferenceGenerator(ManagedNode):
         if self.value('exit_when_finished'):
             self.exit_code = 0
 
+    def safe_stop(self, why):
+        """Take the disturbance off and, where it speaks to the valve, ask it to vent."""
+        if self.loop is not None and self.begin_ns is not None:
+            self.begin_ns = None
+            for topic, plain in self.loop.safe_messages(self.now_ns()).items():
+                self.send(topic, plain)
+
+    def teardown(self):
+        """Drop the experiment."""
+        self.loop = None
+
     def diagnostic_values(self):
         """Add how far the experiment is."""
-        loop = getattr(self, 'loop', None)
-        elapsed_s = loop.elapsed_s(self.now_ns()) if loop else 0.0
+        elapsed_s = self.loop.elapsed_s(self.now_ns()) if self.loop else 0.0
         return (*super().diagnostic_values(), ('elapsed_s', f'{elapsed_s:.3f}'))
 
 

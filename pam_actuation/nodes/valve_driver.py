@@ -18,6 +18,7 @@ import sys
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.messages import Pressure
+from pam_actuation.messages import ValveSignal
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -46,6 +47,9 @@ class ValveDriver(ManagedNode):
         NodeParameter(
             'rig', '', 'Rig preset or model file that tells the driver valves, volume and load; '
             'numbers given beside it win. Empty: the defaults of the parameters.'),
+        NodeParameter(
+            'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
+            'pressure_command; supervised alike.'),
         *(NodeParameter(p.name, p.default, p.description, p.lower, p.upper)
           for p in DRIVER_PARAMETERS),
     )
@@ -60,6 +64,9 @@ class ValveDriver(ManagedNode):
         self.loop = DriverLoop(self.value('valve_type'), config)
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
+        self.raw_commands = None
+        if self.value('accept_valve_command'):
+            self.raw_commands = self.add_subscription('valve_command')
         self.pressures = self.add_subscription('pressure')
         self.supplies = self.add_subscription('supply_pressure')
         self._safety_services = [
@@ -104,10 +111,18 @@ class ValveDriver(ManagedNode):
         return self._commanded or since_last_s >= EARLY_SHARE * self.loop.period_s
 
     def _take_commands(self):
-        taken = self.commands.take()
-        for message, info in taken:
-            self.loop.on_command(
-                from_ros('pressure_command', message), info['publication_sequence_number'])
+        taken = [(from_ros('pressure_command', message), info['publication_sequence_number'])
+                 for message, info in self.commands.take()]
+        if self.raw_commands is not None:
+            raw = [(from_ros('valve_command', message), None)
+                   for message, _ in self.raw_commands.take()]
+            # One sender takes turns on the two topics: they are one sequence by stamp.
+            taken = sorted(taken + raw, key=lambda item: item[0].stamp_ns) if raw else taken
+        for plain, sequence in taken:
+            if isinstance(plain, ValveSignal):
+                self.loop.on_valve_command(plain)
+            else:
+                self.loop.on_command(plain, sequence)
         self._commanded = bool(taken)
 
     def tick(self):
@@ -127,7 +142,9 @@ class ValveDriver(ManagedNode):
             self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
 
     def _look_at_graph(self):
-        self.loop.set_command_publishers(self.count_publishers(self.commands.topic))
+        counts = [self.count_publishers(subscription.topic)
+                  for subscription in (self.commands, self.raw_commands) if subscription]
+        self.loop.set_command_publishers(max(counts))
 
     def _on_emergency_stop(self, request, response):
         with self.loops.lock:

@@ -35,7 +35,7 @@ class RigPlan:
     The nodes of one session.
 
     ``parameters`` maps node name to ROS parameters, in the order in which the nodes
-    become active; ``controller_node`` is '' for an experiment in the pressure domain.
+    become active; ``controller_node`` is '' for an experiment without controller.
     """
 
     experiment: object
@@ -94,7 +94,7 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     elif valve and valve != rig.valve:
         rig = rig.with_(valve=valve)
     experiment.check_reachable(rig)
-    if experiment.domain == 'pressure':
+    if experiment.domain != 'contraction':
         controller = None
     elif not hasattr(controller, 'to_yaml'):
         controller = load_controller(controller or f'sofc_{rig.valve}', rig)
@@ -125,6 +125,7 @@ def _compile(rig, controller):
 
 def _parameters(plan, bag, learning, seed, namespace, overwrite):
     """Return node name to parameters and write the files they name."""
+    from pam_actuation.experiments import ReferenceLoop
     rig, controller = plan.rig, plan.controller
     rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
     nodes = {}
@@ -132,16 +133,19 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
             learning=str(bool(learning)).lower())
-        topics = ['pressure', 'contraction', 'force', 'valve_signal', 'pressure_command']
+        wanted = ReferenceLoop(plan.experiment, valve=rig.valve).topics
+        topics = ['pressure', 'contraction', 'force', 'valve_signal', *wanted]
         if rig.valve == 'hsv':
             topics.append('supply_pressure')
         if controller is not None:
-            topics += ['controller_state', 'reference', 'reference_trajectory']
+            topics += ['controller_state', 'pressure_command']
         nodes[RECORDER] = {
             'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
     nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
-    nodes[DRIVER] = {'valve_type': rig.valve, 'rig': rig_file}
+    nodes[DRIVER] = {
+        'valve_type': rig.valve, 'rig': rig_file,
+        'accept_valve_command': plan.experiment.sends_valve_command(rig.valve)}
     if controller is not None:
         nodes[plan.controller_node] = {
             'rig': rig_file, 'valve_type': rig.valve,
@@ -149,6 +153,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
         if controller.kind == 'sofc':
             nodes[plan.controller_node]['learning'] = learning
     nodes[REFERENCE] = {
+        'valve_type': rig.valve,
         'experiment': _write(plan.folder / 'experiment.yaml', plan.experiment.to_yaml())}
     for parameters in nodes.values():
         parameters['autostart'] = False

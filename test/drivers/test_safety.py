@@ -321,5 +321,5 @@ def test_fault_table_is_complete():
     assert len(FAULTS) == len(FAULT_TABLE)
     assert all(fault.title in text for fault in FAULT_TABLE)
     assert {fault.key for fault in FAULT_TABLE if fault.latched} == {
-        'emergency_stop', 'over_pressure'}
+        'emergency_stop', 'over_pressure', 'valve_command_interrupted'}
     assert text.count('\n') == len(FAULT_TABLE) + 2

@@ -15,9 +15,13 @@
 """Primitives and experiment files: continuity, rates, seeds, and every way to get a file wrong."""
 
 import math
+import os
+import subprocess
+import sys
 
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.primitives import make_primitive, PRIMITIVES
+from pam_actuation.resources import list_config
 from pam_sim.errors import InputError
 import pytest
 
@@ -36,10 +40,19 @@ EXAMPLES = {
                      'duration_s': 5.0, 'seed': 3},
     'multisine': {'center_m': 0.01, 'amplitude_m': 0.005, 'min_hz': 0.1, 'max_hz': 2.0,
                   'lines': 8, 'duration_s': 6.0, 'seed': 3},
+    'decay': {'duration_s': 2.0},
+    'knee_gait': {'low_m': 0.004, 'high_m': 0.02, 'frequency_hz': 0.8, 'cycles': 3},
+    'pulses': {'height_m': 0.002, 'width_s': 0.5, 'every_s': 2.0, 'count': 3},
+    'rates': {'low_m': 0.002, 'high_m': 0.02, 'slow_period_s': 8.0, 'fast_period_s': 2.0,
+              'rates': 3},
+    'triangle_loops': {'low_m': 0.002, 'high_m': 0.02, 'depth_m': 0.003, 'loops': 2,
+                       'period_s': 8.0, 'cycles': 2},
+    'two_bands': {'low_center_m': 0.006, 'high_center_m': 0.016, 'amplitude_m': 0.002,
+                  'frequency_hz': 0.5, 'cycles': 2, 'move_s': 1.0},
 }
-SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'increments', 'multisine')
-NAMED = ('sine_quarter_hz', 'sine_half_hz', 'step_10mm', 'short_sine', 'pressure_identification',
-         'pressure_increments')
+SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'increments', 'multisine', 'decay',
+          'knee_gait', 'two_bands')
+NAMED = list_config('experiments')
 
 
 def make(name):
@@ -86,6 +99,75 @@ def test_ramp_is_at_rest_at_both_ends_and_starts_where_the_last_ended():
     assert primitive.at(1.0) == (pytest.approx(0.01), pytest.approx(0.0, abs=1e-12))
 
 
+def test_triangle_with_loops_turns_where_it_should_at_one_rate():
+    primitive = make('triangle_loops')
+    assert primitive.rate == pytest.approx(0.0045)
+    assert primitive.cycle_s == pytest.approx(8.0 + 4 * 2 * 0.003 / 0.0045)
+    values = [primitive.at(0.001 * k)[0] for k in range(int(1000 * primitive.cycle_s))]
+    turns = [b for a, b, c in zip(values, values[1:], values[2:]) if (b - a) * (c - b) < 0]
+    expected = [0.008, 0.005, 0.014, 0.011, 0.02, 0.014, 0.017, 0.008, 0.011]
+    assert turns == pytest.approx(expected, abs=1e-5)
+    assert max(abs(b - a) for a, b in zip(values, values[1:])) <= 0.0045e-3 * (1 + 1e-9)
+    assert primitive.end == 0.002
+
+
+def test_rates_go_the_same_path_ever_faster():
+    primitive = make('rates')
+    assert primitive.all_periods_s == pytest.approx((8.0, 4.0, 2.0))
+    assert primitive.duration_s == pytest.approx(14.0)
+    assert primitive.at(4.0)[0] == pytest.approx(0.02)
+    assert primitive.at(10.0)[0] == pytest.approx(0.02)
+    assert primitive.at(13.0)[0] == pytest.approx(0.02)
+    assert [abs(primitive.at(t)[1]) for t in (1.0, 9.0, 12.5)] == pytest.approx(
+        [0.0045, 0.009, 0.018])
+
+
+def test_two_bands_make_the_same_motion_twice():
+    primitive = make('two_bands')
+    for k in range(40):
+        low, high = primitive.at(1.0 + 0.1 * k), primitive.at(6.0 + 0.1 * k)
+        assert high[0] - low[0] == pytest.approx(0.01)
+        assert high[1] == pytest.approx(low[1])
+    assert primitive.at(0.0)[0] == 0.003 and primitive.end == pytest.approx(0.014)
+
+
+def test_knee_gait_has_two_flexions_per_stride_and_stays_in_its_range():
+    primitive = make('knee_gait')
+    stride = [primitive.at(k / 800.0)[0] for k in range(1000)]
+    assert min(stride) == pytest.approx(0.004, abs=1e-9)
+    assert max(stride) == pytest.approx(0.02, abs=1e-6)
+    peaks = [b for a, b, c in zip(stride, stride[1:], stride[2:]) if a < b >= c]
+    assert len(peaks) == 2 and peaks[0] < 0.009 < peaks[1]
+    assert primitive.at(0.0)[1] == pytest.approx(0.0, abs=1e-9)
+    assert primitive.at(1.25) == pytest.approx(primitive.at(0.0), abs=1e-9)
+
+
+def test_pulses_begin_each_interval_and_end_at_the_base():
+    primitive = make('pulses')
+    assert [primitive.at(t)[0] for t in (0.0, 0.49, 0.5, 1.9, 2.0, 4.2, 5.0)] == pytest.approx(
+        [0.005, 0.005, 0.003, 0.003, 0.005, 0.005, 0.003])
+    assert primitive.end == 0.003
+
+
+def test_a_file_in_a_folder_of_ones_own_is_a_primitive(tmp_path):
+    (tmp_path / 'sawtooth.py').write_text(
+        'from dataclasses import dataclass\n'
+        'from pam_actuation.experiments.primitives.base import Primitive\n'
+        '@dataclass\n'
+        'class Sawtooth(Primitive):\n'
+        '    start: float\n'
+        '    duration_s: float\n'
+        '    def at(self, t_s):\n'
+        '        return self.start + 0.001 * (t_s % 1.0), 0.001\n'
+        'PRIMITIVE = Sawtooth\n')
+    code = ('from pam_actuation.experiments.primitives import PRIMITIVES, make_primitive\n'
+            'print(make_primitive("sawtooth", {"duration_s": 2.0}, 0.0, 0.0, "m").at(1.5)[0])')
+    done = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True,
+        env={**os.environ, 'PAM_PRIMITIVES_PATH': str(tmp_path)})
+    assert done.stdout.strip() == '0.0005', done.stderr
+
+
 def test_random_steps_follow_their_seed():
     same, other = make('random_steps'), dict(EXAMPLES['random_steps'], seed=4)
     times = [0.01 * k for k in range(500)]
@@ -123,16 +205,34 @@ def test_experiment_is_continuous_but_for_steps():
 
 
 BAD = {
-    'domain: torque\n': '`domain` is `torque`, allowed: contraction, pressure',
+    'domain: torque\n':
+        '`domain` is `torque`, allowed: contraction, pressure, ppr_voltage, hsv_duty',
     'sorts: 1\n': 'unknown key `sorts`',
     'segments: []\n': 'empty',
-    'segments:\n  - jump: {to_m: 0.01}\n': 'unknown primitive "jump"',
-    'segments:\n  - step: {to_pa: 0.01, duration_s: 1.0}\n': 'unknown key "to_pa" of step',
+    'segments:\n  - jump: {to_m: 0.01}\n': 'unknown primitive `jump`',
+    'segments:\n  - step: {to_pa: 0.01, duration_s: 1.0}\n': 'unknown key `to_pa` of step',
     'segments:\n  - step: {to_m: 0.01}\n': 'step lacks duration_s',
     'segments:\n  - step: {to_m: 0.3, duration_s: 1.0}\n': 'allowed for contraction is 0 to 0.25',
     'segments:\n  - step: {to_m: .nan, duration_s: 1.0}\n': 'finite number',
-    'segments:\n  - hold: {duration_s: -1.0}\n': 'allowed is above 0',
+    'segments:\n  - hold: {duration_s: -1.0}\n': 'allowed is 0.01 to 3600 s',
     'segments:\n  - 7\n': 'one "primitive: {keys}" entry',
+    'segments:\n  - hold: {duration_s: 1.0e+300}\n': 'allowed is 0.01 to 3600 s',
+    'segments:\n  - sine: {center_m: 0.01, amplitude_m: 0.001, frequency_hz: 40, cycles: 2}\n':
+        'allowed is 0.001 to 10 Hz',
+    'segments:\n  - sine: {center_m: 0.12, amplitude_m: 0.1, frequency_hz: 9, cycles: 2}\n':
+        'up to 1 m/s',
+    'segments:\n  - staircase: {low_m: 0, high_m: 0.01, steps: 2.5, hold_s: 1}\n':
+        'whole number',
+    'segments:\n  - triangle: {low_m: 0.02, high_m: 0.01, period_s: 1, cycles: 1}\n':
+        'low must be below high',
+    'segments:\n  - knee_gait: {low_m: 0, high_m: 0.01, frequency_hz: 3, cycles: 1}\n':
+        'walking is 0.5 to 1 Hz',
+    'segments:\n  - decay: {duration_s: 1.0}\n': 'makes no sense in the domain contraction',
+    'domain: ppr_voltage\nsegments:\n  - step: {to_v: 7, duration_s: 1}\n': '0 to 6 v',
+    'domain: hsv_duty\nsegments:\n  - step: {to_duty: -2, duration_s: 1}\n': '-1 to 1 duty',
+    'disturbance:\n  - hold: {duration_s: 2.0}\n': 'disturbance lasts 2 s',
+    'disturbance:\n  - step: {to_n: 900, duration_s: 0.5}\n': '-200 to 200 n',
+    'needs: [torque]\n': '`torque`',
 }
 
 

@@ -1,0 +1,141 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A chain of primitives in one domain: a value and its rate over time."""
+
+import bisect
+from dataclasses import dataclass
+
+from pam_actuation.experiments.primitives import make_primitive
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
+
+CHECK_EVERY_S = 0.01        # as often as the reference is sent
+_MOST_CHECKS = 100_000
+LONGEST_S = 6 * 3600.0
+
+
+@dataclass(frozen=True)
+class Domain:
+    """
+    What a value means.
+
+    ``unit`` is its suffix in files, ``rest`` the rest value, ``lower``..``upper`` its
+    range and ``fastest`` the highest rate per second of a value that does not jump
+    (a design value: beyond what any muscle or valve of this kind follows).
+    """
+
+    name: str
+    unit: str
+    rest: float
+    lower: float
+    upper: float
+    fastest: float
+
+
+# In a file: hsv_duty above 0 is the duty of the filling valve, below 0 of the venting one.
+DOMAINS = {d.name: d for d in (
+    Domain('contraction', 'm', 0.0, 0.0, 0.25, 1.0),
+    Domain('pressure', 'pa', P_ATM_PA, P_ATM_PA, 1_300_000.0, 2e7),
+    Domain('ppr_voltage', 'v', 0.0, 0.0, 6.0, 200.0),
+    Domain('hsv_duty', 'duty', -1.0, -1.0, 1.0, 100.0),
+)}
+FORCE = Domain('disturbance', 'n', 0.0, -200.0, 200.0, 10_000.0)
+
+
+class Chain:
+    """
+    Primitives one after another, each from where the former ended.
+
+    Parameters
+    ----------
+    domain : Domain
+        What the values mean.
+    segments : list of (name, arguments, where)
+        The primitives in order, with the keys of the file and ``file:line``.
+
+    Raises
+    ------
+    InputError
+        Unknown primitive or key; a value or rate outside the domain's range.
+
+    """
+
+    def __init__(self, domain, segments):
+        self.domain = domain
+        self.segments, self._starts = [], []
+        self._raw = [(name, dict(arguments or {})) for name, arguments, _ in segments]
+        value, t = domain.rest, 0.0
+        for name, arguments, where in segments:
+            primitive = make_primitive(
+                name, arguments, value, domain.rest, domain.unit, where, domain.name)
+            t += primitive.duration_s
+            if t > LONGEST_S:
+                raise InputError(
+                    f'after {name} the experiment is {t:.6g} s long; allowed is up to '
+                    f'{LONGEST_S:g} s', where)
+            self._check_range(primitive, name, where)
+            self.segments.append(primitive)
+            self._starts.append(t - primitive.duration_s)
+            value = primitive.end
+        self.duration_s = t
+
+    def _check_range(self, primitive, name, where):
+        domain, duration_s = self.domain, primitive.duration_s
+        count = min(max(round(duration_s / CHECK_EVERY_S), 200), _MOST_CHECKS)
+        for k in range(count + 1):
+            t = duration_s * k / count
+            value, rate = primitive.at(t)
+            if not domain.lower - 1e-9 <= value <= domain.upper + 1e-9:
+                raise InputError(
+                    f'{name} reaches {value:.6g} {domain.unit} after {t:.3g} s; allowed for '
+                    f'{domain.name} is {domain.lower:g} to {domain.upper:g} {domain.unit}', where)
+            if not abs(rate) <= domain.fastest:
+                raise InputError(
+                    f'{name} moves at {abs(rate):.4g} {domain.unit}/s after {t:.3g} s; allowed '
+                    f'for {domain.name} is up to {domain.fastest:g} {domain.unit}/s', where)
+
+    def _index(self, t_s):
+        return max(bisect.bisect_right(self._starts, t_s) - 1, 0)
+
+    def at(self, t_s):
+        """Return (value, rate) at t_s since the start; outside, the end values at rest."""
+        if t_s < 0.0:
+            return self.segments[0].at(0.0)[0], 0.0
+        if t_s >= self.duration_s:
+            return self.segments[-1].end, 0.0
+        k = self._index(t_s)
+        return self.segments[k].at(t_s - self._starts[k])
+
+    def shuts_valve(self, t_s):
+        """Tell whether the primitive at t_s shuts the valve; never outside the chain."""
+        return 0.0 <= t_s < self.duration_s and self.segments[self._index(t_s)].SHUTS_VALVE
+
+    @property
+    def cycles(self):
+        """Return (start_s, period_s, count) of the first periodic primitive, or None."""
+        for start, segment in zip(self._starts, self.segments):
+            if segment.periods:
+                return (start, *segment.periods)
+        return None
+
+    def extremes(self):
+        """Return the lowest and highest value, looked at every 10 ms."""
+        count = min(max(round(self.duration_s / CHECK_EVERY_S), 1), _MOST_CHECKS)
+        values = [self.at(self.duration_s * k / count)[0] for k in range(count + 1)]
+        return min(values), max(values)
+
+    def plain(self):
+        """Return the list of segments as it stands in a file."""
+        return [{name: arguments} for name, arguments in self._raw]

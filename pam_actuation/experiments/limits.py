@@ -1,0 +1,69 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a rig can do of an experiment, asked before the first message is sent."""
+
+from pam_actuation.drivers.for_rig import driver_config
+from pam_sim.errors import InputError
+from pam_sim.units import gauge_kpa, P_ATM_PA
+
+_VALVE_OF = {'ppr_voltage': 'ppr', 'hsv_duty': 'hsv'}
+
+
+def check_rig(experiment, rig):
+    """
+    Raise InputError where an experiment asks for more than a rig can give.
+
+    Contraction: the stroke of the muscle. Pressure: the limit of the driver and the supply
+    of the valves. Raw valve signal: the valve it is meant for. Disturbance: a load that
+    moves freely. Measured topics it needs.
+    """
+    place = f'experiment "{experiment.name}"'
+    if experiment.domain == 'contraction':
+        _check_stroke(experiment, rig, place)
+    elif experiment.domain == 'pressure':
+        _check_pressure(experiment, rig, place)
+    elif rig.valve != _VALVE_OF[experiment.domain]:
+        raise InputError(
+            f'its values are the raw signal {experiment.domain} of the valve type '
+            f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}', place)
+    if experiment.disturbance and 'mass_kg' not in rig.parameters:
+        raise InputError(
+            f'it pushes on the load, and the load `{rig.load}` of {rig.name} has no mass that '
+            'could move', place)
+    if 'supply_pressure' in experiment.needs and rig.valve != 'hsv':
+        raise InputError(
+            f'it needs supply_pressure, which {rig.name} with valve {rig.valve} does not measure',
+            place)
+
+
+def _check_stroke(experiment, rig, place):
+    stroke = rig.muscle.stroke_m
+    worst = experiment.chain.extremes()[1]
+    if worst > stroke:
+        raise InputError(
+            f'asks for {1e3 * worst:.1f} mm of contraction; {rig.name} allows 0 to '
+            f'{1e3 * stroke:.1f} mm', place)
+
+
+def _check_pressure(experiment, rig, place):
+    config = driver_config(rig)
+    highest = P_ATM_PA + config.safety.max_pressure_gauge_pa
+    if rig.valve == 'hsv':
+        highest = min(highest, config.hsv.supply_pa)
+    worst = experiment.chain.extremes()[1]
+    if worst > highest + 1e-6:
+        raise InputError(
+            f'asks for {gauge_kpa(worst):.1f} kPa gauge; {rig.name} allows 0 to '
+            f'{gauge_kpa(highest):.1f} kPa (driver limit and supply)', place)

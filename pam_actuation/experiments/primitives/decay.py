@@ -1,0 +1,36 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Shut the valve and watch."""
+
+from dataclasses import dataclass
+
+from pam_actuation.experiments.primitives.base import Primitive
+
+
+@dataclass
+class Decay(Primitive):
+    """Both high-speed valves shut; a pressure regulator holds its last command instead."""
+
+    DOMAINS = ('pressure', 'ppr_voltage', 'hsv_duty')
+    SHUTS_VALVE = True
+    start: float
+    duration_s: float
+
+    def at(self, t_s):
+        """Return the value wanted last, which is sent where the valve cannot be shut."""
+        return self.start, 0.0
+
+
+PRIMITIVE = Decay

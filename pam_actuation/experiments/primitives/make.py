@@ -1,0 +1,118 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Find the primitives and build one from the keys of an experiment file."""
+
+from dataclasses import fields, MISSING
+import math
+from pathlib import Path
+
+from pam_sim.errors import InputError
+from pam_sim.plugins import pick, plugin_files, plugin_module
+
+_FOLDER = Path(__file__).parent
+_FILLED_IN = ('start', 'rest_value')
+
+# Last part of a key: lowest and highest value. The reference is sent 100 times a second:
+# nothing shorter than a message, nothing faster than ten messages per period.
+_LIMITS = {'s': (0.01, 3600.0, ' s'), 'hz': (0.001, 10.0, ' Hz')}
+_LARGEST_COUNT = 1000
+_LARGEST_SEED = 2**32 - 1
+
+
+def _found():
+    """Return name to class of all primitives there are."""
+    files = plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make'))
+    return {path.stem: plugin_module(
+        path, _FOLDER, __package__, 'pam_primitive').PRIMITIVE for path in files}
+
+
+PRIMITIVES = _found()
+
+
+def keys_of(cls, suffix):
+    """Return key in the file to dataclass field of a primitive, in the order of the class."""
+    return {f'{f.name}_{suffix}' if f.name in cls.QUANTITIES else f.name: f for f in fields(cls)
+            if f.init and f.name not in _FILLED_IN}
+
+
+def make_primitive(name, arguments, start, rest_value, suffix, where='', domain=None):
+    """
+    Build a primitive from the keys of an experiment file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the primitive, as in ``PRIMITIVES``.
+    arguments : dict
+        Keys of the file; quantities carry the suffix of the domain.
+    start, rest_value : float
+        Value the previous primitive ended with; rest value of the domain.
+    suffix : str
+        Unit suffix of the domain: ``m``, ``pa``, ``v``, ``duty`` or ``n``.
+    where : str
+        ``file:line`` for the error message.
+    domain : str, optional
+        Name of the domain, for primitives that make sense in some only.
+
+    Raises
+    ------
+    InputError
+        Unknown primitive, unknown or missing key, a value out of its range.
+
+    """
+    cls = pick(PRIMITIVES, name, 'primitive', where)
+    if domain and cls.DOMAINS and domain not in cls.DOMAINS:
+        raise InputError(
+            f'{name} makes no sense in the domain {domain}; it does in '
+            f'{", ".join(cls.DOMAINS)}', where)
+    keys = keys_of(cls, suffix)
+    values = {}
+    for key, value in dict(arguments or {}).items():
+        if key not in keys:
+            raise InputError(
+                f'unknown key `{key}` of {name}; allowed: {", ".join(keys)}', where)
+        _check(f'{name}.{key}', keys[key], value, keys[key].name in cls.QUANTITIES, where)
+        values[keys[key].name] = value
+    missing = [key for key, field in keys.items()
+               if field.name not in values and field.default is MISSING]
+    if missing:
+        raise InputError(f'{name} lacks {", ".join(missing)}', where)
+    if 'rest_value' in cls.__dataclass_fields__:
+        values['rest_value'] = rest_value
+    primitive = cls(start=start, **values)
+    problem = primitive.problem()
+    if problem:
+        raise InputError(f'{name}: {problem}', where)
+    return primitive
+
+
+def _check(what, field, value, is_quantity, where):
+    """Raise InputError unless the value is a number in the range of its kind."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) \
+            or not math.isfinite(value):
+        raise InputError(f'{what} is {value!r}; a finite number is needed', where)
+    if is_quantity:
+        return
+    unit = ''
+    if field.name == 'seed':
+        lower, upper = 0, _LARGEST_SEED
+    else:
+        lower, upper, unit = _LIMITS.get(
+            field.name.rsplit('_', 1)[-1], (1 if field.type is int else 1e-3, _LARGEST_COUNT, ''))
+    if field.type is int and value != int(value):
+        raise InputError(f'{what} is {value!r}; a whole number is needed', where)
+    if not lower <= value <= upper:
+        raise InputError(
+            f'{what} is {value!r}; allowed is {lower:g} to {upper:g}{unit}', where)

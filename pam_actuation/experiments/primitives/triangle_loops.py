@@ -1,0 +1,85 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Turn back within a slow triangle: nested hysteresis loops."""
+
+from dataclasses import dataclass
+
+from pam_actuation.experiments.primitives.base import along, Primitive
+
+
+@dataclass
+class TriangleLoops(Primitive):
+    """Slow triangle with inner loops: at even places it turns back by ``depth``."""
+
+    QUANTITIES = ('low', 'high', 'depth')
+    start: float
+    low: float
+    high: float
+    depth: float
+    loops: int
+    period_s: float
+    cycles: int = 1
+
+    def problem(self):
+        """Refuse loops that would not lie within the triangle."""
+        if not self.low < self.high:
+            return 'low must be below high'
+        longest = (self.high - self.low) / (self.loops + 1)
+        if not 0.0 < self.depth <= longest:
+            return (f'depth is {self.depth:g}; with loops {self.loops:g} allowed is above 0, to '
+                    f'{longest:g}, the distance of two turning points')
+        return ''
+
+    def __post_init__(self):
+        """Lay the path through all turning points of one cycle."""
+        share = (self.high - self.low) / (self.loops + 1)
+        path = [self.low]
+        for k in range(1, int(self.loops) + 1):
+            turn = self.low + k * share
+            path += [turn, turn - self.depth, turn]
+        path.append(self.high)
+        for k in range(1, int(self.loops) + 1):
+            turn = self.high - k * share
+            path += [turn, turn + self.depth, turn]
+        self._path = [*path, self.low]
+
+    @property
+    def rate(self):
+        """Speed on the whole path: that of the triangle without inner loops."""
+        return 2.0 * (self.high - self.low) / self.period_s
+
+    @property
+    def cycle_s(self):
+        """Length of one cycle, inner loops included."""
+        return self.period_s + 4.0 * int(self.loops) * self.depth / self.rate
+
+    @property
+    def duration_s(self):
+        """Length of all cycles together."""
+        return self.cycle_s * int(self.cycles)
+
+    @property
+    def periods(self):
+        """Return (length of a cycle in s, cycles)."""
+        return self.cycle_s, int(self.cycles)
+
+    def at(self, t_s):
+        """Return value and rate."""
+        if t_s >= self.duration_s:
+            return self.low, 0.0
+        return along(self._path, self.rate, t_s % self.cycle_s)
+
+
+PRIMITIVE = TriangleLoops

@@ -1,0 +1,179 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What experiments send in each domain, offline, and what a rig refuses."""
+
+from pam_actuation.bags.load import load_run
+from pam_actuation.experiments import load_experiment, ReferenceLoop
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.messages import ValveSignal
+import pam_sim
+from pam_sim.errors import InputError
+import pytest
+
+T0 = 1_700_000_000_000_000_000
+DUTY = """\
+name: duty
+domain: hsv_duty
+segments:
+  - rest: {duration_s: 0.2}
+  - step: {to_duty: 0.3, duration_s: 0.5}
+  - decay: {duration_s: 0.5}
+  - step: {to_duty: -0.25, duration_s: 0.2}
+"""
+VOLTAGE = """\
+name: voltage
+domain: ppr_voltage
+segments:
+  - rest: {duration_s: 0.2}
+  - step: {to_v: 3.0, duration_s: 0.8}
+"""
+SHUT = """\
+name: shut
+domain: pressure
+segments:
+  - ramp: {to_pa: 401325.0, duration_s: 0.6}
+  - hold: {duration_s: 0.6}
+  - decay: {duration_s: 0.5}
+  - hold: {duration_s: 0.2}
+"""
+PUSH = """\
+name: push
+domain: pressure
+segments:
+  - ramp: {to_pa: 501325.0, duration_s: 0.5}
+  - hold: {duration_s: 1.5}
+disturbance:
+  - rest: {duration_s: 1.0}
+  - pulses: {height_n: 10.0, width_s: 0.4, every_s: 0.8, count: 1}
+"""
+
+
+def sent(text, valve, seconds):
+    """Return (loop, messages of every tick at 100 Hz)."""
+    loop = ReferenceLoop(load_experiment(text), valve=valve)
+    return loop, [loop.tick(T0 + k * 10_000_000) for k in range(int(seconds * 100))]
+
+
+def simulated(text, valve, tmp_path):
+    """Return the run of an experiment simulated on the realistic rig."""
+    rig = pam_sim.load_rig('dmsp_5_300_realistic', valve=valve)
+    return load_run(simulate_experiment(load_experiment(text), rig, None, tmp_path / 'b')['bag'])
+
+
+def test_duty_experiments_command_the_pair_and_end_with_the_vent():
+    _, ticks = sent(DUTY, 'hsv', 1.6)
+    assert all(set(m) == {'valve_command'} for m in ticks)
+    assert [ticks[k]['valve_command'].efforts for k in (10, 30, 100, 130, 150)] == [
+        (0.0, 1.0), (0.3, 0.0), (0.0, 0.0), (0.0, 0.25), (0.0, 1.0)]
+
+
+def test_voltage_experiments_command_volts_and_end_at_zero():
+    _, ticks = sent(VOLTAGE, 'ppr', 1.2)
+    assert ticks[50] == {
+        'valve_command': ValveSignal(T0 + 500_000_000, ('ppr_voltage',), (3.0,))}
+    assert ticks[110]['valve_command'].efforts == (0.0,)
+
+
+def test_decay_shuts_a_pair_of_valves_and_holds_a_regulator():
+    loop, ticks = sent(SHUT, 'hsv', 1.85)
+    assert loop.topics == ('pressure_command', 'valve_command')
+    assert ticks[150]['valve_command'].efforts == (0.0, 0.0)
+    assert all(set(m) == {'pressure_command'} for m in ticks[:120] + ticks[171:])
+    loop, ticks = sent(SHUT, 'ppr', 1.85)
+    assert loop.topics == ('pressure_command',)
+    assert ticks[150]['pressure_command'].pressure_pa == pytest.approx(401325.0)
+    experiment = load_experiment(SHUT)
+    assert 'nothing of a leak' in experiment.remarks('ppr')[0]
+    assert experiment.remarks('hsv') == ()
+
+
+def test_decay_in_simulation_sends_two_shut_valves_and_a_leak_shows(tmp_path):
+    rig = pam_sim.load_rig('dmsp_5_300_hanging_mass', valve='hsv')
+    leaky = rig.with_(effects=[
+        {'name': 'leakage', 'parameters': {'conductance_m3_per_s_pa': 5e-12}}])
+    lost = []
+    for k, one in enumerate((rig, leaky)):
+        run = load_run(simulate_experiment(
+            load_experiment(SHUT), one, None, tmp_path / str(k))['bag'])
+        signal, pressure = run.topics['valve_signal'], run.topics['pressure']
+        start = pressure.stamp_ns[0]
+        inside = ((signal.stamp_ns - start) * 1e-9 > 1.25) & (
+            (signal.stamp_ns - start) * 1e-9 < 1.65)
+        assert (signal.values['fill_duty'][inside] == 0.0).all()
+        assert (signal.values['vent_duty'][inside] == 0.0).all()
+        t = (pressure.stamp_ns - start) * 1e-9
+        value = pressure.values['pressure_pa']
+        lost.append(value[t > 1.3][0] - value[t < 1.65][-1])
+    assert abs(lost[0]) < 500.0 and lost[1] > lost[0] + 5000.0
+
+
+@pytest.mark.parametrize('text, valve, name, value', [
+    (DUTY, 'hsv', 'fill_duty', 0.3), (VOLTAGE, 'ppr', 'ppr_voltage', 3.0)])
+def test_raw_experiments_run_in_simulation(tmp_path, text, valve, name, value):
+    run = simulated(text, valve, tmp_path)
+    assert run.topics['valve_command'].values[name].max() == value
+    assert run.topics['valve_signal'].values[name].max() == pytest.approx(value)
+    assert run.topics['pressure'].values['pressure_pa'].max() > 250e3
+    assert 'pressure_command' not in run.topics
+
+
+def test_a_disturbance_moves_the_load(tmp_path):
+    run = simulated(PUSH, 'ppr', tmp_path)
+    force, push = run.topics['force'], run.topics['external_force']
+    assert push.values['force_n'].max() == 10.0 and push.values['force_n'][-1] == 0.0
+    t = (force.stamp_ns - force.stamp_ns[0]) * 1e-9
+    before = force.values['force_n'][(t > 0.9) & (t < 1.0)].mean()
+    during = force.values['force_n'][(t > 1.2) & (t < 1.4)].mean()
+    assert during - before == pytest.approx(10.0, abs=4.0)
+    t = (push.stamp_ns - push.stamp_ns[0]) * 1e-9
+    assert set(push.values['force_n'][(t > 1.0) & (t < 1.39)]) == {10.0}
+
+
+def test_ending_early_takes_the_disturbance_off_and_vents():
+    loop, _ = sent(PUSH, 'ppr', 1.2)
+    assert loop.safe_messages(T0 + 5).keys() == {'external_force'}
+    assert loop.safe_messages(T0 + 5)['external_force'].force_n == 0.0
+    loop, _ = sent(DUTY, 'hsv', 0.5)
+    assert loop.safe_messages(T0 + 5)['valve_command'].efforts == (0.0, 1.0)
+
+
+HIGH = 'name: high\ndomain: pressure\nsegments:\n  - step: {to_pa: %f, duration_s: 1}\n'
+FAR = 'name: far\nsegments:\n  - step: {to_m: 0.09, duration_s: 1}\n'
+NEEDY = 'name: needy\ndomain: pressure\nneeds: [supply_pressure]\nsegments:\n  - rest: ' \
+        '{duration_s: 1}\n'
+
+
+@pytest.mark.parametrize('text, rig, valve, says', [
+    (DUTY, 'dmsp_5_300_realistic', 'ppr', 'raw signal hsv_duty of the valve type hsv'),
+    (VOLTAGE, 'dmsp_5_300_realistic', 'hsv', 'raw signal ppr_voltage of the valve type ppr'),
+    (HIGH % 751325.0, 'dmsp_5_300_realistic', 'hsv', '650.0 kPa gauge'),
+    (HIGH % 751325.0, 'dmsp_5_300_realistic', 'ppr', 'allows 0 to 600.0 kPa'),
+    (FAR, 'dmsp_5_300_realistic', 'ppr', '90.0 mm'),
+    (PUSH, 'dmsp_5_300_isometric', 'ppr', 'no mass'),
+    (NEEDY, 'dmsp_5_300_realistic', 'ppr', 'supply_pressure'),
+])
+def test_a_rig_refuses_what_it_cannot_do_before_anything_is_written(
+        tmp_path, text, rig, valve, says):
+    with pytest.raises(InputError, match=says):
+        simulate_experiment(
+            load_experiment(text), pam_sim.load_rig(rig, valve=valve), None, tmp_path / 'bag')
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_needs_and_disturbance_round_trip():
+    experiment = load_experiment(NEEDY)
+    assert load_experiment(experiment.to_yaml()).needs == ('supply_pressure',)
+    again = load_experiment(load_experiment(PUSH).to_yaml())
+    assert [again.external_force_n(t) for t in (0.5, 1.1, 1.5, 5.0)] == [0.0, 10.0, 0.0, 0.0]
