@@ -14,13 +14,14 @@
 
 """An experiment file: a domain and a chain of primitives, checked before it runs."""
 
-from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE
+from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S
 from pam_actuation.experiments.limits import check_rig
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located
 
-KEYS = ('name', 'description', 'domain', 'needs', 'segments', 'disturbance')
+KEYS = (
+    'name', 'description', 'domain', 'needs', 'stop_after_s', 'segments', 'disturbance')
 NEEDS = ('pressure', 'contraction', 'force', 'supply_pressure')
 
 
@@ -44,6 +45,8 @@ class Experiment:
         Primitives of a force on the load [N], against contraction positive.
     needs : sequence of str, optional
         Measured topics without which the experiment tells nothing.
+    stop_after_s : float, optional
+        End before the last primitive does, to try a long experiment.
 
     Raises
     ------
@@ -52,7 +55,8 @@ class Experiment:
 
     """
 
-    def __init__(self, name, description, domain, segments, where='', disturbance=(), needs=()):
+    def __init__(self, name, description, domain, segments, where='', disturbance=(), needs=(),
+                 stop_after_s=None):
         if domain not in DOMAINS:
             raise InputError(
                 f'domain is "{domain}"; allowed: {", ".join(DOMAINS)}', where)
@@ -62,23 +66,28 @@ class Experiment:
         self.needs = tuple(needs)
         self.chain = Chain(DOMAINS[domain], segments)
         self.disturbance = Chain(FORCE, disturbance) if disturbance else None
-        self.duration_s = self.chain.duration_s
-        if self.disturbance and self.disturbance.duration_s > self.duration_s + 1e-9:
+        whole_s = self.chain.duration_s
+        if self.disturbance and self.disturbance.duration_s > whole_s + 1e-9:
             raise InputError(
                 f'disturbance lasts {self.disturbance.duration_s:g} s, the experiment only '
-                f'{self.duration_s:g} s', disturbance[0][2])
+                f'{whole_s:g} s', disturbance[0][2])
+        self.stop_after_s = stop_after_s
+        self.duration_s = whole_s if stop_after_s is None else min(stop_after_s, whole_s)
 
     def at(self, t_s):
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
+        if t_s >= self.duration_s:
+            return self.chain.at(self.duration_s)[0], 0.0
         return self.chain.at(t_s)
 
     def shuts_valve(self, t_s):
         """Tell whether both valves of a pair are shut at t_s, whatever the value."""
-        return self.chain.shuts_valve(t_s)
+        return t_s < self.duration_s and self.chain.shuts_valve(t_s)
 
     def external_force_n(self, t_s):
         """Return the disturbance on the load [N], against contraction positive; 0 outside."""
-        if self.disturbance is None or not 0.0 <= t_s < self.disturbance.duration_s:
+        if self.disturbance is None or not 0.0 <= t_s < min(
+                self.disturbance.duration_s, self.duration_s):
             return 0.0
         return self.disturbance.at(t_s)[0]
 
@@ -110,6 +119,8 @@ class Experiment:
         data = {'name': self.name, 'description': self.description, 'domain': self.domain}
         if self.needs:
             data['needs'] = list(self.needs)
+        if self.stop_after_s is not None:
+            data['stop_after_s'] = self.stop_after_s
         data['segments'] = self.chain.plain()
         if self.disturbance:
             data['disturbance'] = self.disturbance.plain()
@@ -138,7 +149,8 @@ def load_experiment(source):
         data.require('name', str), data.get('description', str, ''),
         data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
         _segments(data.require('segments', list)), data.where('segments'),
-        _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())))
+        _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())),
+        data.get('stop_after_s', float, None, 0.01, LONGEST_S, unit='s'))
 
 
 def _needs(items):

@@ -21,6 +21,7 @@ seed, all stamps from the virtual clock.
 """
 
 from collections import Counter
+import heapq
 import os
 
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
@@ -56,8 +57,19 @@ class _Recorder:
         self.counts[name] += 1
 
 
+def _due(order, ticks_ns, rate_hz, end_ns):
+    """Yield (time, order) of the ticks of one loop; at equal times the lower order is first."""
+    if ticks_ns is None:
+        ticks_ns = range(0, end_ns - START_NS + 1, round(1e9 / rate_hz))
+    for after_ns in ticks_ns:
+        now_ns = START_NS + int(after_ns)
+        if now_ns > end_ns:
+            return
+        yield now_ns, order
+
+
 def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
-                        overwrite=False, progress=None, namespace=NAMESPACE):
+                        overwrite=False, progress=None, namespace=NAMESPACE, ticks=None):
     """
     Simulate an experiment and record it as a bag.
 
@@ -81,6 +93,10 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
         Called with simulated seconds done.
     namespace : str
         Namespace of the topics.
+    ticks : dict of str to sequence of int, optional
+        When the loops ``plant``, ``reference``, ``controller`` and ``driver`` tick, ns since
+        the start and perhaps before it; a loop not named ticks at its rate. For the tick
+        times of a live run.
 
     Returns
     -------
@@ -101,15 +117,16 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
     recorder = _Recorder(writer, namespace)
     try:
-        _run(experiment, rig, controller, seed, learning, recorder, progress, namespace)
+        _run(experiment, rig, controller, seed, learning, recorder, progress, namespace,
+             ticks or {})
     finally:
         writer.close()
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
 
 
-def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace):
-    """Call every loop at its rate, in order of time, until the experiment is over."""
+def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace, ticks):
+    """Call every loop when it is due, in order of time, until the experiment is over."""
     plant = PlantLoop(rig, seed=seed)
     reference = ReferenceLoop(experiment, valve=rig.valve)
     driver = DriverLoop(rig.valve, driver_config(rig))
@@ -159,21 +176,16 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
             recorder.write('diagnostics', status, now)
 
     # At equal times: measure, then want, then decide, then act.
-    loops = [(PUBLISH_RATE_HZ, tick_plant), (reference.rate_hz, tick_reference)]
+    loops = [('plant', PUBLISH_RATE_HZ, tick_plant),
+             ('reference', reference.rate_hz, tick_reference)]
     if control is not None:
-        loops.append((controller.rate_hz, tick_control))
-    loops.append((driver.rate_hz, tick_driver))
-    periods = [round(1e9 / rate) for rate, _ in loops]
-    due = [START_NS] * len(loops)
+        loops.append(('controller', controller.rate_hz, tick_control))
+    loops.append(('driver', driver.rate_hz, tick_driver))
     end = START_NS + round(experiment.duration_s * 1e9)
     reported = 0
-    while True:
-        k = due.index(min(due))
-        now = due[k]
-        if now > end:
-            break
-        loops[k][1](now)
-        due[k] = now + periods[k]
+    for now, k in heapq.merge(*(
+            _due(k, ticks.get(name), rate_hz, end) for k, (name, rate_hz, _) in enumerate(loops))):
+        loops[k][2](now)
         if progress and (now - START_NS) // 1_000_000_000 > reported:
             reported = (now - START_NS) // 1_000_000_000
             progress(reported)

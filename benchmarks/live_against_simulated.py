@@ -1,0 +1,174 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Named experiments live and simulated from the same file: how far the recordings agree.
+
+Run ``python benchmarks/live_against_simulated.py --experiments decay,knee_gait --seconds 15``.
+Per experiment the live nodes run once, in real time. Everything is compared at the header
+stamps of the live measurements, time zero being the first message of the experiment:
+
+live - sim      live recording less simulation, RMS
+noise           two simulations that differ in the seed of the sensors, RMS: noise of both and
+                what it does on its way through the controller
+timing          two simulations without sensor noise, one with every loop ticking when it
+                ticked in the live run, RMS: phase, jitter and pauses of the loops
+live - re-timed live recording less the noisy simulation with the live ticks, RMS: what
+                neither of the two explains (transport between the processes)
+"""
+
+import argparse
+from dataclasses import dataclass
+import os
+import tempfile
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.rigging.session import run_experiment
+from pam_sim import load_rig
+import yaml
+
+SIGNALS = {'pressure': ('pressure_pa', 'kPa', 1e-3), 'contraction': ('contraction_m', 'mm', 1e3),
+           'force': ('force_n', 'N', 1.0)}
+FIRST = ('reference', 'pressure_command', 'valve_command')
+TICKS = {'plant': 'pressure', 'reference': FIRST, 'controller': 'controller_state',
+         'driver': 'valve_signal'}
+BEFORE_NS = 50_000_000         # ticks taken over from before the start
+DEFAULT = ('step_10mm', 'knee_gait', 'disturbance', 'random_steps', 'voltage_steps')
+
+
+@dataclass
+class Recording:
+    """One run with its start: the first message that carries the wanted value."""
+
+    run: object
+    start_ns: int
+
+    @classmethod
+    def of(cls, path, contraction):
+        """Load a bag; in contraction the pressure command is the controller's."""
+        run = load_run(path)
+        first = ('reference',) if contraction else FIRST[1:]
+        return cls(run, min(int(run.topics[t].stamp_ns[0]) for t in first if t in run))
+
+    def stamps(self, topics):
+        """Return the sorted stamps of a topic, or of several together, ns since the start."""
+        names = (topics,) if isinstance(topics, str) else topics
+        stamps = [self.run.topics[name].stamp_ns for name in names if name in self.run]
+        return np.sort(np.concatenate(stamps)) - self.start_ns
+
+    def series(self, topic):
+        """Return (seconds since the start, values in units for people)."""
+        key, _, scale = SIGNALS[topic]
+        one = self.run.topics[topic]
+        return (one.stamp_ns - self.start_ns) * 1e-9, one.values[key] * scale
+
+
+def rms_between(one, other, topic, duration_s):
+    """Return the RMS of one recording less another, at the stamps of the first."""
+    t, value = one.series(topic)
+    inside = (t > 0.0) & (t < duration_s)
+    return float(np.sqrt(np.mean((value - np.interp(t, *other.series(topic)))[inside] ** 2)))
+
+
+def live_ticks(live, contraction):
+    """Return when every loop of a live run ticked, for ``simulate_experiment``."""
+    ticks = {}
+    for loop, topics in TICKS.items():
+        if loop == 'reference':
+            topics = 'reference' if contraction else FIRST[1:]
+        elif loop == 'controller' and not contraction:
+            continue
+        stamps = live.stamps(topics)
+        ticks[loop] = stamps[stamps >= (0 if loop == 'reference' else -BEFORE_NS)]
+    return ticks
+
+
+def timing_ms(ticks, name):
+    """Return (mean interval, its standard deviation, longest interval) of a loop [ms]."""
+    gaps = np.diff(ticks[name]) * 1e-6
+    return gaps.mean(), gaps.std(), gaps.max()
+
+
+def compare(name, valve, seconds, folder, domain_id):
+    """Run one experiment live and simulated; return the lines of the tables."""
+    experiment = load_experiment(name)
+    if seconds and seconds < experiment.duration_s:
+        experiment = load_experiment(
+            yaml.safe_dump({**experiment.to_dict(), 'stop_after_s': seconds}, sort_keys=False))
+    rig = load_rig('dmsp_5_300_realistic', valve=valve)
+    contraction = experiment.domain == 'contraction'
+    path = os.path.join(folder, f'{experiment.name}_{valve}')
+    result = run_experiment(
+        experiment, rig, None, valve, f'{path}_live', seed=1, domain_id=domain_id)
+    if result.failure or result.findings:
+        print(f'{name} {valve}: {result.failure} {result.findings}', flush=True)
+    live = Recording.of(result.bag, contraction)
+    ticks = live_ticks(live, contraction)
+    quiet = rig.with_(sensors={key: 0.0 for key in rig.sensors})
+
+    def simulated(tag, one_rig, seed, at=None):
+        controller = load_controller(f'sofc_{valve}', rig) if contraction else None
+        done = simulate_experiment(
+            experiment, one_rig, controller, f'{path}_{tag}', seed=seed, ticks=at)
+        return Recording.of(done['bag'], contraction)
+
+    plain, other = simulated('sim', rig, 2), simulated('other', rig, 3)
+    retimed = simulated('retimed', rig, 4, ticks)
+    quiet_plain, quiet_retimed = simulated('q', quiet, 1), simulated('q_retimed', quiet, 1, ticks)
+    rows = []
+    for topic, (_, unit, _) in SIGNALS.items():
+        a, n, t, r = (
+            rms_between(*pair, topic, experiment.duration_s) for pair in (
+                (live, plain), (other, plain), (quiet_retimed, quiet_plain), (live, retimed)))
+        rows.append(
+            f'| {experiment.name} | {valve} | {experiment.duration_s:.0f} s | {topic} [{unit}] '
+            f'| {a:.3f} | {n:.3f} | {t:.3f} | {a / np.hypot(n, t):.2f} | {r:.3f} |')
+    shown = [f'| {experiment.name} | {valve} ']
+    for loop in TICKS:
+        shown.append('| – ' if loop not in ticks else '| {:.2f} ± {:.2f}, {:.1f} '.format(
+            *timing_ms(ticks, loop)))
+    return rows, ''.join(shown) + '|'
+
+
+def main():
+    """Print both tables as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--experiments', default=','.join(DEFAULT), help='names, by commas')
+    parser.add_argument('--valve', default='ppr', choices=('ppr', 'hsv'))
+    parser.add_argument('--seconds', type=float, default=None, help='shorten each to this')
+    parser.add_argument('--domain-id', type=int, default=None, help='ROS domain')
+    parser.add_argument('--keep', default=None, metavar='DIR', help='keep the bags here')
+    args = parser.parse_args()
+    timing = []
+    print('| experiment | valve | time | signal | live - sim | noise | timing | ratio '
+          '| live - re-timed |')
+    print('|---|---|---|---|---|---|---|---|---|')
+    with tempfile.TemporaryDirectory() as temporary:
+        for name in args.experiments.split(','):
+            rows, line = compare(
+                name, args.valve, args.seconds, args.keep or temporary, args.domain_id)
+            print('\n'.join(rows), flush=True)
+            timing.append(line)
+    print('\nIntervals of the loops in the live run [ms], mean ± standard deviation, longest:\n')
+    print('| experiment | valve | plant | reference | controller | driver |')
+    print('|---|---|---|---|---|---|')
+    print('\n'.join(timing))
+
+
+if __name__ == '__main__':
+    main()
