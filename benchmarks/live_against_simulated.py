@@ -23,9 +23,10 @@ live - sim      live recording less simulation, RMS
 noise           two simulations that differ in the seed of the sensors, RMS: noise of both and
                 what it does on its way through the controller
 timing          two simulations without sensor noise, one with every loop ticking when it
-                ticked in the live run, RMS: phase, jitter and pauses of the loops
-live - re-timed live recording less the noisy simulation with the live ticks, RMS: what
-                neither of the two explains (transport between the processes)
+                ticked in the live run and every message as late as the median one was
+                there, RMS: phase, jitter and pauses of the loops, and transport
+live - re-timed live recording less the noisy simulation with the live timing, RMS: noise,
+                and what is left unexplained
 """
 
 import argparse
@@ -35,6 +36,8 @@ import tempfile
 
 import numpy as np
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.series import table
+from pam_actuation.bags.source import read_bag
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
@@ -98,6 +101,15 @@ def live_ticks(live, contraction):
     return ticks
 
 
+def transport_ns(bag):
+    """Return the median time from the stamp of a command to its arrival at the recorder [ns]."""
+    for name, topic in read_bag(bag).topics.items():
+        if name.endswith('/valve_signal'):
+            stamps, _, _ = table('valve_signal', topic.payloads)
+            return int(np.median(np.asarray(topic.log_time_ns) - stamps))
+    return 0
+
+
 def timing_ms(ticks, name):
     """Return (mean interval, its standard deviation, longest interval) of a loop [ms]."""
     gaps = np.diff(ticks[name]) * 1e-6
@@ -121,10 +133,13 @@ def compare(name, valve, seconds, folder, domain_id):
     ticks = live_ticks(live, contraction)
     quiet = rig.with_(sensors={key: 0.0 for key in rig.sensors})
 
+    delay_ns = transport_ns(result.bag)
+
     def simulated(tag, one_rig, seed, at=None):
         controller = load_controller(f'sofc_{valve}', rig) if contraction else None
         done = simulate_experiment(
-            experiment, one_rig, controller, f'{path}_{tag}', seed=seed, ticks=at)
+            experiment, one_rig, controller, f'{path}_{tag}', seed=seed, ticks=at,
+            transport_ns=delay_ns if at else 0)
         return Recording.of(done['bag'], contraction)
 
     plain, other = simulated('sim', rig, 2), simulated('other', rig, 3)
@@ -142,7 +157,7 @@ def compare(name, valve, seconds, folder, domain_id):
     for loop in TICKS:
         shown.append('| – ' if loop not in ticks else '| {:.2f} ± {:.2f}, {:.1f} '.format(
             *timing_ms(ticks, loop)))
-    return rows, ''.join(shown) + '|'
+    return rows, ''.join(shown) + f'| {delay_ns * 1e-6:.2f} |'
 
 
 def main():
@@ -164,9 +179,10 @@ def main():
                 name, args.valve, args.seconds, args.keep or temporary, args.domain_id)
             print('\n'.join(rows), flush=True)
             timing.append(line)
-    print('\nIntervals of the loops in the live run [ms], mean ± standard deviation, longest:\n')
-    print('| experiment | valve | plant | reference | controller | driver |')
-    print('|---|---|---|---|---|---|')
+    print('\nIntervals of the loops in the live run [ms], mean ± standard deviation, longest; '
+          'median transport:\n')
+    print('| experiment | valve | plant | reference | controller | driver | transport |')
+    print('|---|---|---|---|---|---|---|')
     print('\n'.join(timing))
 
 

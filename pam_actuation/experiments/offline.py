@@ -20,7 +20,7 @@ rig does, less transport. Same input, same bits: all randomness comes from the
 seed, all stamps from the virtual clock.
 """
 
-from collections import Counter
+from collections import Counter, deque
 import heapq
 import os
 
@@ -37,6 +37,7 @@ from pam_actuation.plant_loop import PlantLoop
 START_NS = 1_000_000_000 * 1_000_000_000   # virtual clocks start here, not at the date of the run
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
+LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live
 NAMESPACE = '/muscle'
 
 
@@ -57,10 +58,11 @@ class _Recorder:
         self.counts[name] += 1
 
 
-def _due(order, ticks_ns, rate_hz, end_ns):
+def _due(order, ticks_ns, rate_hz, lead_ns, end_ns):
     """Yield (time, order) of the ticks of one loop; at equal times the lower order is first."""
     if ticks_ns is None:
-        ticks_ns = range(0, end_ns - START_NS + 1, round(1e9 / rate_hz))
+        period_ns = round(1e9 / rate_hz)
+        ticks_ns = range(-(lead_ns // period_ns) * period_ns, end_ns - START_NS + 1, period_ns)
     for after_ns in ticks_ns:
         now_ns = START_NS + int(after_ns)
         if now_ns > end_ns:
@@ -69,7 +71,8 @@ def _due(order, ticks_ns, rate_hz, end_ns):
 
 
 def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
-                        overwrite=False, progress=None, namespace=NAMESPACE, ticks=None):
+                        overwrite=False, progress=None, namespace=NAMESPACE, ticks=None,
+                        transport_ns=0):
     """
     Simulate an experiment and record it as a bag.
 
@@ -97,6 +100,8 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
         When the loops ``plant``, ``reference``, ``controller`` and ``driver`` tick, ns since
         the start and perhaps before it; a loop not named ticks at its rate. For the tick
         times of a live run.
+    transport_ns : int
+        Time from the tick that sends a message to its arrival.
 
     Returns
     -------
@@ -118,14 +123,15 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     recorder = _Recorder(writer, namespace)
     try:
         _run(experiment, rig, controller, seed, learning, recorder, progress, namespace,
-             ticks or {})
+             ticks or {}, transport_ns)
     finally:
         writer.close()
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
 
 
-def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace, ticks):
+def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace, ticks,
+         transport_ns):
     """Call every loop when it is due, in order of time, until the experiment is over."""
     plant = PlantLoop(rig, seed=seed)
     reference = ReferenceLoop(experiment, valve=rig.valve)
@@ -133,35 +139,47 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
     control = None
     if experiment.domain == 'contraction':
         control = ControllerLoop(controller)
+    on_the_way = deque()
+
+    def send(handler, message, now):
+        on_the_way.append((now + transport_ns, handler, message))
+
+    def deliver(now):
+        while on_the_way and on_the_way[0][0] <= now:
+            _, handler, message = on_the_way.popleft()
+            handler(message)
+
+    def act(signal):
+        plant.advance_to(signal.stamp_ns)      # from its own stamp on, not before
+        plant.set_signal(signal)
 
     def tick_plant(now):
         plant.advance_to(now)
         for topic, message in plant.sample(now).items():
             recorder.write(topic, message, now)
             if topic == 'pressure':
-                driver.on_pressure(message)
+                send(driver.on_pressure, message, now)
             elif topic == 'supply_pressure':
-                driver.on_supply(message)
+                send(driver.on_supply, message, now)
             if control is not None:
                 handler = getattr(control, f'on_{topic}', None)
                 if handler:
-                    handler(message)
+                    send(handler, message, now)
+
+    takers = {'pressure_command': driver.on_command, 'valve_command': driver.on_valve_command,
+              'external_force': plant.set_external_force}
+    if control is not None:
+        takers.update({topic: getattr(control, f'on_{topic}') for topic in (
+            'reference', 'reference_trajectory')})
 
     def tick_reference(now):
         for topic, message in reference.tick(now).items():
             recorder.write(topic, message, now)
-            if topic == 'pressure_command':
-                driver.on_command(message)
-            elif topic == 'valve_command':
-                driver.on_valve_command(message)
-            elif topic == 'external_force':
-                plant.set_external_force(message)
-            else:
-                getattr(control, f'on_{topic}')(message)
+            send(takers[topic], message, now)
 
     def tick_control(now):
         command, state = control.tick(now, learning)
-        driver.on_command(command)
+        send(driver.on_command, command, now)
         recorder.write('pressure_command', command, now)
         recorder.write('controller_state', state, now)
 
@@ -169,7 +187,7 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
 
     def tick_driver(now):
         signal, status = driver.tick(now)
-        plant.set_signal(signal)
+        send(act, signal, now)
         recorder.write('valve_signal', signal, now)
         if now - last_status[0] >= STATUS_EVERY_NS:
             last_status[0] = now
@@ -181,10 +199,13 @@ def _run(experiment, rig, controller, seed, learning, recorder, progress, namesp
     if control is not None:
         loops.append(('controller', controller.rate_hz, tick_control))
     loops.append(('driver', driver.rate_hz, tick_driver))
+    lead_ns = 0 if control is None else LEAD_NS
     end = START_NS + round(experiment.duration_s * 1e9)
     reported = 0
     for now, k in heapq.merge(*(
-            _due(k, ticks.get(name), rate_hz, end) for k, (name, rate_hz, _) in enumerate(loops))):
+            _due(k, ticks.get(name), rate_hz, 0 if name == 'reference' else lead_ns, end)
+            for k, (name, rate_hz, _) in enumerate(loops))):
+        deliver(now)
         loops[k][2](now)
         if progress and (now - START_NS) // 1_000_000_000 > reported:
             reported = (now - START_NS) // 1_000_000_000
