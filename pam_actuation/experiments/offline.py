@@ -57,6 +57,97 @@ class _Recorder:
         self._writer.write(name, encode(topic, message), now_ns, now_ns)
         self.counts[name] += 1
 
+    def published(self):
+        """Return the counts as a node states them in its last status."""
+        return tuple((f'published.{name}', str(count)) for name, count in self.counts.items()
+                     if not name.endswith('/diagnostics'))
+
+
+class _Loops:
+    """The loops of the live nodes, joined by messages that take ``transport_ns``."""
+
+    def __init__(self, experiment, rig, controller, seed, learning, recorder, transport_ns):
+        self.learning, self.recorder, self.transport_ns = learning, recorder, transport_ns
+        self.plant = PlantLoop(rig, seed=seed)
+        self.reference = ReferenceLoop(experiment, valve=rig.valve)
+        self.driver = DriverLoop(rig.valve, driver_config(rig))
+        # At equal times: measure, then want, then decide, then act.
+        self.loops = [('plant', PUBLISH_RATE_HZ, self.tick_plant),
+                      ('reference', self.reference.rate_hz, self.tick_reference)]
+        self.lead_ns = 0
+        takers = [('pressure', self.driver.on_pressure),
+                  ('supply_pressure', self.driver.on_supply),
+                  ('pressure_command', self.driver.on_command),
+                  ('valve_command', self.driver.on_valve_command),
+                  ('external_force', self.plant.set_external_force),
+                  ('valve_signal', self.take_signal)]
+        if experiment.domain == 'contraction':
+            self.control = ControllerLoop(controller)
+            self.loops.append(('controller', controller.rate_hz, self.tick_controller))
+            self.lead_ns = LEAD_NS
+            takers += [(topic, getattr(self.control, f'on_{topic}')) for topic in TOPIC_TYPES
+                       if hasattr(self.control, f'on_{topic}')]
+        self.loops.append(('driver', self.driver.rate_hz, self.tick_driver))
+        self._takers = {topic: [] for topic in TOPIC_TYPES}
+        for topic, take in takers:
+            self._takers[topic].append(take)
+        self._on_the_way = deque()
+        self._status_ns = -STATUS_EVERY_NS
+
+    def send(self, topic, message, now):
+        """Record a message and put it on its way to all who take it."""
+        self.recorder.write(topic, message, now)
+        for take in self._takers[topic]:
+            self._on_the_way.append((now + self.transport_ns, take, message))
+
+    def deliver(self, now):
+        """Hand over what has arrived."""
+        while self._on_the_way and self._on_the_way[0][0] <= now:
+            _, take, message = self._on_the_way.popleft()
+            take(message)
+
+    def take_signal(self, signal):
+        """Let a valve signal act from its own stamp on, where physics has not passed it."""
+        self.plant.advance_to(signal.stamp_ns)
+        self.plant.set_signal(signal)
+
+    def tick_plant(self, now):
+        """Run physics to the present and measure."""
+        self.plant.advance_to(now)
+        for topic, message in self.plant.sample(now).items():
+            self.send(topic, message, now)
+
+    def tick_reference(self, now):
+        """Ask for what the experiment wants now."""
+        for topic, message in self.reference.tick(now).items():
+            self.send(topic, message, now)
+
+    def tick_controller(self, now):
+        """Turn the reference into a pressure command."""
+        command, state = self.control.tick(now, self.learning)
+        self.send('pressure_command', command, now)
+        self.send('controller_state', state, now)
+
+    def tick_driver(self, now):
+        """Turn the command into a valve signal, supervised."""
+        signal, status = self.driver.tick(now)
+        self.send('valve_signal', signal, now)
+        if now - self._status_ns >= STATUS_EVERY_NS:
+            self._status_ns = now
+            self.recorder.write('diagnostics', status, now)
+
+    def run(self, ticks, end, progress):
+        """Call every loop when it is due, in order of time, until the experiment is over."""
+        reported = 0
+        for now, k in heapq.merge(*(
+                _due(k, ticks.get(name), rate_hz, 0 if name == 'reference' else self.lead_ns, end)
+                for k, (name, rate_hz, _) in enumerate(self.loops))):
+            self.deliver(now)
+            self.loops[k][2](now)
+            if progress and (now - START_NS) // 1_000_000_000 > reported:
+                reported = (now - START_NS) // 1_000_000_000
+                progress(reported)
+
 
 def _due(order, ticks_ns, rate_hz, lead_ns, end_ns):
     """Yield (time, order) of the ticks of one loop; at equal times the lower order is first."""
@@ -122,96 +213,12 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
     recorder = _Recorder(writer, namespace)
     try:
-        _run(experiment, rig, controller, seed, learning, recorder, progress, namespace,
-             ticks or {}, transport_ns)
+        loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns)
+        end = START_NS + round(experiment.duration_s * 1e9)
+        loops.run(ticks or {}, end, progress)
+        recorder.write('diagnostics', Status(
+            end, 0, f'{namespace}/simulation', 'finished', recorder.published()), end)
     finally:
         writer.close()
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
-
-
-def _run(experiment, rig, controller, seed, learning, recorder, progress, namespace, ticks,
-         transport_ns):
-    """Call every loop when it is due, in order of time, until the experiment is over."""
-    plant = PlantLoop(rig, seed=seed)
-    reference = ReferenceLoop(experiment, valve=rig.valve)
-    driver = DriverLoop(rig.valve, driver_config(rig))
-    control = None
-    if experiment.domain == 'contraction':
-        control = ControllerLoop(controller)
-    on_the_way = deque()
-
-    def send(handler, message, now):
-        on_the_way.append((now + transport_ns, handler, message))
-
-    def deliver(now):
-        while on_the_way and on_the_way[0][0] <= now:
-            _, handler, message = on_the_way.popleft()
-            handler(message)
-
-    def act(signal):
-        plant.advance_to(signal.stamp_ns)      # from its own stamp on, not before
-        plant.set_signal(signal)
-
-    def tick_plant(now):
-        plant.advance_to(now)
-        for topic, message in plant.sample(now).items():
-            recorder.write(topic, message, now)
-            if topic == 'pressure':
-                send(driver.on_pressure, message, now)
-            elif topic == 'supply_pressure':
-                send(driver.on_supply, message, now)
-            if control is not None:
-                handler = getattr(control, f'on_{topic}', None)
-                if handler:
-                    send(handler, message, now)
-
-    takers = {'pressure_command': driver.on_command, 'valve_command': driver.on_valve_command,
-              'external_force': plant.set_external_force}
-    if control is not None:
-        takers.update({topic: getattr(control, f'on_{topic}') for topic in (
-            'reference', 'reference_trajectory')})
-
-    def tick_reference(now):
-        for topic, message in reference.tick(now).items():
-            recorder.write(topic, message, now)
-            send(takers[topic], message, now)
-
-    def tick_control(now):
-        command, state = control.tick(now, learning)
-        send(driver.on_command, command, now)
-        recorder.write('pressure_command', command, now)
-        recorder.write('controller_state', state, now)
-
-    last_status = [-STATUS_EVERY_NS]
-
-    def tick_driver(now):
-        signal, status = driver.tick(now)
-        send(act, signal, now)
-        recorder.write('valve_signal', signal, now)
-        if now - last_status[0] >= STATUS_EVERY_NS:
-            last_status[0] = now
-            recorder.write('diagnostics', status, now)
-
-    # At equal times: measure, then want, then decide, then act.
-    loops = [('plant', PUBLISH_RATE_HZ, tick_plant),
-             ('reference', reference.rate_hz, tick_reference)]
-    if control is not None:
-        loops.append(('controller', controller.rate_hz, tick_control))
-    loops.append(('driver', driver.rate_hz, tick_driver))
-    lead_ns = 0 if control is None else LEAD_NS
-    end = START_NS + round(experiment.duration_s * 1e9)
-    reported = 0
-    for now, k in heapq.merge(*(
-            _due(k, ticks.get(name), rate_hz, 0 if name == 'reference' else lead_ns, end)
-            for k, (name, rate_hz, _) in enumerate(loops))):
-        deliver(now)
-        loops[k][2](now)
-        if progress and (now - START_NS) // 1_000_000_000 > reported:
-            reported = (now - START_NS) // 1_000_000_000
-            progress(reported)
-    counts = {f'published.{name}': count for name, count in recorder.counts.items()}
-    recorder.write('diagnostics', Status(
-        end, 0, f'{namespace}/simulation', 'finished',
-        tuple((key, str(value)) for key, value in counts.items()
-              if not key.endswith('/diagnostics'))), end)
