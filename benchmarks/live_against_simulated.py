@@ -20,8 +20,8 @@ Per experiment the live nodes run once, in real time. Everything is compared at 
 stamps of the live measurements, time zero being the first message of the experiment:
 
 live - sim      live recording less simulation, RMS
-noise           two simulations that differ in the seed of the sensors, RMS: noise of both and
-                what it does on its way through the controller
+noise           simulations that differ in the seed of the sensors, RMS over six seeds: noise
+                of both and what it does on its way through controller and driver
 timing          two simulations without sensor noise, one with every loop ticking when it
                 ticked in the live run and every message as late as the median one was
                 there, RMS: phase, jitter and pauses of the loops, and transport
@@ -50,6 +50,7 @@ SIGNALS = {'pressure': ('pressure_pa', 'kPa', 1e-3), 'contraction': ('contractio
 FIRST = ('reference', 'pressure_command', 'valve_command')
 TICKS = {'plant': 'pressure', 'reference': FIRST, 'controller': 'controller_state',
          'driver': 'valve_signal'}
+OTHER_SEEDS = range(11, 17)
 BEFORE_NS = 50_000_000         # ticks taken over from before the start
 DEFAULT = ('step_10mm', 'knee_gait', 'disturbance', 'random_steps', 'voltage_steps')
 
@@ -125,31 +126,35 @@ def compare(name, valve, seconds, folder, domain_id):
     rig = load_rig('dmsp_5_300_realistic', valve=valve)
     contraction = experiment.domain == 'contraction'
     path = os.path.join(folder, f'{experiment.name}_{valve}')
-    result = run_experiment(
-        experiment, rig, None, valve, f'{path}_live', seed=1, domain_id=domain_id)
-    if result.failure or result.findings:
-        print(f'{name} {valve}: {result.failure} {result.findings}', flush=True)
-    live = Recording.of(result.bag, contraction)
+    bag = f'{path}_live'
+    if not os.path.exists(bag):
+        result = run_experiment(experiment, rig, None, valve, bag, seed=1, domain_id=domain_id)
+        if result.failure or result.findings:
+            print(f'{name} {valve}: {result.failure} {result.findings}', flush=True)
+    live = Recording.of(bag, contraction)
     ticks = live_ticks(live, contraction)
     quiet = rig.with_(sensors={key: 0.0 for key in rig.sensors})
 
-    delay_ns = transport_ns(result.bag)
+    delay_ns = transport_ns(bag)
 
     def simulated(tag, one_rig, seed, at=None):
         controller = load_controller(f'sofc_{valve}', rig) if contraction else None
         done = simulate_experiment(
-            experiment, one_rig, controller, f'{path}_{tag}', seed=seed, ticks=at,
+            experiment, one_rig, controller, f'{path}_{tag}', seed=seed, ticks=at, overwrite=True,
             transport_ns=delay_ns if at else 0)
         return Recording.of(done['bag'], contraction)
 
-    plain, other = simulated('sim', rig, 2), simulated('other', rig, 3)
+    plain = simulated('sim', rig, 2)
+    others = [simulated(f'other{seed}', rig, seed) for seed in OTHER_SEEDS]
     retimed = simulated('retimed', rig, 4, ticks)
     quiet_plain, quiet_retimed = simulated('q', quiet, 1), simulated('q_retimed', quiet, 1, ticks)
     rows = []
     for topic, (_, unit, _) in SIGNALS.items():
-        a, n, t, r = (
+        a, t, r, *by_seed = (
             rms_between(*pair, topic, experiment.duration_s) for pair in (
-                (live, plain), (other, plain), (quiet_retimed, quiet_plain), (live, retimed)))
+                (live, plain), (quiet_retimed, quiet_plain), (live, retimed),
+                *((other, plain) for other in others)))
+        n = np.sqrt(np.mean(np.square(by_seed)))
         rows.append(
             f'| {experiment.name} | {valve} | {experiment.duration_s:.0f} s | {topic} [{unit}] '
             f'| {a:.3f} | {n:.3f} | {t:.3f} | {a / np.hypot(n, t):.2f} | {r:.3f} |')
@@ -167,7 +172,8 @@ def main():
     parser.add_argument('--valve', default='ppr', choices=('ppr', 'hsv'))
     parser.add_argument('--seconds', type=float, default=None, help='shorten each to this')
     parser.add_argument('--domain-id', type=int, default=None, help='ROS domain')
-    parser.add_argument('--keep', default=None, metavar='DIR', help='keep the bags here')
+    parser.add_argument('--keep', default=None, metavar='DIR',
+                        help='keep the bags here; a live bag found there is not run again')
     args = parser.parse_args()
     timing = []
     print('| experiment | valve | time | signal | live - sim | noise | timing | ratio '
