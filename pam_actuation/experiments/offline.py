@@ -79,8 +79,8 @@ class _Loops:
                   ('supply_pressure', self.driver.on_supply),
                   ('pressure_command', self.driver.on_command),
                   ('valve_command', self.driver.on_valve_command),
-                  ('external_force', self.plant.set_external_force),
-                  ('valve_signal', self.take_signal)]
+                  ('external_force', self._from_its_stamp(self.plant.set_external_force)),
+                  ('valve_signal', self._from_its_stamp(self.plant.set_signal))]
         if experiment.domain == 'contraction':
             self.control = ControllerLoop(controller)
             self.loops.append(('controller', controller.rate_hz, self.tick_controller))
@@ -106,10 +106,12 @@ class _Loops:
             _, take, message = self._on_the_way.popleft()
             take(message)
 
-    def take_signal(self, signal):
-        """Let a valve signal act from its own stamp on, where physics has not passed it."""
-        self.plant.advance_to(signal.stamp_ns)
-        self.plant.set_signal(signal)
+    def _from_its_stamp(self, apply):
+        """Return what lets a message act from its stamp on, where physics has not passed it."""
+        def take(message):
+            self.plant.advance_to(message.stamp_ns)
+            apply(message)
+        return take
 
     def tick_plant(self, now):
         """Run physics to the present and measure."""

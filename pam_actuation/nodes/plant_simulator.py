@@ -28,8 +28,8 @@ class PlantSimulator(ManagedNode):
     """
     Simulate valve, muscle, load and sensors in real time with 1 ms steps.
 
-    Physics runs up to the present at every tick. A valve signal acts from its own stamp
-    on if physics has not passed it yet, else at once; the valve holds it without limit.
+    Physics runs up to the present at every tick. A valve signal or a disturbance acts from
+    its own stamp on if physics has not passed it yet, else at once, and is held without limit.
     """
 
     NAME = 'plant_simulator'
@@ -74,12 +74,13 @@ class PlantSimulator(ManagedNode):
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
         now_ns = self.now_ns()
-        for message, _ in self.disturbances.take():
-            self.plant.set_external_force(from_ros('external_force', message))
-        for message, _ in self.signals.take():
-            signal = from_ros('valve_signal', message)
-            self.plant.advance_to(min(signal.stamp_ns, now_ns))
-            self.plant.set_signal(signal)
+        arrived = [(from_ros('external_force', message), self.plant.set_external_force)
+                   for message, _ in self.disturbances.take()]
+        arrived += [(from_ros('valve_signal', message), self.plant.set_signal)
+                    for message, _ in self.signals.take()]
+        for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
+            self.plant.advance_to(min(plain.stamp_ns, now_ns))
+            apply(plain)
         self.plant.advance_to(now_ns)
         if self.plant.steps == self._sampled_steps:
             return              # right after a late tick: there is nothing new to measure

@@ -15,6 +15,7 @@
 """What experiments send in each domain, offline, and what a rig refuses."""
 
 from pam_actuation.bags.load import load_run
+from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment, ReferenceLoop
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import ValveSignal
@@ -22,6 +23,7 @@ import pam_sim
 from pam_sim.errors import InputError
 import pytest
 
+MS = 1_000_000
 T0 = 1_700_000_000_000_000_000
 DUTY = """\
 name: duty
@@ -177,3 +179,39 @@ def test_needs_and_disturbance_round_trip():
     assert load_experiment(experiment.to_yaml()).needs == ('supply_pressure',)
     again = load_experiment(load_experiment(PUSH).to_yaml())
     assert [again.external_force_n(t) for t in (0.5, 1.1, 1.5, 5.0)] == [0.0, 10.0, 0.0, 0.0]
+
+
+def test_a_long_experiment_may_be_stopped_early():
+    text = DUTY.replace('domain:', 'stop_after_s: 0.5\ndomain:')
+    experiment = load_experiment(text)
+    assert experiment.duration_s == 0.5
+    assert load_experiment(experiment.to_yaml()).duration_s == 0.5
+    _, ticks = sent(text, 'hsv', 1.0)
+    assert ticks[49]['valve_command'].efforts == (0.3, 0.0)
+    assert ticks[50]['valve_command'].efforts == (0.0, 1.0)
+    with pytest.raises(InputError, match='stop_after_s'):
+        load_experiment(text.replace('0.5\ndomain', '0\ndomain'))
+
+
+def test_simulation_takes_the_timing_of_another_run(tmp_path):
+    rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
+    runs = []
+    for name, more in (('as_usual', {}), ('same', {'ticks': {'driver': range(0, 10**9, 5 * MS)}}),
+                       ('late', {'ticks': {'driver': range(3 * MS, 10**9, 5 * MS)},
+                                 'transport_ns': MS})):
+        runs.append(load_run(simulate_experiment(
+            load_experiment(VOLTAGE), rig, None, tmp_path / name, **more)['bag']))
+    usual, same, late = [run.topics['pressure'].values['pressure_pa'] for run in runs]
+    assert (usual == same).all()
+    assert late[65] < usual[65] - 2e3          # rising, and 3 ms behind
+
+
+def test_a_controller_is_up_before_the_experiment_as_it_is_live(tmp_path):
+    rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
+    experiment = load_experiment('name: stay\nsegments:\n  - rest: {duration_s: 0.3}\n')
+    run = load_run(simulate_experiment(
+        experiment, rig, load_controller('pid', rig), tmp_path / 'bag')['bag'])
+    first = run.topics['reference'].stamp_ns[0]
+    assert first - run.topics['controller_state'].stamp_ns[0] == 100 * MS
+    before = run.topics['pressure_command']
+    assert (before.values['pressure_pa'][before.stamp_ns < first] == 101_325.0).all()

@@ -37,7 +37,11 @@ class Primitive:
         raise NotImplementedError
 
     def problem(self):
-        """Return what is wrong with the keys taken together, '' if nothing."""
+        """
+        Return what is wrong with the keys taken together, '' if nothing.
+
+        Asked once the object is there: a ``__post_init__`` must bear wrong keys.
+        """
         return ''
 
     @property

@@ -40,6 +40,8 @@ class Multisine(Primitive):
 
     def __post_init__(self):
         """Choose log-spaced frequencies and phases from the seed, scaled to the peak bound."""
+        if self.problem():
+            return
         rng = np.random.default_rng(int(self.seed))
         self._w = 2.0 * np.pi * np.geomspace(self.min_hz, self.max_hz, int(self.lines))
         self._phase = rng.uniform(0.0, 2.0 * np.pi, int(self.lines))

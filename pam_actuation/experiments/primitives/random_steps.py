@@ -44,6 +44,8 @@ class RandomSteps(Primitive):
     def __post_init__(self):
         """Draw all steps once, from the seed."""
         self._times, self._values = [], []
+        if self.problem():
+            return
         rng = np.random.default_rng(int(self.seed))
         t = 0.0
         while t < self.duration_s:
