@@ -43,7 +43,7 @@ from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.rigging.session import run_experiment
 from pam_sim import load_rig
-import yaml
+from pam_sim.located_yaml import dump_yaml
 
 SIGNALS = {'pressure': ('pressure_pa', 'kPa', 1e-3), 'contraction': ('contraction_m', 'mm', 1e3),
            'force': ('force_n', 'N', 1.0)}
@@ -122,7 +122,7 @@ def compare(name, valve, seconds, folder, domain_id):
     experiment = load_experiment(name)
     if seconds and seconds < experiment.duration_s:
         experiment = load_experiment(
-            yaml.safe_dump({**experiment.to_dict(), 'stop_after_s': seconds}, sort_keys=False))
+            dump_yaml({**experiment.to_dict(), 'stop_after_s': seconds}))
     rig = load_rig('dmsp_5_300_realistic', valve=valve)
     contraction = experiment.domain == 'contraction'
     path = os.path.join(folder, f'{experiment.name}_{valve}')
