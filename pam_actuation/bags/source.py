@@ -23,8 +23,10 @@ that rosbag2 writes through the ``rosbags`` package.
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC, scan
+from pam_actuation.bags.payloads import Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 from rosbags.rosbag2 import Reader
@@ -34,16 +36,20 @@ import yaml
 _RECOVER = 'or read that beginning with the option recover'
 
 
+def _no_times():
+    return np.zeros(0, dtype=np.int64)
+
+
 @dataclass
 class TopicData:
-    """The messages of one topic as bytes, in file order, with their times [ns]."""
+    """The N messages of one topic as bytes, in file order, with their times [ns], shape (N,)."""
 
     name: str
     type_name: str
     encoding: str = 'cdr'
-    payloads: list = field(default_factory=list)
-    log_time_ns: list = field(default_factory=list)
-    publish_time_ns: list = field(default_factory=list)
+    payloads: Payloads = field(default_factory=Payloads)
+    log_time_ns: np.ndarray = field(default_factory=_no_times)
+    publish_time_ns: np.ndarray = field(default_factory=_no_times)
 
 
 @dataclass
@@ -170,26 +176,30 @@ def _by_number(path):
 
 def _read_mcap(path, files, recover):
     bag = Bag(path=path, storage='mcap')
+    pieces = {}
     for file in files:
-        data = file.read_bytes()
-        _refuse_foreign(data, file)
-        content = scan(data)
+        with open(file, 'rb') as stream:
+            _refuse_foreign(stream.read(len(MAGIC)), file)
+            content = scan(stream)
         if content.damage is not None:
             readable = (
                 f'{content.message_count} messages before that can still be read')
             if not content.message_count or not recover:
-                raise InputError(_damage_sentence(content, len(data), readable), file)
+                raise InputError(
+                    _damage_sentence(content, file.stat().st_size, readable), file)
             bag.recovered = True
             bag.remarks.append(
                 f'{file.name} ended early or is damaged ({content.damage}); {readable}.')
-        _add_content(bag, content, file)
+        _add_content(bag, content, pieces)
+    for topic in bag.topics.values():
+        _join(topic, pieces[topic.name])
     return bag
 
 
-def _refuse_foreign(data, file):
-    if not data:
+def _refuse_foreign(begin, file):
+    if not begin:
         raise InputError('the file is empty; record again or give another bag', file)
-    if not data.startswith(MAGIC[:len(data)]):
+    if not MAGIC.startswith(begin):
         raise InputError(
             'not an MCAP file (it begins with other bytes); give a file written by a recorder',
             file)
@@ -205,7 +215,8 @@ def _damage_sentence(content, size, readable):
     return f'the file is damaged ({content.damage}); {readable}'
 
 
-def _add_content(bag, content, file):
+def _add_content(bag, content, pieces):
+    """Note a file's topics in the bag and their messages in ``pieces``, by topic."""
     bag.records.update(content.metadata)
     for channel in content.channels.values():
         type_name = _full_type_name(channel.type_name)
@@ -216,9 +227,14 @@ def _add_content(bag, content, file):
                 f'{channel.topic} has several message types ({topic.type_name}, '
                 f'{type_name}); only the first is read.')
             continue
-        topic.payloads += channel.payloads
-        topic.log_time_ns += channel.log_time_ns
-        topic.publish_time_ns += channel.publish_time_ns
+        pieces.setdefault(channel.topic, []).append(channel.messages)
+
+
+def _join(topic, pieces):
+    for messages in pieces:
+        topic.payloads.extend(messages.payloads)
+    topic.log_time_ns = np.concatenate([messages.log_time_ns for messages in pieces])
+    topic.publish_time_ns = np.concatenate([messages.publish_time_ns for messages in pieces])
 
 
 def _full_type_name(name):
@@ -234,13 +250,16 @@ def _read_with_rosbags(path, opened):
             for connection in reader.connections:
                 bag.topics.setdefault(
                     connection.topic, TopicData(connection.topic, connection.msgtype))
+            times = {name: [] for name in bag.topics}
             for connection, log_time_ns, raw in reader.messages():
                 topic = bag.topics[connection.topic]
                 if connection.msgtype == topic.type_name:
                     topic.payloads.append(bytes(raw))
-                    topic.log_time_ns.append(log_time_ns)
-                    # This storage keeps only the receive time.
-                    topic.publish_time_ns.append(log_time_ns)
+                    times[topic.name].append(log_time_ns)
+            for name, topic in bag.topics.items():
+                # This storage keeps only the receive time.
+                topic.log_time_ns = np.array(times[name], dtype=np.int64)
+                topic.publish_time_ns = topic.log_time_ns
             _add_custom_data(bag, getattr(reader.storage.metadata, 'custom', None))
     except (ReaderError, FileNotFoundError) as error:
         raise InputError(f'not a readable rosbag2 bag: {error}', path) from None

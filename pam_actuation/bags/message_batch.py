@@ -1,0 +1,127 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Sort the messages of many chunks into their channels, thousands at a time.
+
+Chunks of a recorder are small, so that little is lost with its power; here
+they are gathered until sorting them is worth a few array operations.
+"""
+
+import numpy as np
+from pam_actuation.bags.payloads import Payloads
+from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES, windows
+
+BATCH_BYTES = 4 * 1024 * 1024
+_KEYS = 2**16
+
+
+class MessageColumns:
+    """The messages of one channel in file order: their bytes and their times [ns]."""
+
+    def __init__(self):
+        self.payloads = Payloads()
+        self._log, self._publish = [], []
+
+    def __len__(self):
+        """Return the number of messages."""
+        return len(self.payloads)
+
+    @property
+    def log_time_ns(self):
+        """Return the receive times, ndarray of int64."""
+        return _joined(self._log)
+
+    @property
+    def publish_time_ns(self):
+        """Return the send times, ndarray of int64."""
+        return _joined(self._publish)
+
+    def append(self, data, positions, heads):
+        """Append messages: ``data`` the records, ``positions`` and ``heads`` of (n,) messages."""
+        first = len(self.payloads)
+        lengths = heads['length']
+        order = np.arange(len(heads))
+        groups = [order]
+        if (lengths != lengths[0]).any():
+            order = np.argsort(lengths, kind='stable')
+            groups = np.split(order, np.flatnonzero(np.diff(lengths[order])) + 1)
+        for group in groups:
+            size = RECORD_BYTES + int(lengths[group[0]]) - MESSAGE_BYTES
+            self.payloads.append_rows(_rows(data, positions[group], size), first + group)
+        self._log.append(heads['log_time_ns'].astype(np.int64))
+        self._publish.append(heads['publish_time_ns'].astype(np.int64))
+
+
+class MessageBatch:
+    """Messages on their way from the chunks to their channels."""
+
+    def __init__(self):
+        self._columns = {}
+        self._known = np.zeros(_KEYS, dtype=bool)
+        self._clear()
+
+    def _clear(self):
+        self._data, self._positions, self._heads, self._size = [], [], [], 0
+
+    def add_channel(self, key):
+        """Accept messages of channel number ``key`` from now on; return its MessageColumns."""
+        self._columns[key] = MessageColumns()
+        self._known[key] = True
+        return self._columns[key]
+
+    def add(self, data, positions):
+        """
+        Take the message records of ``data`` that begin at ``positions``, shape (n,).
+
+        Returns how many were taken: n, or fewer where one has an unknown channel.
+        """
+        heads = windows(data, MESSAGE_HEAD.itemsize)[positions].view(MESSAGE_HEAD)
+        known = self._known[heads['channel']]
+        taken = len(heads) if known.all() else int(np.argmin(known))
+        if taken:
+            self._data.append(data)
+            self._positions.append(positions[:taken] + self._size)
+            self._heads.append(heads[:taken])
+            self._size += len(data)
+            if self._size >= BATCH_BYTES:
+                self.flush()
+        return taken
+
+    def flush(self):
+        """Hand everything taken so far to the channels."""
+        if not self._data:
+            return
+        data, positions, heads = map(_joined, (self._data, self._positions, self._heads))
+        self._clear()
+        order = np.argsort(heads['channel'], kind='stable')
+        keys = heads['channel'][order]
+        for chosen in np.split(order, np.flatnonzero(np.diff(keys)) + 1):
+            key = int(heads['channel'][chosen[0]])
+            self._columns[key].append(data, positions[chosen], heads[chosen])
+
+
+def _rows(data, positions, size):
+    """Return the payloads of ``size`` bytes as rows, shape (n, size) of uint8."""
+    if not size:
+        return np.zeros((len(positions), 0), dtype=np.uint8)
+    return windows(data, size)[positions + MESSAGE_BYTES].view(np.uint8).reshape(-1, size)
+
+
+def _joined(parts):
+    if not parts:
+        return np.zeros(0, dtype=np.int64)
+    if len(parts) > 1:
+        parts[:] = [np.concatenate(parts)]
+    return parts[0]
