@@ -33,6 +33,8 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 import yaml
 
+# The compiled reader where it is there: metadata of many topics is long.
+_YAML_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _RECOVER = 'or read that beginning with the option recover'
 
 
@@ -155,7 +157,7 @@ def _directory_facts(path):
     if not file.is_file():
         return None
     try:
-        facts = yaml.safe_load(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
+        facts = yaml.load(file.read_text(encoding='utf-8'), _YAML_LOADER)[layout.METADATA_ROOT]
         if isinstance(facts['relative_file_paths'], list) and facts['relative_file_paths']:
             return facts
         problem = 'it names no file'
