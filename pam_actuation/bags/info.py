@@ -38,6 +38,7 @@ DIAGNOSTICS = 'diagnostics'
 PUBLISHED = 'published.'
 # An interval between stamps this many times the usual one counts as a gap.
 GAP_FACTOR = 2.5
+COUNT_DIGITS = 18
 
 
 @dataclass
@@ -251,8 +252,9 @@ def _published(bag):
             continue
         for status in statuses:
             for key, text in status.values:
-                if key.startswith(PUBLISHED) and text.isdigit():
-                    last[status.name, key[len(PUBLISHED):]] = (int(text), sent_ns)
+                number = _count(text)
+                if key.startswith(PUBLISHED) and number is not None:
+                    last[status.name, key[len(PUBLISHED):]] = (number, sent_ns)
     published = {}
     for (_, name), (number, sent_ns) in last.items():
         before, before_ns = published.get(name, (0, 0))
@@ -260,10 +262,14 @@ def _published(bag):
     return published
 
 
+def _count(text):
+    """Return the number a text is, None where it is no number of messages."""
+    return int(text) if text.isdecimal() and len(text) <= COUNT_DIGITS else None
+
+
 def _add_counts(info, topic, recording, published):
     def recorded(key):
-        text = recording.get(f'{topic.name}.{key}', '')
-        return int(text) if text.isdigit() else None
+        return _count(recording.get(f'{topic.name}.{key}', ''))
 
     info.lost = recorded('lost')
     info.dropped = recorded('dropped')

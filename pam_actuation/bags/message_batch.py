@@ -20,7 +20,7 @@ they are gathered until sorting them is worth a few array operations.
 """
 
 import numpy as np
-from pam_actuation.bags.payloads import Payloads
+from pam_actuation.bags.payloads import alike, joined, Payloads
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES, windows
 
 BATCH_BYTES = 4 * 1024 * 1024
@@ -41,25 +41,20 @@ class MessageColumns:
     @property
     def log_time_ns(self):
         """Return the receive times, ndarray of int64."""
-        return _joined(self._log)
+        return joined(self._log)
 
     @property
     def publish_time_ns(self):
         """Return the send times, ndarray of int64."""
-        return _joined(self._publish)
+        return joined(self._publish)
 
     def append(self, data, positions, heads):
         """Append messages: ``data`` the records, ``positions`` and ``heads`` of (n,) messages."""
         first = len(self.payloads)
-        lengths = heads['length']
-        order = np.arange(len(heads))
-        groups = [order]
-        if (lengths != lengths[0]).any():
-            order = np.argsort(lengths, kind='stable')
-            groups = np.split(order, np.flatnonzero(np.diff(lengths[order])) + 1)
-        for group in groups:
-            size = RECORD_BYTES + int(lengths[group[0]]) - MESSAGE_BYTES
-            self.payloads.append_rows(_rows(data, positions[group], size), first + group)
+        for length, places in alike(heads['length'].astype(np.int64)):
+            whole = len(places) == len(heads)
+            self.payloads.append_rows(
+                _rows(data, positions[places], length), None if whole else first + places)
         self._log.append(heads['log_time_ns'].astype(np.int64))
         self._publish.append(heads['publish_time_ns'].astype(np.int64))
 
@@ -103,7 +98,7 @@ class MessageBatch:
         """Hand everything taken so far to the channels."""
         if not self._data:
             return
-        data, positions, heads = map(_joined, (self._data, self._positions, self._heads))
+        data, positions, heads = map(joined, (self._data, self._positions, self._heads))
         self._clear()
         order = np.argsort(heads['channel'], kind='stable')
         keys = heads['channel'][order]
@@ -112,16 +107,9 @@ class MessageBatch:
             self._columns[key].append(data, positions[chosen], heads[chosen])
 
 
-def _rows(data, positions, size):
-    """Return the payloads of ``size`` bytes as rows, shape (n, size) of uint8."""
+def _rows(data, positions, record_length):
+    """Return payloads of messages with equally long records, shape (n, size) of uint8."""
+    size = RECORD_BYTES + record_length - MESSAGE_BYTES
     if not size:
         return np.zeros((len(positions), 0), dtype=np.uint8)
     return windows(data, size)[positions + MESSAGE_BYTES].view(np.uint8).reshape(-1, size)
-
-
-def _joined(parts):
-    if not parts:
-        return np.zeros(0, dtype=np.int64)
-    if len(parts) > 1:
-        parts[:] = [np.concatenate(parts)]
-    return parts[0]

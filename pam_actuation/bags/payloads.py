@@ -28,17 +28,21 @@ class Payloads:
 
     Iterating gives ``bytes`` one by one, for the few topics that are read that
     way; ``tables`` gives all of them at once.
+
+    Parameters
+    ----------
+    messages : list of bytes
+        The first messages.
+
     """
 
     def __init__(self, messages=()):
-        self._parts = {}
+        self._parts = []
         self._count = 0
-        for raw in messages:
-            self.append(raw)
-
-    def append(self, raw):
-        """Append one message."""
-        self.append_rows(np.frombuffer(raw, dtype=np.uint8).reshape(1, len(raw)))
+        lengths = np.array([len(raw) for raw in messages], dtype=np.int64)
+        for size, places in alike(lengths):
+            rows = np.frombuffer(b''.join([messages[i] for i in places]), dtype=np.uint8)
+            self.append_rows(rows.reshape(len(places), size), places)
 
     def append_rows(self, rows, indices=None):
         """
@@ -52,31 +56,26 @@ class Payloads:
             Their places among all messages; by default behind those that are there.
 
         """
-        if indices is None:
-            indices = np.arange(self._count, self._count + len(rows))
-        self._parts.setdefault(rows.shape[1], []).append((indices, rows))
+        self._parts.append((self._count, indices, rows))
         self._count += len(rows)
 
     def extend(self, other):
         """Append all messages of another Payloads."""
-        first = self._count
-        for length, parts in other._parts.items():
-            for indices, rows in parts:
-                self._parts.setdefault(length, []).append((indices + first, rows))
+        for first, indices, rows in other._parts:
+            moved = None if indices is None else indices + self._count
+            self._parts.append((first + self._count, moved, rows))
         self._count += len(other)
 
     def tables(self):
         """
-        Return one pair (indices, rows) per length of message.
+        Iterate over tables of messages of one length: pairs (indices, rows).
 
         ``indices``, shape (n,), are the places of the messages in file order and
-        ``rows``, shape (n, length) of uint8, their bytes.
+        ``rows``, shape (n, length) of uint8, their bytes. A table holds some
+        thousand messages, so that working on it stays within the cache.
         """
-        for length, parts in self._parts.items():
-            if len(parts) > 1:
-                indices, rows = zip(*parts)
-                self._parts[length] = [(np.concatenate(indices), np.concatenate(rows))]
-        return [parts[0] for parts in self._parts.values()]
+        for first, indices, rows in self._parts:
+            yield np.arange(first, first + len(rows)) if indices is None else indices, rows
 
     def __len__(self):
         """Return the number of messages."""
@@ -96,3 +95,23 @@ class Payloads:
         return len(self) == len(other) and all(map(bytes.__eq__, self, other))
 
     __hash__ = None
+
+
+def alike(lengths):
+    """
+    Group messages by length.
+
+    Yields (length, places): ``places`` are the indices into ``lengths``, shape
+    (n,), of those of one length, in order.
+    """
+    order = np.argsort(lengths, kind='stable')
+    for places in np.split(order, np.flatnonzero(np.diff(lengths[order])) + 1):
+        if len(places):
+            yield int(lengths[places[0]]), places
+
+
+def joined(parts):
+    """Return the arrays of a list as one; the list is left with that one alone."""
+    if len(parts) > 1:
+        parts[:] = [np.concatenate(parts)]
+    return parts[0] if parts else np.zeros(0, dtype=np.int64)

@@ -39,7 +39,7 @@ VALUES = {
 }
 
 # Layouts of equal length that are looked for together; what is left is read one by one.
-_MAX_LAYOUTS = 16
+_MAX_LAYOUTS = 8
 
 
 def table(short, payloads):

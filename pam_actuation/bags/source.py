@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC, scan
-from pam_actuation.bags.payloads import Payloads
+from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 from rosbags.rosbag2 import Reader
@@ -35,6 +35,7 @@ import yaml
 
 # The compiled reader where it is there: metadata of many topics is long.
 _YAML_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_LONGEST_REASON = 300
 _RECOVER = 'or read that beginning with the option recover'
 
 
@@ -144,7 +145,9 @@ def _read_directory(path, recover):
         files.append(found[0])
     bag = _read_mcap(path, files, recover)
     announced, present = facts.get('message_count'), sum(bag.counts.values())
-    if announced != present and not bag.recovered:
+    if not isinstance(announced, int) or announced.bit_length() > 64:
+        bag.remarks.append(f'{layout.METADATA_FILE} announces no number of messages.')
+    elif announced != present and not bag.recovered:
         bag.remarks.append(
             f'{layout.METADATA_FILE} announces {announced} messages, the files hold {present}.')
     _add_custom_data(bag, facts.get('custom_data'))
@@ -158,16 +161,22 @@ def _directory_facts(path):
         return None
     try:
         facts = yaml.load(file.read_text(encoding='utf-8'), _YAML_LOADER)[layout.METADATA_ROOT]
-        if isinstance(facts['relative_file_paths'], list) and facts['relative_file_paths']:
+        names = facts['relative_file_paths']
+        if isinstance(names, list) and names and all(map(_is_file_name, names)):
             return facts
-        problem = 'it names no file'
-    except (yaml.YAMLError, UnicodeDecodeError):
-        problem = 'it is not YAML'
+        problem = 'relative_file_paths is not a list of file names'
     except (KeyError, TypeError):
         problem = f'it has no {layout.METADATA_ROOT} with relative_file_paths'
+    # Dates and numbers that do not exist are plain ValueErrors of the YAML library.
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError):
+        problem = 'it is not YAML'
     raise InputError(
         f'not the metadata of a rosbag2 bag: {problem}; remove the file to read the data files '
         'without it', file)
+
+
+def _is_file_name(name):
+    return isinstance(name, str) and 0 < len(name) < 4096 and name.isprintable()
 
 
 def _by_number(path):
@@ -235,8 +244,8 @@ def _add_content(bag, content, pieces):
 def _join(topic, pieces):
     for messages in pieces:
         topic.payloads.extend(messages.payloads)
-    topic.log_time_ns = np.concatenate([messages.log_time_ns for messages in pieces])
-    topic.publish_time_ns = np.concatenate([messages.publish_time_ns for messages in pieces])
+    topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])
+    topic.publish_time_ns = joined([messages.publish_time_ns for messages in pieces])
 
 
 def _full_type_name(name):
@@ -252,27 +261,39 @@ def _read_with_rosbags(path, opened):
             for connection in reader.connections:
                 bag.topics.setdefault(
                     connection.topic, TopicData(connection.topic, connection.msgtype))
-            times = {name: [] for name in bag.topics}
+            raws, times = ({name: [] for name in bag.topics} for _ in range(2))
             for connection, log_time_ns, raw in reader.messages():
                 topic = bag.topics[connection.topic]
                 if connection.msgtype == topic.type_name:
-                    topic.payloads.append(bytes(raw))
+                    raws[topic.name].append(bytes(raw))
                     times[topic.name].append(log_time_ns)
             for name, topic in bag.topics.items():
+                topic.payloads = Payloads(raws[name])
                 # This storage keeps only the receive time.
                 topic.log_time_ns = np.array(times[name], dtype=np.int64)
                 topic.publish_time_ns = topic.log_time_ns
             _add_custom_data(bag, getattr(reader.storage.metadata, 'custom', None))
     except (ReaderError, FileNotFoundError) as error:
-        raise InputError(f'not a readable rosbag2 bag: {error}', path) from None
+        raise InputError(f'not a readable rosbag2 bag: {_short(error)}', path) from None
     # The database library has its own family of exceptions, all meaning a broken file.
     except Exception as error:
         raise InputError(
-            f'not a readable rosbag2 bag ({type(error).__name__}: {error})', path) from None
+            f'not a readable rosbag2 bag ({type(error).__name__}: {_short(error)})',
+            path) from None
     return bag
+
+
+def _short(error):
+    """Return the text of a library's error as part of one sentence."""
+    text = ' '.join(str(error).split())
+    return text if len(text) < _LONGEST_REASON else f'{text[:_LONGEST_REASON]} …'
 
 
 def _add_custom_data(bag, custom):
     """Take the experiment from metadata.yaml where the file itself has no record of it."""
-    if custom and isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
-        bag.records[EXPERIMENT_RECORD] = {str(k): str(v) for k, v in custom.items()}
+    if isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
+        texts = {
+            key: value for key, value in custom.items()
+            if isinstance(key, str) and isinstance(value, str)}
+        if texts:
+            bag.records[EXPERIMENT_RECORD] = texts
