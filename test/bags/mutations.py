@@ -24,6 +24,7 @@ answer within the limits of time and memory with what is right in the bag, or wi
 import argparse
 from collections import Counter
 import contextlib
+import functools
 import io
 import json
 from pathlib import Path
@@ -38,7 +39,8 @@ from mutated_bytes import mutate_bytes, mutate_metadata, mutate_records
 import numpy as np
 from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.load import load_run
-from pam_actuation.cli.main import main as pam
+from pam_actuation.cli.common import EXIT_BAD_INPUT
+from pam_actuation.cli.main import build_parser
 from pam_sim.errors import InputError
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
@@ -60,6 +62,8 @@ FORMS = {
     'compressed sqlite3': lambda path: _with_rosbags(
         path, StoragePlugin.SQLITE3, CompressionMode.FILE),
 }
+# The last two are read by rosbags, which takes its time over their metadata.
+WEIGHTS = (4, 4, 4, 4, 1, 1)
 
 
 class TimeLimit(BaseException):
@@ -104,22 +108,22 @@ class Mutations:
     def check(self, seed):
         """Make the case of a seed, read it every way and note what came of it."""
         rng = random.Random(seed)
-        form = rng.choice(list(FORMS))
+        form = rng.choices(list(FORMS), WEIGHTS)[0]
         case = self.folder / 'case'
         shutil.rmtree(case, ignore_errors=True)
         done = self._make(rng, form, case)
         known = self.sound[form][1] if form in CHECKED else None
-        for recover in (False, True):
-            for reader in (check_info, check_load):
-                try:
-                    with limits():
-                        outcome = reader(case, recover, known)
-                except (Exception, TimeLimit):
-                    outcome = 'wrong'
-                    self.findings.append(
-                        f'seed {seed} ({form}, {done}, {reader.__name__}, recover={recover}):\n'
-                        + traceback.format_exc(limit=-6))
-                self.outcomes[outcome] += 1
+        for reader in (check_info, check_load):
+            recover = rng.random() < 0.5
+            try:
+                with limits():
+                    outcome = reader(case, recover, known)
+            except (Exception, TimeLimit):
+                outcome = 'wrong'
+                self.findings.append(
+                    f'seed {seed} ({form}, {done}, {reader.__name__}, recover={recover}):\n'
+                    + traceback.format_exc(limit=-6))
+            self.outcomes[outcome] += 1
 
     def _make(self, rng, form, case):
         kind = rng.choices(('bytes', 'metadata', 'records'), (7, 2, 1))[0]
@@ -157,25 +161,33 @@ def limits():
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
+@functools.lru_cache(maxsize=1)
+def _parser():
+    return build_parser()
+
+
 def pam_quietly(arguments):
-    """Return (exit code, stdout, stderr) of ``pam`` called in this process."""
+    """Return (exit code, stdout, stderr) of ``pam``, called in this process."""
+    args = _parser().parse_args(arguments)
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = pam(arguments)
+        try:
+            code = args.call(args)
+        except InputError as mistake:
+            return EXIT_BAD_INPUT, out.getvalue(), str(mistake)
     return code, out.getvalue(), err.getvalue()
 
 
 def check_info(path, recover, _):
     """Call ``pam info`` as text and as JSON; AssertionError where it misbehaves."""
-    arguments = ['info', str(path)] + ['--recover'] * recover
-    code, out, err = pam_quietly(arguments)
-    if code == 2:
+    code, out, err = pam_quietly(['info', str(path)] + ['--recover'] * recover)
+    if code == EXIT_BAD_INPUT:
         assert not out, out
-        assert_sentence(err.rstrip('\n'))
+        assert_sentence(err)
         return 'refused'
     assert code in (0, 1) and out and not err, (code, out, err)
-    again, document, _ = pam_quietly([*arguments, '--json'])
-    assert again == code and json.loads(document)['path'] == str(path)
+    _, document, _ = pam_quietly(['info', str(path), '--json'] + ['--recover'] * recover)
+    assert json.loads(document)['path'] == str(path)
     return 'read'
 
 
@@ -220,7 +232,7 @@ def main():
             mutations.check(seed)
     for finding in mutations.findings[:20]:
         print(finding)
-    print(f'{args.cases} bags, each read four ways: ' + ', '.join(
+    print(f'{args.cases} bags, each read two ways: ' + ', '.join(
         f'{number} {outcome}' for outcome, number in sorted(mutations.outcomes.items())))
     return 1 if mutations.findings else 0
 
