@@ -123,9 +123,10 @@ def _fill(layout, indices, rows, stamp_ns, values):
     """Copy the numbers of messages of one layout to their places."""
     stamp_ns[indices] = _stamp_column(rows)
     for name, offset in layout.columns.items():
-        column = values.setdefault(name, np.full(len(stamp_ns), np.nan))
+        if name not in values:
+            values[name] = np.full(len(stamp_ns), np.nan)
         if offset is not None:
-            column[indices] = _column(rows, offset, '<f8')
+            values[name][indices] = _column(rows, offset, '<f8')
 
 
 def _alike(rows, fixed):
