@@ -37,15 +37,14 @@ import traceback
 
 from mutated_bytes import mutate_bytes, mutate_metadata, mutate_records
 import numpy as np
-from pam_actuation.bags import codecs, layout
+from pam_actuation.bags import layout
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.common import EXIT_BAD_INPUT
 from pam_actuation.cli.main import build_parser
 from pam_sim.errors import InputError
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
-from sample_bag import example_messages, full_name, START_NS, STEP_NS, write_bag
-from sample_mcap import write_mcap
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from sample_bag import write_bag
+from sample_foreign import write_mcap, write_with_rosbags
 
 COUNT = 30
 LIMIT_S = 5.0
@@ -58,9 +57,9 @@ FORMS = {
     'lz4': lambda path: write_mcap(path, COUNT, 'lz4', chunk_size=4000),
     'plain chunks': lambda path: write_mcap(path, COUNT, '', chunk_size=4000, enable_crcs=False),
     'no chunks': lambda path: write_mcap(path, COUNT, '', use_chunking=False),
-    'sqlite3': lambda path: _with_rosbags(path, StoragePlugin.SQLITE3),
-    'compressed sqlite3': lambda path: _with_rosbags(
-        path, StoragePlugin.SQLITE3, CompressionMode.FILE),
+    'sqlite3': lambda path: write_with_rosbags(path, COUNT, StoragePlugin.SQLITE3),
+    'compressed sqlite3': lambda path: write_with_rosbags(
+        path, COUNT, StoragePlugin.SQLITE3, CompressionMode.FILE),
 }
 # The last two are read by rosbags, which takes its time over their metadata.
 WEIGHTS = (4, 4, 4, 4, 1, 1)
@@ -68,23 +67,6 @@ WEIGHTS = (4, 4, 4, 4, 1, 1)
 
 class TimeLimit(BaseException):
     """A case took too long; not an Exception, so that no ``except`` takes it for a damage."""
-
-
-def _with_rosbags(path, plugin, compression=None):
-    store = layout.typestore()
-    writer = RosbagsWriter(path, version=9, storage_plugin=plugin)
-    if compression is not None:
-        writer.set_compression(compression, CompressionFormat.ZSTD)
-    with writer:
-        connections = {}
-        for i in range(COUNT):
-            for short, message in example_messages(i).items():
-                if short not in connections:
-                    connections[short] = writer.add_connection(
-                        full_name(short), codecs.TOPIC_TYPES[short], typestore=store)
-                writer.write(
-                    connections[short], START_NS + i * STEP_NS, codecs.encode(short, message))
-    return path
 
 
 class Mutations:

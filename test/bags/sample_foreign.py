@@ -12,10 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""MCAP files in the forms that other writers choose, for tests of reading."""
+"""Bags in the forms that other writers choose, for tests of reading."""
 
 from mcap.writer import CompressionType, Writer
 from pam_actuation.bags import codecs, layout
+from rosbags.rosbag2 import CompressionFormat
+from rosbags.rosbag2 import Writer as RosbagsWriter
 from sample_bag import example_messages, full_name, START_NS, STEP_NS
 
 
@@ -43,4 +45,23 @@ def write_mcap(directory, count, compression='', namespace='/muscle', **options)
                 writer.add_message(
                     channels[short], START_NS + i * STEP_NS, codecs.encode(short, message), 0)
         writer.finish()
+    return directory
+
+
+def write_with_rosbags(directory, count, plugin, compression=None, namespaces=('/muscle',)):
+    """Write a bag with the rosbags package, compressed with zstd if asked to; return it."""
+    writer = RosbagsWriter(directory, version=9, storage_plugin=plugin)
+    if compression is not None:
+        writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for i in range(count):
+            for namespace in namespaces:
+                for short, message in example_messages(i).items():
+                    name = full_name(short, namespace)
+                    if name not in connections:
+                        connections[name] = writer.add_connection(
+                            name, codecs.TOPIC_TYPES[short], typestore=layout.typestore())
+                    writer.write(
+                        connections[name], START_NS + i * STEP_NS, codecs.encode(short, message))
     return directory
