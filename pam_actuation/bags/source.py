@@ -101,9 +101,9 @@ def read_bag(path, recover=False):
 
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError('no such file or directory; give the path of a bag', path)
     try:
+        if not path.exists():
+            raise InputError('no such file or directory; give the path of a bag', path)
         if path.is_dir():
             return _read_directory(path, recover)
         if path.suffix == '.mcap':
@@ -114,6 +114,9 @@ def read_bag(path, recover=False):
             return _read_directory(path.parent, recover)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
+    except OSError as error:
+        raise InputError(
+            f'cannot be read: {error.strerror or error}', error.filename or path) from None
     raise InputError(
         'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
 
@@ -121,7 +124,7 @@ def read_bag(path, recover=False):
 def _read_directory(path, recover):
     facts = _directory_facts(path)
     if facts is None:
-        files = sorted(path.glob('*.mcap'), key=_by_number)
+        files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
         if files:
             return _read_mcap(path, files, recover)
         databases = sorted(path.glob('*.db3'), key=_by_number)

@@ -322,7 +322,15 @@ def test_places_without_a_bag(tmp_path):
         load_run(database)
 
 
-@pytest.mark.parametrize('text', ['', 'a: [', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
+def test_names_and_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputError, match='cannot be read: File name too long'):
+        load_run(tmp_path / ('x' * 300))
+    (tmp_path / 'folder.mcap').mkdir()
+    with pytest.raises(InputError, match='no bag in this directory'):
+        load_run(tmp_path)
+
+
+@pytest.mark.parametrize('text', ['', 'a: [', 'x: 2026-99-99', '[' * 5000, '- ' * 5000 + 'x', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
                                   'rosbag2_bagfile_information:\n  relative_file_paths: []\n'])
 def test_foreign_metadata_file(tmp_path, bag, text):
     shutil.copytree(bag, tmp_path / 'run')
