@@ -110,7 +110,7 @@ def print_streams(folder, seconds, repeats):
           'times faster |')
     print('|---|---|---|---|---|')
     for label, topics in STREAMS.items():
-        path = write_long_bag(folder / label.replace(' ', '_'), topics, seconds)
+        path = write_long_bag(folder / f'{label}.mcap', topics, seconds)
         here = load_run if len(topics) > 1 else load_here
         ours_s, theirs_s = [], []
         here(path)
@@ -127,8 +127,7 @@ def print_streams(folder, seconds, repeats):
 
 def print_hour(folder, minutes):
     """Print time and memory of loading five topics of 1 kHz in a fresh process."""
-    path = write_long_bag(folder / 'hour', TOPICS, 60 * minutes)
-    size = sum(file.stat().st_size for file in path.iterdir())
+    path = write_long_bag(folder / 'hour.mcap', TOPICS, 60 * minutes)
     done = subprocess.run(
         [sys.executable, '-c', HOUR, str(path)], check=True, capture_output=True, text=True)
     seconds, cpu_s, peak, counts, remarks = json.loads(done.stdout)
@@ -136,7 +135,7 @@ def print_hour(folder, minutes):
         raise SystemExit(f'not what was written: {counts} {remarks}')
     count = sum(counts.values())
     print(f'| {minutes} minutes, five topics at 1 kHz | {count:,} messages in '
-          f'{size / 1e9:.2f} GB | {seconds:.1f} s ({cpu_s:.1f} s of one core) | '
+          f'{path.stat().st_size / 1e9:.2f} GB | {seconds:.1f} s ({cpu_s:.1f} s of one core) | '
           f'{count / seconds:,.0f} messages/s | {peak / 2**30:.2f} GiB peak |')
 
 

@@ -15,11 +15,10 @@
 """
 Write long bags fast: what our recorder would write, made from arrays.
 
-Chunks of the recorder's size, zstd, checksums, message indexes, a summary and
-metadata.yaml; the values are noisy sines. An hour takes seconds to write.
+A lone .mcap: small chunks as a recorder writes them, zstd, checksums, message
+indexes and a summary; the values are noisy sines. An hour takes seconds to write.
 """
 
-from pathlib import Path
 import struct
 import zlib
 
@@ -31,9 +30,9 @@ from pam_actuation import messages
 from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.mcap_scan import MAGIC
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES
-from pam_actuation.bags.writer import CHUNK_BYTES
 import zstandard
 
+CHUNK_BYTES = 128 * 1024
 START_NS = 1_790_000_000_000_000_000
 LATE_NS = 400_000                      # from stamp to receipt
 # Topic: a message as template; SI value at rest and amplitude of what changes in it.
@@ -48,28 +47,12 @@ _INDEX_HEAD = struct.Struct('<BQHI')   # a message index: opcode, length, channe
 _MARK = np.array(1.5).tobytes()        # the number of the templates that is replaced
 
 
-def write_long_bag(directory, topics, seconds, hertz=1000, seed=1, namespace='/muscle'):
-    """
-    Write a bag of ``topics``, each with ``hertz`` messages a second; return its directory.
-
-    ``directory`` must not exist yet.
-    """
-    directory = Path(directory)
-    directory.mkdir(parents=True)
-    file = directory / f'{directory.name}_0.mcap'
-    count = int(seconds * hertz)
-    with open(file, 'wb') as stream:
+def write_long_bag(file, topics, seconds, hertz=1000, seed=1, namespace='/muscle'):
+    """Write ``topics``, each with ``hertz`` messages a second, to ``file``; return its path."""
+    with open(file, 'xb') as stream:
         _LongFile(stream, [(f'{namespace}/{short}', *TOPICS[short]) for short in topics]).write(
-            count, round(1e9 / hertz), np.random.default_rng(seed))
-    facts = [
-        layout.TopicFacts(
-            f'{namespace}/{short}', codecs.TOPIC_TYPES[short], (layout.qos_profile(),),
-            layout.type_hash(codecs.TOPIC_TYPES[short]), count) for short in topics]
-    end_ns = START_NS + (count - 1) * round(1e9 / hertz)
-    metadata = layout.bag_metadata(file.name, facts, START_NS + LATE_NS, end_ns + LATE_NS)
-    (directory / layout.METADATA_FILE).write_text(
-        layout.to_yaml({layout.METADATA_ROOT: metadata}), encoding='utf-8')
-    return directory
+            int(seconds * hertz), round(1e9 / hertz), np.random.default_rng(seed))
+    return file
 
 
 class _LongFile:

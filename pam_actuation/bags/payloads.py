@@ -90,6 +90,10 @@ class Payloads:
                 messages[index] = data[row * size:(row + 1) * size]
         return iter(messages)
 
+    def __getitem__(self, index):
+        """Return one message as bytes, or a list of them for a slice; copies all of them."""
+        return list(self)[index]
+
     def __eq__(self, other):
         """Return whether the messages are those of a list or another Payloads."""
         return len(self) == len(other) and all(map(bytes.__eq__, self, other))
