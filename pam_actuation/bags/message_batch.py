@@ -48,8 +48,9 @@ class MessageColumns:
         """Return the send times, ndarray of int64."""
         return joined(self._publish)
 
-    def append(self, data, positions, heads):
-        """Append messages: ``data`` the records, ``positions`` and ``heads`` of (n,) messages."""
+    def append(self, data, positions):
+        """Append the message records of ``data`` that begin at ``positions``, shape (n,)."""
+        heads = windows(data, MESSAGE_HEAD.itemsize)[positions].view(MESSAGE_HEAD)
         first = len(self.payloads)
         for length, places in alike(heads['length'].astype(np.int64)):
             whole = len(places) == len(heads)
@@ -68,7 +69,7 @@ class MessageBatch:
         self._clear()
 
     def _clear(self):
-        self._data, self._positions, self._heads, self._size = [], [], [], 0
+        self._data, self._positions, self._keys, self._size = [], [], [], 0
 
     def add_channel(self, key):
         """Accept messages of channel number ``key`` from now on; return its MessageColumns."""
@@ -82,13 +83,13 @@ class MessageBatch:
 
         Returns how many were taken: n, or fewer where one has an unknown channel.
         """
-        heads = windows(data, MESSAGE_HEAD.itemsize)[positions].view(MESSAGE_HEAD)
-        known = self._known[heads['channel']]
-        taken = len(heads) if known.all() else int(np.argmin(known))
+        keys = windows(data, 2)[positions + RECORD_BYTES].view('<u2')
+        known = self._known[keys]
+        taken = len(keys) if known.all() else int(np.argmin(known))
         if taken:
             self._data.append(data)
             self._positions.append(positions[:taken] + self._size)
-            self._heads.append(heads[:taken])
+            self._keys.append(keys[:taken])
             self._size += len(data)
             if self._size >= BATCH_BYTES:
                 self.flush()
@@ -98,13 +99,10 @@ class MessageBatch:
         """Hand everything taken so far to the channels."""
         if not self._data:
             return
-        data, positions, heads = map(joined, (self._data, self._positions, self._heads))
+        data, positions, keys = map(joined, (self._data, self._positions, self._keys))
         self._clear()
-        order = np.argsort(heads['channel'], kind='stable')
-        keys = heads['channel'][order]
-        for chosen in np.split(order, np.flatnonzero(np.diff(keys)) + 1):
-            key = int(heads['channel'][chosen[0]])
-            self._columns[key].append(data, positions[chosen], heads[chosen])
+        for key, places in alike(keys):
+            self._columns[key].append(data, positions[places])
 
 
 def _rows(data, positions, record_length):

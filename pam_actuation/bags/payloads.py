@@ -101,17 +101,17 @@ class Payloads:
     __hash__ = None
 
 
-def alike(lengths):
+def alike(numbers):
     """
-    Group messages by length.
+    Group equal numbers, such as the lengths of messages.
 
-    Yields (length, places): ``places`` are the indices into ``lengths``, shape
-    (n,), of those of one length, in order.
+    Yields (number, places): ``places`` are the indices into ``numbers``, shape
+    (n,), where it stands, in order.
     """
-    order = np.argsort(lengths, kind='stable')
-    for places in np.split(order, np.flatnonzero(np.diff(lengths[order])) + 1):
+    order = np.argsort(numbers, kind='stable')
+    for places in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1):
         if len(places):
-            yield int(lengths[places[0]]), places
+            yield int(numbers[places[0]]), places
 
 
 def joined(parts):
