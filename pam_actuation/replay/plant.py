@@ -21,8 +21,10 @@ from pam_actuation.replay.difference import difference
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.health import check_health
+from pam_sim.gap.health import recorded_valve
+from pam_sim.gap.result import FIELD
 
+MIN_DURATION_S = 0.1         # the start is read from half of it
 UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 
 
@@ -82,12 +84,31 @@ def replay_plant(run):
     if not text:
         raise InputError('the recording does not say which rig it is', str(run.path))
     rig = load_rig(text)
-    health = check_health(run, rig.valve)
-    if not health.usable:
-        raise InputError('; '.join(health.problems), str(run.path))
+    _check(run, rig)
     recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
     simulated = free_run(rig, recording)
     return PlantReplay(
         rig.name, {s: recording.time_s[s] for s in recording.signals},
         {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated,
         {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns)
+
+
+def _check(run, rig):
+    """Raise InputError unless the run has the input of the rig and the signals of its start."""
+    path = str(run.path)
+    valve = recorded_valve(run)
+    if valve != rig.valve:
+        raise InputError(f'the valve signal is of {valve or "no known"} valve, the rig has '
+                         f'{rig.valve}', path)
+    used = [run.require('valve_signal')]
+    for topic in ('pressure', 'contraction'):
+        series = run.require(topic)
+        if not np.isfinite(series.values[FIELD[topic]]).any():
+            raise InputError(f'{topic} has no finite value', path)
+        used.append(series)
+    common_ns = min(int(np.max(one.stamp_ns)) for one in used) - max(
+        int(np.min(one.stamp_ns)) for one in used)
+    if common_ns < MIN_DURATION_S * 1e9:
+        raise InputError(
+            f'pressure, contraction and valve signal have {max(common_ns, 0) * 1e-9:.3f} s in '
+            f'common, at least {MIN_DURATION_S:g} s are needed', path)
