@@ -58,7 +58,8 @@ def _construct_int(loader, node):
     text = loader.construct_scalar(node)
     if len(text) > MAX_DIGITS:
         raise yaml.constructor.ConstructorError(
-            problem=f'a whole number of {len(text)} digits is too large', problem_mark=node.start_mark)
+            problem=f'a whole number of {len(text)} digits is too large',
+            problem_mark=node.start_mark)
     return int(text)       # YAML 1.2: a leading zero is not octal
 
 

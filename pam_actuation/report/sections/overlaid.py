@@ -42,7 +42,8 @@ def overlaid(named, key='overlaid', title='Runs laid over each other', max_point
     rows = [('contraction [mm]', _lines(named, _topic('contraction', 1e3), max_points)
              + _reference(named[0][1], max_points)),
             ('tracking error [mm]', _lines(named, _error, max_points)),
-            ('pressure [kPa gauge]', _lines(named, _topic('pressure', 1e-3, P_ATM_PA), max_points)),
+            ('pressure [kPa gauge]',
+             _lines(named, _topic('pressure', 1e-3, P_ATM_PA), max_points)),
             ('force [N]', _lines(named, _topic('force', 1.0), max_points))]
     rows = [(label, traces) for label, traces in rows if traces]
     if not rows:
