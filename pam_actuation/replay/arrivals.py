@@ -32,7 +32,8 @@ from pam_sim.errors import InputError
 # At equal times: measure, want, decide, act; the order in which the simulation runs its loops.
 ORDER = (
     'pressure', 'contraction', 'force', 'supply_pressure', 'external_force', 'reference',
-    'reference_trajectory', 'controller_state', 'pressure_command', 'valve_signal')
+    'reference_trajectory', 'controller_state', 'pressure_command', 'valve_command',
+    'valve_signal')
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000

@@ -15,10 +15,11 @@
 """
 Repeat a recorded experiment in simulation: controller, driver and plant in a closed loop.
 
-Only the reference (or, in the pressure domain, the command), the disturbance force and the
-moments of all ticks come from the recording; everything else is computed anew. With the
-recording's own controller this is the experiment repeated, a simulated one to the bit; with
-another controller it is the experiment as it would have gone with that one on the model.
+Only the reference (or, in an experiment without a controller, the command), the disturbance
+force and the moments of all ticks come from the recording; everything else is computed anew.
+With the recording's own controller this is the experiment repeated, a simulated one to the
+bit; with another controller it is the experiment as it would have gone with that one on the
+model.
 """
 
 from dataclasses import dataclass
@@ -92,11 +93,10 @@ class ChainReplay:
 class _Chain:
     """The loops of one repeated experiment, stepped from one recorded message to the next."""
 
-    def __init__(self, rig, controller, seed, act_at_stamp):
+    def __init__(self, rig, controller, seed):
         self.plant = PlantLoop(rig, seed=seed)
         self.driver = DriverLoop(rig.valve, driver_config(rig))
         self.control = None if controller is None else ControllerLoop(controller)
-        self.act_at_stamp = act_at_stamp
         self.samples = {}        # recorded stamp of a reading -> what the plant reads then
         self.command = None
         self.rows = {}
@@ -116,6 +116,8 @@ class _Chain:
             self.driver.on_command(self.command)
         elif topic == 'pressure_command':
             self._command(message)
+        elif topic == 'valve_command':
+            self.driver.on_valve_command(message)
         else:
             self._drive(message)
 
@@ -148,8 +150,7 @@ class _Chain:
 
     def _drive(self, message):
         signal, _ = self.driver.tick(message.stamp_ns)
-        if self.act_at_stamp:
-            self.plant.advance_to(message.stamp_ns)
+        self.plant.advance_to(message.stamp_ns)     # a signal acts from its stamp on
         self.plant.set_signal(signal)
         recorded = dict(zip(message.names, message.efforts))
         for name, effort in zip(signal.names, signal.efforts):
@@ -192,8 +193,7 @@ def replay_chain(run, controller=None):
     seed = run.metadata.get('seed', '0')
     if not seed.isdigit():
         raise InputError(f'its seed `{seed}` is not a whole number', str(run.path))
-    # A live plant applies a signal at its stamp, the simulated one with its next reading.
-    chain = _Chain(rig, controller, int(seed), run.metadata.get('origin') == 'live')
+    chain = _Chain(rig, controller, int(seed))
     for arrival in arrivals(run, ORDER):
         if arrival.topic != 'controller_state' or chain.control is not None:
             chain.take(*arrival)
@@ -207,10 +207,9 @@ def replay_chain(run, controller=None):
 
 
 def _controller(run, rig, controller):
-    """Return the controller of the loop, None for an experiment in the pressure domain."""
+    """Return the controller of the loop, None for an experiment without one."""
     own = run.metadata.get('controller')
     if controller is None and not own:
-        run.require('pressure_command')
         return None
     run.require('controller_state')
     run.require('reference')

@@ -195,9 +195,8 @@ def _why_not(run, name, controller):
         if 'controller_state' not in run or not (controller or run.metadata.get('controller')):
             return 'the bag has no recorded controller'
     elif name == 'driver':
-        missing = [t for t in ('pressure_command', 'valve_signal') if t not in run]
-        if missing or not os.path.exists(run.path):
-            return f'the bag has no {missing[0]}' if missing else 'the run is not from a bag'
+        if 'valve_signal' not in run or not os.path.exists(run.path):
+            return 'the run has no valve_signal or is not from a bag'
     elif not run.metadata.get('rig') or 'valve_signal' not in run:
         return 'the bag does not say which rig it is, or has no valve_signal'
     return ''

@@ -33,7 +33,9 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 
 UNITS = {'ppr_voltage': 'V', 'fill_duty': '1', 'vent_duty': '1'}
-_TOPICS = ('pressure', 'supply_pressure', 'pressure_command', 'valve_signal')
+COMMANDS = ('pressure_command', 'valve_command')
+_TAKEN_BY = {'pressure': 'on_pressure', 'supply_pressure': 'on_supply',
+             'pressure_command': 'on_command', 'valve_command': 'on_valve_command'}
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def replay_driver(run):
     Parameters
     ----------
     run : pam_sim.run.Run
-        A loaded bag with ``valve_signal`` and ``pressure_command``.
+        A loaded bag with ``valve_signal`` and what the driver was told to do.
 
     Returns
     -------
@@ -103,16 +105,14 @@ def replay_driver(run):
 
     """
     signals = run.require('valve_signal')
-    run.require('pressure_command')
     driver, note = _driver(run, signals)
     rows = []
-    for _, topic, message in arrivals(run, _TOPICS, ticks=('valve_signal',)):
-        if topic == 'pressure':
-            driver.on_pressure(message)
-        elif topic == 'supply_pressure':
-            driver.on_supply(message)
-        elif topic == 'pressure_command':
-            driver.on_command(message)
+    found = arrivals(run, (*_TAKEN_BY, 'valve_signal'), ticks=('valve_signal',))
+    if not any(one.topic in COMMANDS for one in found):
+        run.require('pressure_command')
+    for _, topic, message in found:
+        if topic in _TAKEN_BY:
+            getattr(driver, _TAKEN_BY[topic])(message)
         else:
             signal, _ = driver.tick(message.stamp_ns)
             rows.append((message.stamp_ns, dict(zip(message.names, message.efforts)),

@@ -79,10 +79,12 @@ def compare(reference, now):
     found = [f'{name}: is no longer there' for name in sorted(set(reference) - set(now))]
     found += [f'{name}: is new' for name in sorted(set(now) - set(reference))]
     common = [name for name in reference if name in now]
-    counted = [f'{name}: {len(now[name])} messages, {len(reference[name])} in the reference'
-               for name in common if len(now[name]) != len(reference[name])]
-    if found or counted:
-        return found + counted
+    counted = {name.partition('.')[0]: (len(now[name]), len(reference[name]))
+               for name in common if len(now[name]) != len(reference[name])}
+    found += [f'{topic}: {count} messages, {before} in the reference'
+              for topic, (count, before) in counted.items()]
+    if found:
+        return found
     return [sentence for name in common
             if (sentence := _compare_values(name, reference[name], now[name]))]
 

@@ -62,7 +62,7 @@ def test_counts_and_fields_are_told_before_any_value():
     now['chain/force.force_n'] = np.arange(4.0)
     now['driver/valve_signal.ppr_voltage'] += 1.0
     assert compare(reference(), now) == [
-        'chain/force.force_n: 4 messages, 5 in the reference']
+        'chain/force: 4 messages, 5 in the reference']
     now['chain/new.force_n'] = now.pop('chain/force.force_n')
     assert compare(reference(), now) == [
         'chain/force.force_n: is no longer there', 'chain/new.force_n: is new']
