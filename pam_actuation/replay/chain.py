@@ -76,8 +76,10 @@ class ChainReplay:
 
     def lines(self):
         """Return the outcome for people."""
-        return [f'chain: controller, driver and {self.rig} in a closed loop on the recorded '
-                'reference', *(one.line() for one in self.differences)]
+        what = f'controller, driver and {self.rig} in a closed loop on the recorded reference'
+        if 'pressure_command.pressure_pa' not in self.recorded:
+            what = f'driver and {self.rig} on the recorded commands'
+        return [f'chain: {what}', *(one.line() for one in self.differences)]
 
     def arrays(self):
         """Return all arrays by name, for saving."""
