@@ -158,6 +158,8 @@ def bag_info(path, recover=False):
     recording = bag.records.get(RECORDING_RECORD, {})
     published = _published(bag)
     remarks = list(bag.remarks)
+    if recording.get('write_error'):
+        remarks.append(f'The recorder could not go on: {recording["write_error"]}.')
     topics = []
     for name in sorted(bag.topics):
         topic = bag.topics[name]

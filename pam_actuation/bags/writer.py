@@ -15,23 +15,23 @@
 """
 Write a rosbag2 directory in the Jazzy MCAP layout.
 
-``run/run_0.mcap`` grows while recording, in small compressed chunks with
-checksums, so that a killed process leaves a readable beginning; the experiment
-metadata is the first record. ``run/metadata.yaml`` appears, complete, at close.
+``run/run_0.mcap`` grows while recording, in compressed chunks with checksums, so that a
+killed process leaves a readable beginning; the experiment metadata is among the first
+records. With a limit of size or time ``run_1.mcap`` and so on follow, each a complete
+file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
 import contextlib
-import io
-import os
+import functools
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
-
-from pam_actuation.bags import layout
+from pam_actuation.bags import disk, layout
+from pam_actuation.bags.mcap_write import McapWriter
 from pam_sim.errors import InputError
 
-# About one second of a rig's messages: what a killed recorder may lose.
-CHUNK_BYTES = 128 * 1024
+# Every file holds the metadata of the experiment; a smaller limit would be full of it.
+SMALLEST_FILE_BYTES = 100_000
+SHORTEST_FILE_S = 0.1
 EXPERIMENT_RECORD = 'pam_experiment'
 ROSBAG2_RECORD = 'rosbag2'
 LIBRARY = 'pam_actuation'
@@ -51,41 +51,75 @@ class BagWriter:
         metadata.yaml, so that converted bags have it.
     overwrite : bool
         Replace an existing bag. Files that are no part of a bag are never touched.
+    max_file_bytes : int
+        Go on in the next file from about this size on; 0: never.
+    max_file_s : float
+        Go on in the next file after this time between first and newest message [s]; 0: never.
 
     Raises
     ------
     InputError
-        The directory exists already, or holds something else than a bag.
+        The directory exists already, or holds something else than a bag; a limit so small that
+        a file could not hold anything.
     OSError
         The file system refuses (no space, no right to write).
 
     """
 
-    def __init__(self, directory, metadata=None, overwrite=False):
+    def __init__(self, directory, metadata=None, overwrite=False, max_file_bytes=0,
+                 max_file_s=0.0):
+        check_limits(max_file_bytes, max_file_s)
         self.directory = Path(directory).resolve()
-        records = _records(metadata or {})
-        self._experiment = records.get(EXPERIMENT_RECORD, {})
+        self._records = _records(metadata or {})
+        self._limit_bytes = max_file_bytes or float('inf')
+        self._limit_ns = round(max_file_s * 1e9) or float('inf')
         self._topics = {}
-        self._channels = {}
-        self._schemas = {}
-        self._start_ns = None
-        self._end_ns = None
+        self._finished = []
         self._closed = False
+        self.file = None
         _make_room(self.directory, overwrite)
-        self.file = self.directory / f'{self.directory.name}_0.mcap'
-        self._stream = io.open(self.file, 'xb')
-        self._mcap = Writer(
-            self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._mcap.start(profile='ros2', library=LIBRARY)
+        self._open_next()
+
+    def _open_next(self):
+        """Begin the next file: header, metadata, all topics so far."""
+        before = self.file
+        self.file = self.directory / f'{self.directory.name}_{len(self._finished)}.mcap'
+        self._mcap = None
+        self._stream = open(self.file, 'xb', buffering=0)
+        try:
+            # Held while recording, so that nobody repairs a file that is being written.
+            disk.lock(self._stream)
+            self._begin_file()
+        except OSError:
+            self._stream.close()
+            self.file.unlink()
+            self.file, self._mcap = before, None
+            raise
+        disk.sync_directory(self.directory)
+
+    def _begin_file(self):
+        self._mcap = McapWriter(
+            functools.partial(disk.write_all, self._stream), library=LIBRARY)
+        self._start_ns = self._end_ns = None
+        self._in_file = self._synced = 0
+        self._in_former_files = self.counts
+        self._schemas, self._channels = {}, {}
         self._write_rosbag2_record()
-        for name, texts in records.items():
+        for name, texts in self._records.items():
             self._mcap.add_metadata(name, texts)
-        self._stream.flush()
+        for name in self._topics:
+            self._register(name)
 
     @property
     def counts(self):
         """Return the messages written so far, by full topic name."""
         return {name: facts['count'] for name, facts in self._topics.items()}
+
+    @property
+    def files(self):
+        """Return the paths of all files of the bag, in order."""
+        files = [self.directory / facts.name for facts in self._finished]
+        return files if self._mcap is None else [*files, self.file]
 
     def add_topic(self, full_name, type_name, qos=None):
         """
@@ -103,18 +137,23 @@ class BagWriter:
             return
         if not full_name.startswith('/') or full_name.endswith('/'):
             raise InputError('give the full topic name, such as /muscle/pressure', full_name)
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.register_schema(
-                type_name, 'ros2msg', layout.schema_text(type_name).encode())
         profiles = [layout.qos_profile()] if qos is None else list(qos)
-        type_hash = layout.type_hash(type_name)
-        self._channels[full_name] = self._mcap.register_channel(
-            full_name, 'cdr', self._schemas[type_name], {
-                'offered_qos_profiles': layout.to_yaml(profiles),
-                'topic_type_hash': type_hash,
-            })
         self._topics[full_name] = {
-            'type': type_name, 'qos': tuple(profiles), 'hash': type_hash, 'count': 0}
+            'type': type_name, 'qos': tuple(profiles), 'hash': layout.type_hash(type_name),
+            'count': 0}
+        self._register(full_name)
+
+    def _register(self, full_name):
+        facts = self._topics[full_name]
+        type_name = facts['type']
+        if type_name not in self._schemas:
+            self._schemas[type_name] = self._mcap.add_schema(
+                type_name, 'ros2msg', layout.schema_text(type_name).encode())
+        self._channels[full_name] = self._mcap.add_channel(
+            full_name, self._schemas[type_name], {
+                'offered_qos_profiles': layout.to_yaml(list(facts['qos'])),
+                'topic_type_hash': facts['hash'],
+            })
 
     def write(self, full_name, cdr_bytes, log_time_ns, publish_time_ns):
         """
@@ -122,12 +161,18 @@ class BagWriter:
 
         Raises OSError when the file system refuses; what was written before stays.
         """
+        if self._start_ns is None:
+            self._start_ns = self._end_ns = log_time_ns
+        elif (log_time_ns - self._start_ns >= self._limit_ns
+                or self._mcap.offset + self._mcap.pending >= self._limit_bytes):
+            self._finish_file()
+            self._open_next()
+            self._start_ns = self._end_ns = log_time_ns
         self._mcap.add_message(
             self._channels[full_name], log_time_ns, cdr_bytes, publish_time_ns)
         self._topics[full_name]['count'] += 1
-        if self._start_ns is None:
-            self._start_ns = self._end_ns = log_time_ns
-        elif log_time_ns > self._end_ns:
+        self._in_file += 1
+        if log_time_ns > self._end_ns:
             self._end_ns = log_time_ns
         elif log_time_ns < self._start_ns:
             self._start_ns = log_time_ns
@@ -136,30 +181,70 @@ class BagWriter:
         """Append a named metadata record of texts."""
         self._mcap.add_metadata(name, _texts(values))
 
-    def flush(self):
-        """Hand all finished chunks to the operating system."""
-        self._stream.flush()
+    def flush(self, sync=False):
+        """
+        Close the open chunk, so that all messages written survive the end of the process.
+
+        With ``sync`` they also survive the loss of power: waits for the disk.
+        """
+        self._mcap.close_chunk()
+        if sync and self._mcap.offset > self._synced:
+            disk.sync(self._stream)
+            self._synced = self._mcap.offset
 
     def close(self):
         """Finish the index and metadata.yaml; a second call does nothing."""
         if self._closed:
             return
-        self._closed = True
         try:
-            self._write_rosbag2_record()
-            self._mcap.finish()
-        finally:
-            self._stream.close()
-        text = layout.to_yaml({layout.METADATA_ROOT: self._bag_metadata()})
-        temporary = self.directory / f'.{layout.METADATA_FILE}.{os.getpid()}'
-        temporary.write_text(text, encoding='utf-8')
-        os.replace(temporary, self.directory / layout.METADATA_FILE)
+            if self._mcap is not None:
+                self._finish_file()
+            layout.write_metadata(self.directory, self._bag_metadata())
+        except OSError:
+            self.abandon()
+            raise
+        self._closed = True
+
+    def _finish_file(self):
+        self._write_rosbag2_record()
+        self._mcap.finish()
+        disk.sync(self._stream)
+        self._stream.close()
+        self._finished.append(self._file_facts())
+        self._mcap = None
+
+    def cut(self):
+        """
+        After a write error: take back what is half written and count what is in the bag.
+
+        What can still be written by ``add_metadata`` and ``close`` makes it a whole bag; where
+        that fails, or after ``abandon``, the file has no index but is readable.
+        """
+        if self._closed or self._mcap is None:
+            return
+        with contextlib.suppress(OSError):
+            self._truncate()
+            self._mcap.close_chunk()
+        self._truncate()
+        in_file = self._mcap.counts
+        for name, facts in self._topics.items():
+            facts['count'] = self._in_former_files.get(name, 0) + in_file.get(
+                self._channels.get(name), 0)
+        self._in_file = sum(in_file.values())
+        self._start_ns, self._end_ns = self._mcap.span_ns
+
+    def _truncate(self):
+        self._stream.truncate(self._mcap.offset)
+        self._stream.seek(self._mcap.offset)
 
     def abandon(self):
         """Close the file without an index, after a write error; what is in it stays readable."""
+        if not self._closed and self._mcap is not None:
+            with contextlib.suppress(OSError):
+                self._truncate()
+            with contextlib.suppress(OSError):
+                self._stream.close()
         self._closed = True
-        with contextlib.suppress(OSError):
-            self._stream.close()
 
     def __enter__(self):
         """Return the writer itself."""
@@ -169,17 +254,34 @@ class BagWriter:
         """Close the bag, whatever happened: what was written stays readable."""
         self.close()
 
+    def _file_facts(self):
+        return layout.FileFacts(self.file.name, self._start_ns, self._end_ns, self._in_file)
+
     def _bag_metadata(self):
         topics = [
             layout.TopicFacts(name, facts['type'], facts['qos'], facts['hash'], facts['count'])
             for name, facts in self._topics.items()]
-        return layout.bag_metadata(
-            self.file.name, topics, self._start_ns, self._end_ns, self._experiment)
+        files = list(self._finished)
+        if self._mcap is not None:
+            files.append(self._file_facts())
+        return layout.bag_metadata(files, topics, self._records.get(EXPERIMENT_RECORD))
 
     def _write_rosbag2_record(self):
         # Written at open and at close, as rosbag2 does; readers take the last one.
         self._mcap.add_metadata(
             ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(self._bag_metadata())})
+
+
+def check_limits(max_file_bytes, max_file_s):
+    """Raise InputError for limits of a file that are neither 0 nor large enough."""
+    if max_file_bytes != 0 and max_file_bytes < SMALLEST_FILE_BYTES:
+        raise InputError(
+            f'{max_file_bytes} bytes are too few for a file, give 0 (no limit) or at least '
+            f'{SMALLEST_FILE_BYTES}', 'largest file size')
+    if max_file_s != 0.0 and not SHORTEST_FILE_S <= max_file_s <= 1e9:
+        raise InputError(
+            f'{max_file_s:g} s is not allowed, give 0 (no limit) or {SHORTEST_FILE_S} to 1e9',
+            'longest file duration')
 
 
 def _texts(values):
