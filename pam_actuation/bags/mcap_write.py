@@ -34,7 +34,7 @@ import numpy as np
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
-CHUNK_BYTES = 768 * 1024           # of unpacked records, as rosbag2 does
+CHUNK_BYTES = 128 * 1024           # of unpacked records: what one damaged place may cost
 RECORD = struct.Struct('<BQ')
 MESSAGE = struct.Struct('<BQHIQQ')
 MESSAGE_OVERHEAD = MESSAGE.size - RECORD.size
