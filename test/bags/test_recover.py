@@ -62,7 +62,7 @@ def assert_is_beginning(bag, original):
 def test_a_file_cut_anywhere_becomes_a_whole_bag(tmp_path, whole):
     data, original = whole
     rng = random.Random(4)
-    for length in (0, 5, 8, 30, 300, *(rng.randrange(len(data)) for _ in range(12))):
+    for length in (0, 5, 30, 300, *(rng.randrange(len(data)) for _ in range(4))):
         bag = broken(tmp_path, data[:length])
         done = recover_bag(bag)
         assert done.changed and done.files[0].rebuilt and not done.files[0].kept
