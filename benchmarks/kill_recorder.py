@@ -49,6 +49,7 @@ FEED_PERIOD_S = 0.01
 RATES_HZ = {'pressure': 1000, 'pressure_command': 500, 'controller_state': 500}
 NAMES = tuple(f'internal_{k}' for k in range(20))
 ALLOWED_S = 1.0
+START_S = 20.0
 NODE_RATES_HZ = {'pressure': 500, 'controller_state': 200}
 
 
@@ -105,21 +106,23 @@ def kill_processes(folder, count, rng, parallel=4, shortest_s=0.0, longest_s=4.0
             process = context.Process(
                 target=record, args=(bag, split_bytes, begun), daemon=True)
             process.start()
-            running.append((rng.uniform(shortest_s, longest_s), bag, process, heard))
-        begin = time.monotonic()
-        for life_s, bag, process, heard in sorted(running, key=lambda item: item[0]):
-            time.sleep(max(begin + life_s - time.monotonic(), 0.0))
+            running.append((rng.uniform(shortest_s, longest_s), bag, process, heard, k))
+        for life_s, bag, process, heard, k in sorted(running, key=lambda item: item[0]):
+            # Every tenth may be killed before its first message.
+            started_ns = _told(heard, START_S if k % 10 else 0.0)
+            age_s = (time.time_ns() - started_ns) * 1e-9 if started_ns else 0.0
+            time.sleep(max(life_s - age_s, 0.0))
             killed_ns = time.time_ns()
             os.kill(process.pid, signal.SIGKILL)
             process.join()
             yield {'bag': bag, 'killed_ns': killed_ns, 'from_zero': True,
-                   'started_ns': _told(heard)}
+                   'started_ns': started_ns or _told(heard, 0.0)}
 
 
-def _told(heard):
-    """Return what a killed child had sent, None for nothing."""
+def _told(heard, wait_s):
+    """Return the time a child told, None if it has not."""
     try:
-        return heard.recv() if heard.poll() else None
+        return heard.recv() if heard.poll(wait_s) else None
     except EOFError:
         return None
 
@@ -224,7 +227,9 @@ def summary(results):
     """Return the figures of many examined bags."""
     missing = sorted(result['missing_s'] for result in results)
     return {
-        'kills': len(results), 'messages': sum(result['messages'] for result in results),
+        'kills': len(results), 'before_first_chunk': sum(
+            not result['messages'] for result in results),
+        'messages': sum(result['messages'] for result in results),
         'bad_bags': sum(bool(result['problems']) for result in results),
         'missing_median_s': round(missing[len(missing) // 2], 3) if missing else None,
         'missing_worst_s': round(missing[-1], 3) if missing else None,

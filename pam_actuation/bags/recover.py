@@ -32,9 +32,10 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Metadata
 from pam_actuation.bags import disk, layout, mcap_salvage
+from pam_actuation.bags.data_file import LIBRARY
 from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
-from pam_actuation.bags.writer import EXPERIMENT_RECORD, LIBRARY, ROSBAG2_RECORD
+from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
 from pam_sim.errors import InputError
 import yaml
 

@@ -21,12 +21,10 @@ records. With a limit of size or time ``run_1.mcap`` and so on follow, each a co
 file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
-import contextlib
-import functools
 from pathlib import Path
 
 from pam_actuation.bags import disk, layout
-from pam_actuation.bags.mcap_write import McapWriter
+from pam_actuation.bags.data_file import DataFile
 from pam_sim.errors import InputError
 
 # Every file holds the metadata of the experiment; a smaller limit would be full of it.
@@ -34,7 +32,6 @@ SMALLEST_FILE_BYTES = 100_000
 SHORTEST_FILE_S = 0.1
 EXPERIMENT_RECORD = 'pam_experiment'
 ROSBAG2_RECORD = 'rosbag2'
-LIBRARY = 'pam_actuation'
 
 
 class BagWriter:
@@ -75,40 +72,32 @@ class BagWriter:
         self._limit_ns = round(max_file_s * 1e9) or float('inf')
         self._topics = {}
         self._finished = []
+        self._in_former_files = {}
         self._closed = False
-        self.file = None
         _make_room(self.directory, overwrite)
-        self._open_next()
+        self._current = None
+        self._current = self._next_file()
 
-    def _open_next(self):
+    def _next_file(self):
         """Begin the next file: header, metadata, all topics so far."""
-        before = self.file
-        self.file = self.directory / f'{self.directory.name}_{len(self._finished)}.mcap'
-        self._mcap = None
-        self._stream = open(self.file, 'xb', buffering=0)
-        try:
-            # Held while recording, so that nobody repairs a file that is being written.
-            disk.lock(self._stream)
-            self._begin_file()
-        except OSError:
-            self._stream.close()
-            self.file.unlink()
-            self.file, self._mcap = before, None
-            raise
+        number = len(self._finished) + (self._current is not None)
+        made = DataFile(self.directory / f'{self.directory.name}_{number}.mcap', self._begin)
         disk.sync_directory(self.directory)
+        return made
 
-    def _begin_file(self):
-        self._mcap = McapWriter(
-            functools.partial(disk.write_all, self._stream), library=LIBRARY)
-        self._start_ns = self._end_ns = None
-        self._in_file = self._synced = 0
-        self._in_former_files = self.counts
-        self._schemas, self._channels = {}, {}
-        self._write_rosbag2_record()
+    def _begin(self, file):
+        self._write_rosbag2_record(file)
         for name, texts in self._records.items():
-            self._mcap.add_metadata(name, texts)
-        for name in self._topics:
-            self._register(name)
+            file.mcap.add_metadata(name, texts)
+        for name, facts in self._topics.items():
+            file.register(name, facts['type'], facts['qos'], facts['hash'])
+
+    def _split(self):
+        # The next file first: where it cannot be made, the present one can still be finished.
+        following = self._next_file()
+        self._finish_file()
+        self._current = following
+        self._in_former_files = self.counts
 
     @property
     def counts(self):
@@ -119,7 +108,12 @@ class BagWriter:
     def files(self):
         """Return the paths of all files of the bag, in order."""
         files = [self.directory / facts.name for facts in self._finished]
-        return files if self._mcap is None else [*files, self.file]
+        return files if self._current is None else [*files, self._current.path]
+
+    @property
+    def file(self):
+        """Return the path of the newest file."""
+        return self.files[-1]
 
     def add_topic(self, full_name, type_name, qos=None):
         """
@@ -141,19 +135,8 @@ class BagWriter:
         self._topics[full_name] = {
             'type': type_name, 'qos': tuple(profiles), 'hash': layout.type_hash(type_name),
             'count': 0}
-        self._register(full_name)
-
-    def _register(self, full_name):
         facts = self._topics[full_name]
-        type_name = facts['type']
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.add_schema(
-                type_name, 'ros2msg', layout.schema_text(type_name).encode())
-        self._channels[full_name] = self._mcap.add_channel(
-            full_name, self._schemas[type_name], {
-                'offered_qos_profiles': layout.to_yaml(list(facts['qos'])),
-                'topic_type_hash': facts['hash'],
-            })
+        self._current.register(full_name, type_name, facts['qos'], facts['hash'])
 
     def write(self, full_name, cdr_bytes, log_time_ns, publish_time_ns):
         """
@@ -161,25 +144,16 @@ class BagWriter:
 
         Raises OSError when the file system refuses; what was written before stays.
         """
-        if self._start_ns is None:
-            self._start_ns = self._end_ns = log_time_ns
-        elif (log_time_ns - self._start_ns >= self._limit_ns
-                or self._mcap.offset + self._mcap.pending >= self._limit_bytes):
-            self._finish_file()
-            self._open_next()
-            self._start_ns = self._end_ns = log_time_ns
-        self._mcap.add_message(
-            self._channels[full_name], log_time_ns, cdr_bytes, publish_time_ns)
+        file = self._current
+        if file.count and (log_time_ns - file.start_ns >= self._limit_ns
+                           or file.size >= self._limit_bytes):
+            self._split()
+        self._current.write(full_name, cdr_bytes, log_time_ns, publish_time_ns)
         self._topics[full_name]['count'] += 1
-        self._in_file += 1
-        if log_time_ns > self._end_ns:
-            self._end_ns = log_time_ns
-        elif log_time_ns < self._start_ns:
-            self._start_ns = log_time_ns
 
     def add_metadata(self, name, values):
         """Append a named metadata record of texts."""
-        self._mcap.add_metadata(name, _texts(values))
+        self._current.mcap.add_metadata(name, _texts(values))
 
     def flush(self, sync=False):
         """
@@ -187,17 +161,16 @@ class BagWriter:
 
         With ``sync`` they also survive the loss of power: waits for the disk.
         """
-        self._mcap.close_chunk()
-        if sync and self._mcap.offset > self._synced:
-            disk.sync(self._stream)
-            self._synced = self._mcap.offset
+        self._current.mcap.close_chunk()
+        if sync:
+            self._current.sync()
 
     def close(self):
         """Finish the index and metadata.yaml; a second call does nothing."""
         if self._closed:
             return
         try:
-            if self._mcap is not None:
+            if self._current is not None:
                 self._finish_file()
             layout.write_metadata(self.directory, self._bag_metadata())
         except OSError:
@@ -206,12 +179,10 @@ class BagWriter:
         self._closed = True
 
     def _finish_file(self):
-        self._write_rosbag2_record()
-        self._mcap.finish()
-        disk.sync(self._stream)
-        self._stream.close()
-        self._finished.append(self._file_facts())
-        self._mcap = None
+        self._write_rosbag2_record(self._current)
+        self._current.finish()
+        self._finished.append(self._current.facts)
+        self._current = None
 
     def cut(self):
         """
@@ -220,30 +191,16 @@ class BagWriter:
         What can still be written by ``add_metadata`` and ``close`` makes it a whole bag; where
         that fails, or after ``abandon``, the file has no index but is readable.
         """
-        if self._closed or self._mcap is None:
+        if self._closed or self._current is None:
             return
-        with contextlib.suppress(OSError):
-            self._truncate()
-            self._mcap.close_chunk()
-        self._truncate()
-        in_file = self._mcap.counts
+        in_file = self._current.cut()
         for name, facts in self._topics.items():
-            facts['count'] = self._in_former_files.get(name, 0) + in_file.get(
-                self._channels.get(name), 0)
-        self._in_file = sum(in_file.values())
-        self._start_ns, self._end_ns = self._mcap.span_ns
-
-    def _truncate(self):
-        self._stream.truncate(self._mcap.offset)
-        self._stream.seek(self._mcap.offset)
+            facts['count'] = self._in_former_files.get(name, 0) + in_file.get(name, 0)
 
     def abandon(self):
         """Close the file without an index, after a write error; what is in it stays readable."""
-        if not self._closed and self._mcap is not None:
-            with contextlib.suppress(OSError):
-                self._truncate()
-            with contextlib.suppress(OSError):
-                self._stream.close()
+        if not self._closed and self._current is not None:
+            self._current.abandon()
         self._closed = True
 
     def __enter__(self):
@@ -254,22 +211,22 @@ class BagWriter:
         """Close the bag, whatever happened: what was written stays readable."""
         self.close()
 
-    def _file_facts(self):
-        return layout.FileFacts(self.file.name, self._start_ns, self._end_ns, self._in_file)
-
-    def _bag_metadata(self):
+    def _bag_metadata(self, begun=None):
         topics = [
             layout.TopicFacts(name, facts['type'], facts['qos'], facts['hash'], facts['count'])
             for name, facts in self._topics.items()]
         files = list(self._finished)
-        if self._mcap is not None:
-            files.append(self._file_facts())
+        if self._current is not None:
+            files.append(self._current.facts)
+        if begun is not None:
+            files.append(begun.facts)
         return layout.bag_metadata(files, topics, self._records.get(EXPERIMENT_RECORD))
 
-    def _write_rosbag2_record(self):
+    def _write_rosbag2_record(self, file):
         # Written at open and at close, as rosbag2 does; readers take the last one.
-        self._mcap.add_metadata(
-            ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(self._bag_metadata())})
+        metadata = self._bag_metadata(file if file is not self._current else None)
+        file.mcap.add_metadata(
+            ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(metadata)})
 
 
 def check_limits(max_file_bytes, max_file_s):

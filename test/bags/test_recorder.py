@@ -196,6 +196,16 @@ def test_publishers_are_told_apart_by_continuity():
     assert check([10, 11, 1, 12, 2, 14, 3, 4, 15]) == (1, 9, 2)
 
 
+def test_publishers_that_come_late_and_vanish_are_counted_honestly():
+    # One vanishes, another comes late: what it sent before it was connected is told apart.
+    assert check([1, 2, 3, 4, 3, 4, 5]) == (0, 2, 2)
+    # It loses two on the way, and vanishes as well; a third starts from the beginning.
+    assert check([1, 2, 3, 4, 3, 4, 7, 8, 1, 2]) == (2, 2, 3)
+    # A late one with a high number cannot be told from a gap: the sum of both is right.
+    lost, missed, _ = check([1, 2, 3, 50, 51, 4, 5, 52])
+    assert lost + missed == 49
+
+
 def test_given_publishers_are_counted_apart():
     result = SequenceCheck()
     for publisher, number in (('a', 5), ('b', 900), ('a', 6), ('b', 902), ('a', 7)):
@@ -225,6 +235,40 @@ def test_killed_recorder_leaves_a_readable_beginning(tmp_path):
     run = load_run(left, recover=True)
     assert len(run.topics['pressure']) == 20_000
     assert run.metadata['experiment_name'] == 'sine'
+
+
+def test_messages_are_handed_over_as_rclpy_takes_them(tmp_path):
+    writer = HeldWriter(tmp_path / 'run')
+    core = recorder_on(writer, max_queued=5)
+    messages = [(payload(i), {'source_timestamp': START_NS + i, 'received_timestamp': START_NS,
+                              'publication_sequence_number': i + 1}) for i in range(20)]
+    assert core.receive_all(TOPIC, messages) == 5
+    writer.go.set()
+    summary = core.close()
+    counts = summary.counts[TOPIC]
+    assert (counts.received, counts.written, counts.dropped, counts.lost) == (20, 5, 15, 0)
+    assert read_bag(tmp_path / 'run').topics[TOPIC].payloads == [raw for raw, _ in messages[:5]]
+
+
+def test_a_full_disk_between_two_files_keeps_the_first(tmp_path, monkeypatch):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA, max_file_s=0.5))
+    for i in range(100):
+        core.receive(TOPIC, payload(i), START_NS, START_NS + i * 1_000_000, i + 1)
+    while core.counts[TOPIC].written < 100:
+        time.sleep(0.01)
+
+    def refuse(self):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(BagWriter, '_next_file', refuse)
+    for i in range(100, 200):
+        core.receive(TOPIC, payload(i), START_NS, START_NS + 10**9 + i, i + 1)
+    summary = core.close()
+    assert 'No space left' in summary.write_error
+    assert (summary.received, summary.written, summary.dropped) == (200, 100, 100)
+    assert [path.name for path in (tmp_path / 'run').glob('*.mcap')] == ['run_0.mcap']
+    assert len(load_run(tmp_path / 'run').topics['pressure']) == 100
+    assert bag_info(tmp_path / 'run').dropped == 100
 
 
 def test_queue_length_is_checked(tmp_path):
