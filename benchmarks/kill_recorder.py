@@ -25,6 +25,7 @@ that listen to a real publisher (needs ROS 2).
 """
 
 import argparse
+import contextlib
 import json
 import multiprocessing
 import os
@@ -50,6 +51,7 @@ RATES_HZ = {'pressure': 1000, 'pressure_command': 500, 'controller_state': 500}
 NAMES = tuple(f'internal_{k}' for k in range(20))
 ALLOWED_S = 1.0
 START_S = 20.0
+LARGEST_PAUSE_S = 0.05
 NODE_RATES_HZ = {'pressure': 500, 'controller_state': 200}
 
 
@@ -62,6 +64,27 @@ def numbered(topic, number):
     return encode(topic, Pressure(number, value))
 
 
+class Diary:
+    """What was sent until when, one line per feeding period; survives a kill."""
+
+    def __init__(self, path):
+        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+
+    def note(self, sent):
+        """Write down the numbers of messages sent, by topic."""
+        os.write(self._handle, (json.dumps([time.time_ns(), sent]) + '\n').encode())
+
+    @staticmethod
+    def sent_ns(path, topic, number):
+        """Return when message ``number`` of a topic had been sent, None if it was not."""
+        for line in path.read_text().splitlines():
+            with contextlib.suppress(ValueError):      # the last line may be torn
+                time_ns, sent = json.loads(line)
+                if sent[topic] > number:
+                    return time_ns
+        return None
+
+
 def record(directory, split_bytes, begun):
     """Record numbered messages until killed (the child); tell ``begun`` the time of the first."""
     core = RecorderCore(BagWriter(
@@ -69,6 +92,7 @@ def record(directory, split_bytes, begun):
     sent = dict.fromkeys(RATES_HZ, 0)
     for topic in RATES_HZ:
         core.add_topic(f'/muscle/{topic}', TOPIC_TYPES[topic])
+    diary = Diary(f'{directory}.diary')
     begin = time.monotonic()
     begun.send(time.time_ns())
     while True:
@@ -80,6 +104,7 @@ def record(directory, split_bytes, begun):
                 core.receive(
                     f'/muscle/{topic}', numbered(topic, number), now_ns, now_ns, number + 1)
                 sent[topic] += 1
+        diary.note(sent)
         time.sleep(FEED_PERIOD_S)
 
 
@@ -91,8 +116,9 @@ def kill_processes(folder, count, rng, parallel=4, shortest_s=0.0, longest_s=4.0
     Yields
     ------
     dict
-        ``bag``, ``killed_ns``, the time of the kill, and ``started_ns``, that of the first
-        message (None if it was killed before).
+        ``bag``, ``diary`` of what was sent, ``killed_ns``, the time of the kill,
+        ``started_ns``, that of the first message (None if it was killed before), and
+        ``from_zero``: whether message 0 was sent to this recorder.
 
     """
     # Children of a small server: a process with threads does not fork safely.
@@ -116,6 +142,7 @@ def kill_processes(folder, count, rng, parallel=4, shortest_s=0.0, longest_s=4.0
             os.kill(process.pid, signal.SIGKILL)
             process.join()
             yield {'bag': bag, 'killed_ns': killed_ns, 'from_zero': True,
+                   'diary': Path(f'{bag}.diary'),
                    'started_ns': started_ns or _told(heard, 0.0)}
 
 
@@ -133,8 +160,9 @@ def kill_nodes(folder, count, rng, longest_s=4.0):
     from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
     domain = DomainLock()
     environment = node_environment(domain.domain_id, folder)
+    diary = folder / 'published.diary'
     publisher = subprocess.Popen(
-        [sys.executable, __file__, '--publish'], env=environment, start_new_session=True)
+        [sys.executable, __file__, '--publish', str(diary)], env=environment, start_new_session=True)
     try:
         for k in range(count):
             bag = folder / f'node_{k}'
@@ -153,15 +181,15 @@ def kill_nodes(folder, count, rng, longest_s=4.0):
             node.wait(10.0)
             end_all([node])
             yield {'bag': bag, 'killed_ns': killed_ns, 'from_zero': False,
-                   'started_ns': started_ns}
+                   'diary': diary, 'started_ns': started_ns}
     finally:
         publisher.terminate()
         publisher.wait(10.0)
         domain.release()
 
 
-def publish():
-    """Publish numbered messages until stopped (a process of its own)."""
+def publish(path):
+    """Publish numbered messages until stopped, with a diary (a process of its own)."""
     from pam_actuation.nodes.conversions import MESSAGE_TYPES
     from pam_actuation.nodes.qos import PUBLISHER
     import rclpy
@@ -170,13 +198,19 @@ def publish():
     publishers = {topic: node.create_publisher(MESSAGE_TYPES[topic], topic, PUBLISHER)
                   for topic in NODE_RATES_HZ}
     sent = dict.fromkeys(NODE_RATES_HZ, 0)
-    begin = time.monotonic()
+    diary = Diary(path)
+    began = time.monotonic()
     while rclpy.ok():
-        elapsed_s = time.monotonic() - begin
+        elapsed_s = time.monotonic() - began
+        late_s = elapsed_s - sent['pressure'] / NODE_RATES_HZ['pressure']
+        if late_s > LARGEST_PAUSE_S:        # a sensor does not make up for a pause either
+            began += late_s - LARGEST_PAUSE_S
+            elapsed_s = time.monotonic() - began
         for topic, rate_hz in NODE_RATES_HZ.items():
             while sent[topic] < elapsed_s * rate_hz:
                 publishers[topic].publish(numbered(topic, sent[topic]))
                 sent[topic] += 1
+        diary.note(sent)
         time.sleep(FEED_PERIOD_S)
 
 
@@ -188,17 +222,19 @@ def examine(case, rates=None):
     -------
     dict
         ``problems`` (sentences, empty for a good bag), ``messages`` and ``missing_s``, the
-        time between the last message of the topic that is worst off and the kill.
+        time between the first message that is not in the bag and the kill.
 
     """
     bag, problems = case['bag'], []
-    if not list(bag.glob('*.mcap')) and case['started_ns'] is None:
+    if case['started_ns'] is None:
+        if list(bag.glob('*.mcap')):
+            recover_bag(bag)
         return {'problems': [], 'messages': 0, 'missing_s': 0.0, 'files': 0}
     recovery = recover_bag(bag)
     if recover_bag(bag).changed:
         problems.append('the repaired bag is not whole')
     content = read_bag(bag)
-    last_ns = []
+    missing_s = 0.0
     for topic in rates or RATES_HZ:
         data = content.topics.get(f'/muscle/{topic}')
         payloads = data.payloads if data else []
@@ -208,9 +244,12 @@ def examine(case, rates=None):
         expected = [numbered(topic, first + i) for i in range(len(payloads))]
         if payloads != expected:
             problems.append(f'{topic}: a message is altered or missing inside')
-        nothing_ns = case['started_ns'] or case['killed_ns']
-        last_ns.append(data.log_time_ns[-1] if payloads else nothing_ns)
-    missing_s = (case['killed_ns'] - min(last_ns)) * 1e-9
+        if payloads or case['from_zero']:
+            sent_ns = Diary.sent_ns(case['diary'], topic, first + len(payloads))
+        else:
+            sent_ns = case['started_ns']
+        if sent_ns is not None:
+            missing_s = max(missing_s, (case['killed_ns'] - sent_ns) * 1e-9)
     if missing_s > ALLOWED_S:
         problems.append(f'{missing_s:.2f} s before the kill are missing')
     with Reader(bag) as reader:
@@ -243,10 +282,10 @@ def main():
     parser.add_argument('--nodes', type=int, default=40)
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--parallel', type=int, default=4)
-    parser.add_argument('--publish', action='store_true', help=argparse.SUPPRESS)
+    parser.add_argument('--publish', default='', help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.publish:
-        return publish()
+        return publish(args.publish)
     rng = random.Random(args.seed)
     found = {}
     with tempfile.TemporaryDirectory() as folder:

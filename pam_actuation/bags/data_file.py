@@ -16,6 +16,7 @@
 
 import contextlib
 import functools
+import os
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.mcap_write import McapWriter
@@ -91,16 +92,17 @@ class DataFile:
         """Return what metadata.yaml says of the file."""
         return layout.FileFacts(self.path.name, self.start_ns, self.end_ns, self.count)
 
-    def sync(self):
-        """Wait until everything written is on the disk."""
-        if self.mcap.offset > self._synced:
-            disk.sync(self._stream)
-            self._synced = self.mcap.offset
+    def handle_to_sync(self):
+        """Return a file descriptor of its own for ``disk.sync``, None if nothing is new."""
+        if self.mcap.offset == self._synced:
+            return None
+        self._synced = self.mcap.offset
+        return os.dup(self._stream.fileno())
 
     def finish(self):
         """Write the index and close."""
         self.mcap.finish()
-        disk.sync(self._stream)
+        disk.sync(self._stream.fileno())
         self._stream.close()
 
     def cut(self):

@@ -46,9 +46,9 @@ def lock(stream):
     return True
 
 
-def sync(stream):
-    """Wait until what was written is on the disk."""
-    getattr(os, 'fdatasync', os.fsync)(stream.fileno())
+def sync(handle):
+    """Wait until what was written to a file descriptor is on the disk."""
+    getattr(os, 'fdatasync', os.fsync)(handle)
 
 
 def sync_directory(directory):

@@ -23,9 +23,11 @@ the disk cannot follow, the newest messages are dropped and counted.
 from collections import deque
 import contextlib
 from dataclasses import asdict, dataclass, field
+import os
 import threading
 import time
 
+from pam_actuation.bags import disk
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
@@ -167,6 +169,9 @@ class RecorderCore:
         self.write_error = ''
         self._thread = threading.Thread(target=self._run, name='bag_writer', daemon=True)
         self._thread.start()
+        self._ended = threading.Event()
+        self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
+        self._syncing.start()
 
     def add_topic(self, full_name, type_name, check_sequence=None, qos=None):
         """
@@ -271,6 +276,8 @@ class RecorderCore:
             self._closing = True
             self._wake.notify()
         self._thread.join()
+        self._ended.set()
+        self._syncing.join()
         try:
             if self.write_error:
                 self._count_what_is_kept()
@@ -317,6 +324,19 @@ class RecorderCore:
                 flushed = now
             self._write(batch, flush)
 
+    def _sync(self):
+        """Bring what was written onto the disk; a slow one must not hold up the writing."""
+        while not self._ended.wait(self._flush_every_s):
+            with self._disk:
+                handle = self._writer.handle_to_sync()
+            if handle is not None:
+                try:
+                    disk.sync(handle)
+                except OSError as error:
+                    self._fail(error)
+                finally:
+                    os.close(handle)
+
     def _write(self, batch, flush):
         written = {}
         refused = {}
@@ -328,7 +348,7 @@ class RecorderCore:
                     written[name] = written.get(name, 0) + 1
                     batch.popleft()
                 if flush and not self.write_error:
-                    self._writer.flush(sync=True)
+                    self._writer.flush()
             # Whatever went wrong must reach the summary: a thread dies silently.
             except Exception as error:
                 self._fail(error)

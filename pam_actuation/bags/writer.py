@@ -155,15 +155,18 @@ class BagWriter:
         """Append a named metadata record of texts."""
         self._current.mcap.add_metadata(name, _texts(values))
 
-    def flush(self, sync=False):
-        """
-        Close the open chunk, so that all messages written survive the end of the process.
-
-        With ``sync`` they also survive the loss of power: waits for the disk.
-        """
+    def flush(self):
+        """Close the open chunk, so that all messages written survive the end of the process."""
         self._current.mcap.close_chunk()
-        if sync:
-            self._current.sync()
+
+    def handle_to_sync(self):
+        """
+        Return a file descriptor for ``disk.sync``, None if nothing was written since the last.
+
+        The caller waits for the disk, in a thread of its own, and closes it; what was flushed
+        then survives the loss of power.
+        """
+        return None if self._current is None else self._current.handle_to_sync()
 
     def close(self):
         """Finish the index and metadata.yaml; a second call does nothing."""
