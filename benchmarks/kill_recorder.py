@@ -162,7 +162,8 @@ def kill_nodes(folder, count, rng, longest_s=4.0):
     environment = node_environment(domain.domain_id, folder)
     diary = folder / 'published.diary'
     publisher = subprocess.Popen(
-        [sys.executable, __file__, '--publish', str(diary)], env=environment, start_new_session=True)
+        [sys.executable, __file__, '--publish', str(diary)], env=environment,
+        start_new_session=True)
     try:
         for k in range(count):
             bag = folder / f'node_{k}'
