@@ -29,7 +29,7 @@ from rclpy.node import Node
 
 NAMESPACE = '/muscle'
 
-Heard = collections.namedtuple('Heard', 'time_s plain')
+Heard = collections.namedtuple('Heard', 'time_s plain sequence')
 Health = collections.namedtuple('Health', 'time_s level message values')
 
 
@@ -74,8 +74,9 @@ class LiveRig:
             pass
 
     def _hearer(self, topic):
-        def hear(message):
-            self.heard[topic].append(Heard(time.monotonic(), from_ros(topic, message)))
+        def hear(message, info):
+            self.heard[topic].append(Heard(
+                time.monotonic(), from_ros(topic, message), info['publication_sequence_number']))
         return hear
 
     def _on_diagnostics(self, message):
