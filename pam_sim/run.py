@@ -21,6 +21,8 @@ from pam_sim.errors import InputError
 
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = ('valve_signal', 'reference', 'pressure_command', 'controller_state')
+# A day at 1 kHz; stamps of a broken clock would ask for far more than memory holds.
+MAX_GRID_POINTS = 100_000_000
 
 
 @dataclass
@@ -111,13 +113,14 @@ class Run:
         """Seconds from the first to the last stamp."""
         return (self.end_ns - self.start_ns) * 1e-9
 
-    def on_grid(self, dt_s=0.001, start_ns=None, end_ns=None, topics=None):
+    def on_grid(self, dt_s=0.001, start_ns=None, end_ns=None, topics=None, max_gap_s=None):
         """
         Resample topics on one common time grid.
 
         Measurements are interpolated linearly; commands, references and
-        controller states are held. Before its first message a held signal has
-        its first value.
+        controller states are held, however long. Before its first message a
+        held signal has its first value. Of several messages with one stamp the
+        first counts, of a held signal the last.
 
         Parameters
         ----------
@@ -127,6 +130,9 @@ class Run:
             Ends of the grid; by default the span common to ``topics``.
         topics : iterable of str, optional
             Which topics; all with messages by default.
+        max_gap_s : float, optional
+            Measurements are NaN on the grid between two messages further apart
+            than this, s; by default every gap is interpolated.
 
         Returns
         -------
@@ -135,9 +141,12 @@ class Run:
         Raises
         ------
         InputError
-            A wanted topic is missing, or the topics have no common time span.
+            A wanted topic is missing, the topics have no common time span, or
+            the grid would have no or too many points.
 
         """
+        if not dt_s > 0.0:
+            raise InputError(f'a grid step of {dt_s} s; give one above 0', 'dt_s')
         names = list(topics) if topics is not None else [n for n in self.topics if n in self]
         series = {name: self.require(name) for name in names}
         if not series:
@@ -149,14 +158,20 @@ class Run:
         if end_ns <= start_ns:
             raise InputError('its topics have no common time span', self.path)
         count = int((end_ns - start_ns) * 1e-9 / dt_s + 1e-9) + 1
+        if count > MAX_GRID_POINTS:
+            raise InputError(
+                f'a grid of {count} points over {(end_ns - start_ns) * 1e-9:.6g} s; at most '
+                f'{MAX_GRID_POINTS}: give a larger dt_s, or start_ns and end_ns', self.path)
         time_s = np.arange(count) * dt_s
         values = {}
         for name, one in series.items():
-            stamp, order = np.unique(np.asarray(one.stamp_ns, dtype=np.int64), return_index=True)
-            seconds = (stamp - int(start_ns)) * 1e-9
+            stamp_ns = np.asarray(one.stamp_ns, dtype=np.int64)
+            order = np.argsort(stamp_ns, kind='stable')
+            seconds = (stamp_ns[order] - int(start_ns)) * 1e-9
+            held = name in HELD_TOPICS
             values[name] = {
-                key: _resample(time_s, seconds, np.asarray(samples, float)[order],
-                               name in HELD_TOPICS)
+                key: _held(time_s, seconds, np.asarray(samples, float)[order]) if held
+                else _interpolated(time_s, seconds, np.asarray(samples, float)[order], max_gap_s)
                 for key, samples in one.values.items()}
         return Grid(int(start_ns), dt_s, time_s, values)
 
@@ -197,9 +212,20 @@ class Grid:
         return len(self.time_s)
 
 
-def _resample(time_s, stamp_s, samples, held):
-    if not held:
-        return np.interp(time_s, stamp_s, samples)
+def _held(time_s, stamp_s, samples):
     # A nanosecond of slack: a message stamped on a grid point is in force there.
     index = np.searchsorted(stamp_s, time_s + 1e-9, side='right') - 1
     return samples[np.clip(index, 0, len(samples) - 1)]
+
+
+def _interpolated(time_s, stamp_s, samples, max_gap_s):
+    first = np.append(True, np.diff(stamp_s) > 0.0)
+    stamp_s, samples = stamp_s[first], samples[first]
+    values = np.interp(time_s, stamp_s, samples)
+    if max_gap_s is not None:
+        for i in np.flatnonzero(np.diff(stamp_s) > max_gap_s):
+            # The two messages at its ends are there, with the same slack.
+            begin = np.searchsorted(time_s, stamp_s[i] + 1e-9, side='right')
+            end = np.searchsorted(time_s, stamp_s[i + 1] - 1e-9, side='left')
+            values[begin:end] = np.nan
+    return values

@@ -39,6 +39,7 @@ DIAGNOSTICS = 'diagnostics'
 PUBLISHED = 'published.'
 # An interval between stamps this many times the usual one counts as a gap.
 GAP_FACTOR = 2.5
+COUNT_DIGITS = 18
 
 
 @dataclass
@@ -191,10 +192,10 @@ def _size(path):
 
 
 def _span(bag):
-    times = [topic.log_time_ns for topic in bag.topics.values() if topic.log_time_ns]
+    times = [topic.log_time_ns for topic in bag.topics.values() if len(topic.log_time_ns)]
     if not times:
         return 0, 0
-    return min(map(min, times)), max(map(max, times))
+    return int(min(map(np.min, times))), int(max(map(np.max, times)))
 
 
 def _topic_info(topic, remarks):
@@ -229,17 +230,16 @@ def _stamps_and_values(topic, remarks):
         return stamp_ns[~bad], {name: column[~bad] for name, column in values.items()}
     if _has_header(topic):
         try:
-            return np.array([cdr.stamp_of(raw) for raw in topic.payloads], dtype=np.int64), {}
+            return series.stamps(topic.payloads), {}
         except cdr.CdrError:
             remarks.append(f'{topic.name}: some messages cannot be decoded.')
-    return np.array(topic.log_time_ns, dtype=np.int64), {}
+    return topic.log_time_ns, {}
 
 
 def _has_header(topic):
     fields = layout.typestore().fielddefs.get(topic.type_name)
-    little = all(raw[:2] == cdr.ENCAPSULATION[:2] for raw in topic.payloads)
     return bool(
-        topic.encoding == 'cdr' and little and fields and fields[1]
+        topic.encoding == 'cdr' and fields and fields[1]
         and fields[1][0][1][1] == 'std_msgs/msg/Header')
 
 
@@ -253,15 +253,16 @@ def _published(bag):
     topic = bag.topics.get('/diagnostics')
     if topic is None or not is_rig_topic(topic):
         return {}
-    for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns):
+    for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
         try:
             statuses = codecs.decode(DIAGNOSTICS, raw)
         except InputError:
             continue
         for status in statuses:
             for key, text in status.values:
-                if key.startswith(PUBLISHED) and text.isdigit():
-                    last[status.name, key[len(PUBLISHED):]] = (int(text), sent_ns)
+                number = _count(text)
+                if key.startswith(PUBLISHED) and number is not None:
+                    last[status.name, key[len(PUBLISHED):]] = (number, sent_ns)
     published = {}
     for (_, name), (number, sent_ns) in last.items():
         before, before_ns = published.get(name, (0, 0))
@@ -269,10 +270,14 @@ def _published(bag):
     return published
 
 
+def _count(text):
+    """Return the number a text is, None where it is no number of messages."""
+    return int(text) if text.isdecimal() and len(text) <= COUNT_DIGITS else None
+
+
 def _add_counts(info, topic, recording, published):
     def recorded(key):
-        text = recording.get(f'{topic.name}.{key}', '')
-        return int(text) if text.isdigit() else None
+        return _count(recording.get(f'{topic.name}.{key}', ''))
 
     info.lost = recorded('lost')
     info.dropped = recorded('dropped')
@@ -283,8 +288,8 @@ def _add_counts(info, topic, recording, published):
     # Where the bag knows send times, a node that died early is checked too: what it had
     # published by its last report must be there from that time.
     by_then = info.count
-    if topic.name != '/diagnostics' and topic.publish_time_ns != topic.log_time_ns:
-        by_then = int((np.array(topic.publish_time_ns) <= sent_ns).sum())
+    if topic.name != '/diagnostics' and (topic.publish_time_ns != topic.log_time_ns).any():
+        by_then = int((topic.publish_time_ns <= sent_ns).sum())
     elsewhere = (info.dropped or 0) + (info.missed_at_start or 0)
     info.lost = max(info.lost or 0, info.published - by_then - elsewhere)
 

@@ -145,7 +145,7 @@ def namespaces(bag):
     found = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
-        if short != 'diagnostics' and is_rig_topic(topic) and topic.payloads:
+        if short != 'diagnostics' and is_rig_topic(topic) and len(topic.payloads):
             found.setdefault(parent, set()).add(short)
     return found
 
@@ -215,7 +215,7 @@ def _checked_stamps(stamp_ns, keep, topic, remarks):
     unset = keep & (stamp_ns == 0)
     if int(unset.sum()) > 1 and not (stamp_ns[keep] != 0).any():
         remarks.append(f'{topic.name}: no message has a header stamp, receive times are used.')
-        return np.array(topic.log_time_ns, dtype=np.int64), keep
+        return topic.log_time_ns, keep
     if unset.any() and int(np.median(stamp_ns[keep])) > _WALL_CLOCK_NS:
         remarks.append(
             f'{topic.name}: {int(unset.sum())} messages without a header stamp, left out.')

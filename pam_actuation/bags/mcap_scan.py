@@ -16,23 +16,28 @@
 Read an MCAP file from front to back, quickly, and also when its end is missing.
 
 The index at the end is not needed: every record is walked over, chunks are
-unpacked and checked, and the messages come out as bytes per topic. Format:
-https://mcap.dev/spec.
+unpacked and checked, and the messages come out as tables of bytes per channel.
+Memory is bounded by what the messages take. Format: https://mcap.dev/spec.
 """
 
 from dataclasses import dataclass, field
+import io
+import os
 import struct
 import zlib
 
 import lz4.frame
+import numpy as np
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
+# No writer makes chunks near this size; a chunk that claims more is damaged.
+MAX_CHUNK_BYTES = 2**30
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 1, 2, 3, 4, 5, 6
 _METADATA, _DATA_END = 12, 15
+_READ_BYTES = 1024 * 1024
+_POSITIONS = 2**16
 _RECORD = struct.Struct('<BQ')
-_MESSAGE_HEAD = struct.Struct('<HIQQ')
-_RECORD_AND_MESSAGE = struct.Struct('<BQHIQQ')
 _CHUNK_HEAD = struct.Struct('<QQQI')
 _U16 = struct.Struct('<H')
 _U32 = struct.Struct('<I')
@@ -50,7 +55,7 @@ class Damaged(Exception):
 
 @dataclass
 class Channel:
-    """One channel of the file and its messages in file order."""
+    """One channel of the file; ``messages`` are its MessageColumns in file order."""
 
     topic: str
     type_name: str
@@ -58,9 +63,7 @@ class Channel:
     schema_encoding: str
     schema: str
     metadata: dict
-    payloads: list = field(default_factory=list)
-    log_time_ns: list = field(default_factory=list)
-    publish_time_ns: list = field(default_factory=list)
+    messages: object = None
 
 
 @dataclass
@@ -77,146 +80,194 @@ class McapContent:
     @property
     def message_count(self):
         """Return the number of messages that were read."""
-        return sum(len(channel.payloads) for channel in self.channels.values())
+        return sum(len(channel.messages) for channel in self.channels.values())
 
 
-def scan(data):
+def scan(stream):
     """
-    Return the McapContent of a file's bytes.
+    Return the McapContent of a file.
 
     Never raises for a damaged or truncated file: what precedes the damage is
     returned with ``damage`` set. ``finished`` tells whether the end was written.
+
+    Parameters
+    ----------
+    stream : binary file or bytes
+        Open for reading, seekable; or the bytes of the file themselves.
+
     """
+    if isinstance(stream, (bytes, bytearray, memoryview)):
+        stream = io.BytesIO(stream)
     content = McapContent()
-    if not data.startswith(MAGIC):
-        begun = MAGIC.startswith(data)
+    begin = _read(stream, 0, len(MAGIC))
+    if begin != MAGIC:
         content.damage = Damaged(
-            'the file ends inside its first bytes' if begun else 'not an MCAP file', 0)
+            'the file ends inside its first bytes' if MAGIC.startswith(begin)
+            else 'not an MCAP file', 0)
         return content
-    scanner = _Scanner(content)
+    scanner = _Scanner(content, stream)
     try:
-        scanner.walk(data)
+        scanner.walk()
     except Damaged as damage:
         content.damage = damage
+    scanner.batch.flush()
     return content
+
+
+def _read(stream, position, size):
+    stream.seek(position)
+    return stream.read(size)
 
 
 class _Scanner:
 
-    def __init__(self, content):
+    def __init__(self, content, stream):
+        # Imported late: a recorder reads bags only after a crash, the compiler is large.
+        from pam_actuation.bags.message_batch import MessageBatch
+        from pam_actuation.bags.record_walk import walk_messages
+        self._walk_messages = walk_messages
+        self._positions = np.empty(_POSITIONS, dtype=np.int64)
+        self._unpack_zstd = zstandard.ZstdDecompressor().decompress
         self.content = content
+        self.stream = stream
+        self.size = stream.seek(0, os.SEEK_END)
+        self.batch = MessageBatch()
         self.schemas = {0: ('', '', '')}
         self.where = 0
 
-    def walk(self, data):
+    def walk(self):
         """Walk over the records of the file's data section."""
-        position, size = len(MAGIC), len(data)
-        while position < size:
+        position = len(MAGIC)
+        while position < self.size:
             self.where = position
-            if position + _RECORD.size > size:
+            head = _read(self.stream, position, _RECORD.size)
+            if len(head) < _RECORD.size:
                 raise Damaged('the file ends inside a record', position)
-            opcode, length = _RECORD.unpack_from(data, position)
-            begin, end = position + _RECORD.size, position + _RECORD.size + length
-            if end > size:
+            opcode, length = _RECORD.unpack(head)
+            end = position + _RECORD.size + length
+            if end > self.size:
                 raise Damaged('the file ends inside a record', position)
             if opcode in (_DATA_END, _FOOTER):
-                self.content.finished = data.endswith(MAGIC) and size > len(MAGIC)
-                if not self.content.finished:
-                    raise Damaged('the end mark is missing', position)
+                self._check_end(position)
                 return
-            try:
-                self._record(opcode, data, begin, end)
-            except (struct.error, UnicodeDecodeError, IndexError) as error:
-                raise Damaged(f'a record makes no sense ({error})', position) from None
+            if opcode == _MESSAGE:
+                position = self._loose_messages(position, length)
+                continue
+            if opcode in (_CHUNK, _SCHEMA, _CHANNEL, _METADATA, _HEADER):
+                self._understood(opcode, self.stream.read(length))
             position = end
         raise Damaged('the end mark is missing', position)
 
-    def _record(self, opcode, data, begin, end):
+    def _check_end(self, position):
+        self.content.finished = (
+            self.size >= position + len(MAGIC)
+            and _read(self.stream, self.size - len(MAGIC), len(MAGIC)) == MAGIC)
+        if not self.content.finished:
+            raise Damaged('the end mark is missing', position)
+
+    def _understood(self, opcode, data):
+        try:
+            self._record(opcode, data)
+        except (struct.error, UnicodeDecodeError, IndexError) as error:
+            raise Damaged(f'a record makes no sense ({error})', self.where) from None
+
+    def _record(self, opcode, data):
         if opcode == _CHUNK:
-            self._chunk_records(self._unpacked(data, begin, end))
-        elif opcode == _MESSAGE:
-            self._message(data, begin, end)
+            self._chunk_records(self._unpacked(data))
         elif opcode == _SCHEMA:
-            self._schema(data, begin)
+            self._schema(data)
         elif opcode == _CHANNEL:
-            self._channel(data, begin)
+            self._channel(data)
         elif opcode == _METADATA:
-            name, begin = _text(data, begin)
+            name, begin = _text(data, 0)
             self.content.metadata.append((name, _texts(data, begin)[0]))
-        elif opcode == _HEADER:
-            self.content.profile, begin = _text(data, begin)
+        else:
+            self.content.profile, begin = _text(data, 0)
             self.content.library = _text(data, begin)[0]
 
-    def _unpacked(self, data, begin, end):
-        _, _, size, crc = _CHUNK_HEAD.unpack_from(data, begin)
-        compression, begin = _text(data, begin + _CHUNK_HEAD.size)
+    def _unpacked(self, data):
+        _, _, size, crc = _CHUNK_HEAD.unpack_from(data)
+        compression, begin = _text(data, _CHUNK_HEAD.size)
         length = _U64.unpack_from(data, begin)[0]
-        begin += 8
-        if begin + length > end:
+        begin += _U64.size
+        if begin + length > len(data):
             raise Damaged('a chunk is longer than its record', self.where)
-        packed = data[begin:begin + length]
+        if size > MAX_CHUNK_BYTES:
+            raise Damaged(f'a chunk claims {size} bytes', self.where)
+        packed = memoryview(data)[begin:begin + length]
         try:
-            if compression == 'zstd':
-                records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-            elif compression == 'lz4':
-                records = lz4.frame.decompress(packed)
-            elif compression == '':
-                records = packed
-            else:
-                raise Damaged(f'unknown compression {compression!r}', self.where)
+            records = self._decompressed(compression, packed, size)
         except (zstandard.ZstdError, RuntimeError, MemoryError) as error:
             raise Damaged(f'a chunk cannot be unpacked ({error})', self.where) from None
         if len(records) != size or (crc and zlib.crc32(records) != crc):
             raise Damaged('a chunk fails its checksum', self.where)
         return records
 
+    def _decompressed(self, compression, packed, size):
+        if compression == 'zstd':
+            if zstandard.frame_content_size(packed) > size:
+                raise Damaged('a chunk fails its checksum', self.where)
+            return self._unpack_zstd(packed, max_output_size=size)
+        if compression == 'lz4':
+            # One byte more than announced shows a chunk that is too long.
+            return lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+        if compression == '':
+            return packed
+        raise Damaged(f'unknown compression {compression!r}', self.where)
+
     def _chunk_records(self, data):
+        view = np.frombuffer(data, dtype=np.uint8)
         position, size = 0, len(data)
-        channels = self.content.channels
-        head, whole = _RECORD_AND_MESSAGE, _RECORD_AND_MESSAGE.size
         while position < size:
-            opcode = data[position]
-            if opcode == _MESSAGE:
-                _, length, key, _, log_ns, publish_ns = head.unpack_from(data, position)
-                begin, position = position + whole, position + _RECORD.size + length
-                channel = channels.get(key)
-                if channel is None or position > size:
-                    raise Damaged('a message of an unknown channel', self.where)
-                channel.payloads.append(data[begin:position])
-                channel.log_time_ns.append(log_ns)
-                channel.publish_time_ns.append(publish_ns)
-            else:
-                opcode, length = _RECORD.unpack_from(data, position)
-                begin, position = position + _RECORD.size, position + _RECORD.size + length
-                if opcode in (_SCHEMA, _CHANNEL):
-                    self._record(opcode, data, begin, position)
+            position = self._messages(view, position)
+            if position + _RECORD.size > size:
+                break
+            opcode, length = _RECORD.unpack_from(data, position)
+            begin, end = position + _RECORD.size, position + _RECORD.size + length
+            if end > size or opcode == _MESSAGE:
+                raise Damaged('a record is longer than its chunk', self.where)
+            if opcode in (_SCHEMA, _CHANNEL):
+                self._record(opcode, bytes(data[begin:end]))
+            position = end
 
-    def _message(self, data, begin, end):
-        key, _, log_ns, publish_ns = _MESSAGE_HEAD.unpack_from(data, begin)
-        channel = self.content.channels.get(key)
-        if channel is None:
-            raise Damaged('a message of an unknown channel', self.where)
-        channel.payloads.append(data[begin + _MESSAGE_HEAD.size:end])
-        channel.log_time_ns.append(log_ns)
-        channel.publish_time_ns.append(publish_ns)
+    def _messages(self, view, position):
+        """Take the messages that follow each other; return where anything else begins."""
+        while True:
+            count, end = self._walk_messages(view, position, self._positions)
+            if not count:
+                return position
+            records = view[position:end]
+            if self.batch.add(records, self._positions[:count] - position) < count:
+                raise Damaged('a message of an unknown channel', self.where)
+            position = end
 
-    def _schema(self, data, begin):
-        key = _U16.unpack_from(data, begin)[0]
-        name, begin = _text(data, begin + 2)
+    def _loose_messages(self, position, length):
+        """Take messages outside of chunks, a block of the file at a time."""
+        block = _read(self.stream, position, max(_READ_BYTES, _RECORD.size + length))
+        taken = self._messages(np.frombuffer(block, dtype=np.uint8), 0)
+        if not taken:
+            raise Damaged('a message is shorter than its head', position)
+        return position + taken
+
+    def _schema(self, data):
+        key = _U16.unpack_from(data)[0]
+        name, begin = _text(data, 2)
         encoding, begin = _text(data, begin)
         self.schemas[key] = (name, encoding, _text(data, begin)[0])
 
-    def _channel(self, data, begin):
-        key, schema = _U16.unpack_from(data, begin)[0], _U16.unpack_from(data, begin + 2)[0]
-        topic, begin = _text(data, begin + 4)
+    def _channel(self, data):
+        key, schema = _U16.unpack_from(data)[0], _U16.unpack_from(data, 2)[0]
+        topic, begin = _text(data, 4)
         encoding, begin = _text(data, begin)
         if key in self.content.channels:
             return
         if schema not in self.schemas:
             raise Damaged(f'the topic {topic} has no message definition', self.where)
         name, schema_encoding, text = self.schemas[schema]
+        metadata = _texts(data, begin)[0]
         self.content.channels[key] = Channel(
-            topic, name, encoding, schema_encoding, text, _texts(data, begin)[0])
+            topic, name, encoding, schema_encoding, text, metadata,
+            self.batch.add_channel(key))
 
 
 def _text(data, begin):

@@ -101,7 +101,7 @@ def _time_remarks(topic, info, stamp_ns):
             f'{name}: {info.gaps} gaps, the longest {1e3 * info.max_gap_s:.0f} ms at '
             f'{info.rate_hz:.0f} Hz.')
     if len(stamp_ns) == len(topic.log_time_ns) and len(stamp_ns):
-        remarks += _clock_remarks(name, np.array(topic.log_time_ns, np.int64) - stamp_ns)
+        remarks += _clock_remarks(name, topic.log_time_ns - stamp_ns)
     return remarks
 
 

@@ -22,6 +22,7 @@ deciding places are read together as columns of one array.
 
 import numpy as np
 from pam_actuation.bags import cdr, codecs
+from pam_actuation.bags.payloads import Payloads
 from rosbags.serde import SerdeError
 
 # Value columns that a series always has, NaN where no message carries them.
@@ -37,6 +38,9 @@ VALUES = {
     'controller_state': (),
 }
 
+# Layouts of equal length that are looked for together; what is left is read one by one.
+_MAX_LAYOUTS = 8
+
 
 def table(short, payloads):
     """
@@ -46,7 +50,7 @@ def table(short, payloads):
     ----------
     short : str
         Short topic name, a key of VALUES.
-    payloads : list of bytes
+    payloads : Payloads or list of bytes
         CDR bytes, N messages.
 
     Returns
@@ -59,50 +63,89 @@ def table(short, payloads):
         Messages that are not of the topic's type.
 
     """
+    payloads = _payloads(payloads)
     count = len(payloads)
     stamp_ns = np.zeros(count, dtype=np.int64)
     bad = np.zeros(count, dtype=bool)
     values = {name: np.full(count, np.nan) for name in VALUES[short]}
-    groups = {}
-    for index, raw in enumerate(payloads):
-        groups.setdefault(len(raw), []).append(index)
-    for indices in groups.values():
-        left = np.array(indices)
-        while len(left):
-            left = _read_alike(short, payloads, left, stamp_ns, values, bad)
+    for indices, rows in payloads.tables():
+        for _ in range(_MAX_LAYOUTS):
+            if len(indices):
+                indices, rows = _read_alike(short, indices, rows, stamp_ns, values, bad)
+        for i in range(len(indices)):
+            _read_alike(short, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad)
     return stamp_ns, values, bad
 
 
-def _read_alike(short, payloads, indices, stamp_ns, values, bad):
-    """Read the messages that have the layout of the first one; return the others' indices."""
-    first = indices[0]
+def stamps(payloads):
+    """
+    Return ``header.stamp`` [ns] of N messages of any stamped type, shape (N,).
+
+    Raises CdrError where one is too short or not little-endian.
+    """
+    payloads = _payloads(payloads)
+    stamp_ns = np.zeros(len(payloads), dtype=np.int64)
+    for indices, rows in payloads.tables():
+        cdr.stamp_of(rows[0].tobytes())
+        if (_column(rows, 0, '<u2') != int.from_bytes(cdr.ENCAPSULATION[:2], 'little')).any():
+            raise cdr.CdrError('not plain little-endian CDR')
+        stamp_ns[indices] = _stamp_column(rows)
+    return stamp_ns
+
+
+def _payloads(messages):
+    return messages if isinstance(messages, Payloads) else Payloads(messages)
+
+
+def _read_alike(short, indices, rows, stamp_ns, values, bad):
+    """Read the messages that have the layout of the first one; return the others."""
+    first = rows[0].tobytes()
     try:
-        raw = codecs.little_endian(short, payloads[first])
+        raw = codecs.little_endian(short, first)
         layout = codecs.value_layout(short, raw)
     except (cdr.CdrError, SerdeError):
-        bad[first] = True
-        return indices[1:]
-    if raw is payloads[first]:
-        rows = np.frombuffer(b''.join([payloads[i] for i in indices]), dtype=np.uint8)
-        rows = rows.reshape(len(indices), len(raw))
-        alike = np.ones(len(indices), dtype=bool)
-        for begin, end in layout.fixed:
-            alike &= (rows[:, begin:end] == rows[0, begin:end]).all(axis=1)
-    else:
+        bad[indices[0]] = True
+        return indices[1:], rows[1:]
+    if raw is not first:
         # Re-encoded from big-endian: its bytes compare with no other's.
-        rows = np.frombuffer(raw, dtype=np.uint8).reshape(1, -1)
-        alike = np.arange(len(indices)) == 0
-    chosen = indices[alike]
-    rows = rows[alike[:len(rows)]]
-    seconds = _column(rows, 4, '<i4').astype(np.int64)
-    stamp_ns[chosen] = seconds * cdr.NS_PER_S + _column(rows, 8, '<u4')
+        swapped = np.frombuffer(raw, dtype=np.uint8).reshape(1, -1)
+        _fill(layout, indices[:1], swapped, stamp_ns, values)
+        return indices[1:], rows[1:]
+    alike = _alike(rows, layout.fixed)
+    if alike.all():
+        _fill(layout, indices, rows, stamp_ns, values)
+        return indices[:0], rows[:0]
+    _fill(layout, indices[alike], rows[alike], stamp_ns, values)
+    return indices[~alike], rows[~alike]
+
+
+def _fill(layout, indices, rows, stamp_ns, values):
+    """Copy the numbers of messages of one layout to their places."""
+    stamp_ns[indices] = _stamp_column(rows)
     for name, offset in layout.columns.items():
-        column = values.setdefault(name, np.full(len(stamp_ns), np.nan))
+        if name not in values:
+            values[name] = np.full(len(stamp_ns), np.nan)
         if offset is not None:
-            column[chosen] = _column(rows, offset, '<f8')
-    return indices[~alike]
+            values[name][indices] = _column(rows, offset, '<f8')
+
+
+def _alike(rows, fixed):
+    """Return which rows have the bytes of the first one in the ranges ``fixed``, shape (n,)."""
+    alike = np.ones(len(rows), dtype=bool)
+    for begin, end in fixed:
+        while begin < end:
+            # As many bytes at once as a number has, powers of two.
+            size = min(8, 1 << (end - begin).bit_length() - 1)
+            part = _column(rows, begin, f'<u{size}')
+            alike &= part == part[0]
+            begin += size
+    return alike
+
+
+def _stamp_column(rows):
+    return _column(rows, 4, '<i4').astype(np.int64) * cdr.NS_PER_S + _column(rows, 8, '<u4')
 
 
 def _column(rows, offset, kind):
-    size = np.dtype(kind).itemsize
-    return np.ascontiguousarray(rows[:, offset:offset + size]).view(kind)[:, 0]
+    """Return the numbers at one offset of every row as a view, shape (n,)."""
+    return np.ndarray(len(rows), kind, rows, offset, strides=rows.strides[:1])

@@ -23,27 +23,36 @@ that rosbag2 writes through the ``rosbags`` package.
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC, scan
+from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 import yaml
 
+# The compiled reader where it is there: metadata of many topics is long.
+_YAML_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_LONGEST_REASON = 300
 _RECOVER = 'or read that beginning with the option recover'
+
+
+def _no_times():
+    return np.zeros(0, dtype=np.int64)
 
 
 @dataclass
 class TopicData:
-    """The messages of one topic as bytes, in file order, with their times [ns]."""
+    """The N messages of one topic as bytes, in file order, with their times [ns], shape (N,)."""
 
     name: str
     type_name: str
     encoding: str = 'cdr'
-    payloads: list = field(default_factory=list)
-    log_time_ns: list = field(default_factory=list)
-    publish_time_ns: list = field(default_factory=list)
+    payloads: Payloads = field(default_factory=Payloads)
+    log_time_ns: np.ndarray = field(default_factory=_no_times)
+    publish_time_ns: np.ndarray = field(default_factory=_no_times)
 
 
 @dataclass
@@ -92,9 +101,9 @@ def read_bag(path, recover=False):
 
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError('no such file or directory; give the path of a bag', path)
     try:
+        if not path.exists():
+            raise InputError('no such file or directory; give the path of a bag', path)
         if path.is_dir():
             return _read_directory(path, recover)
         if path.suffix == '.mcap':
@@ -105,6 +114,9 @@ def read_bag(path, recover=False):
             return _read_directory(path.parent, recover)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
+    except OSError as error:
+        raise InputError(
+            f'cannot be read: {error.strerror or error}', error.filename or path) from None
     raise InputError(
         'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
 
@@ -112,7 +124,7 @@ def read_bag(path, recover=False):
 def _read_directory(path, recover):
     facts = _directory_facts(path)
     if facts is None:
-        files = sorted(path.glob('*.mcap'), key=_by_number)
+        files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
         if files:
             return _read_mcap(path, files, recover)
         databases = sorted(path.glob('*.db3'), key=_by_number)
@@ -136,7 +148,9 @@ def _read_directory(path, recover):
         files.append(found[0])
     bag = _read_mcap(path, files, recover)
     announced, present = facts.get('message_count'), sum(bag.counts.values())
-    if announced != present and not bag.recovered:
+    if not isinstance(announced, int) or announced.bit_length() > 64:
+        bag.remarks.append(f'{layout.METADATA_FILE} announces no number of messages.')
+    elif announced != present and not bag.recovered:
         bag.remarks.append(
             f'{layout.METADATA_FILE} announces {announced} messages, the files hold {present}.')
     _add_custom_data(bag, facts.get('custom_data'))
@@ -149,17 +163,23 @@ def _directory_facts(path):
     if not file.is_file():
         return None
     try:
-        facts = yaml.safe_load(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
-        if isinstance(facts['relative_file_paths'], list) and facts['relative_file_paths']:
+        facts = yaml.load(file.read_text(encoding='utf-8'), _YAML_LOADER)[layout.METADATA_ROOT]
+        names = facts['relative_file_paths']
+        if isinstance(names, list) and names and all(map(_is_file_name, names)):
             return facts
-        problem = 'it names no file'
-    except (yaml.YAMLError, UnicodeDecodeError):
-        problem = 'it is not YAML'
+        problem = 'relative_file_paths is not a list of file names'
     except (KeyError, TypeError):
         problem = f'it has no {layout.METADATA_ROOT} with relative_file_paths'
+    # Dates and numbers that do not exist are plain ValueErrors of the YAML library.
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError):
+        problem = 'it is not YAML'
     raise InputError(
         f'not the metadata of a rosbag2 bag: {problem}; remove the file to read the data files '
         'without it', file)
+
+
+def _is_file_name(name):
+    return isinstance(name, str) and 0 < len(name) < 4096 and name.isprintable()
 
 
 def _by_number(path):
@@ -170,26 +190,30 @@ def _by_number(path):
 
 def _read_mcap(path, files, recover):
     bag = Bag(path=path, storage='mcap')
+    pieces = {}
     for file in files:
-        data = file.read_bytes()
-        _refuse_foreign(data, file)
-        content = scan(data)
+        with open(file, 'rb') as stream:
+            _refuse_foreign(stream.read(len(MAGIC)), file)
+            content = scan(stream)
         if content.damage is not None:
             readable = (
                 f'{content.message_count} messages before that can still be read')
             if not content.message_count or not recover:
-                raise InputError(_damage_sentence(content, len(data), readable), file)
+                raise InputError(
+                    _damage_sentence(content, file.stat().st_size, readable), file)
             bag.recovered = True
             bag.remarks.append(
                 f'{file.name} ended early or is damaged ({content.damage}); {readable}.')
-        _add_content(bag, content, file)
+        _add_content(bag, content, pieces)
+    for topic in bag.topics.values():
+        _join(topic, pieces[topic.name])
     return bag
 
 
-def _refuse_foreign(data, file):
-    if not data:
+def _refuse_foreign(begin, file):
+    if not begin:
         raise InputError('the file is empty; record again or give another bag', file)
-    if not data.startswith(MAGIC[:len(data)]):
+    if not MAGIC.startswith(begin):
         raise InputError(
             'not an MCAP file (it begins with other bytes); give a file written by a recorder',
             file)
@@ -205,7 +229,8 @@ def _damage_sentence(content, size, readable):
     return f'the file is damaged ({content.damage}); {readable}'
 
 
-def _add_content(bag, content, file):
+def _add_content(bag, content, pieces):
+    """Note a file's topics in the bag and their messages in ``pieces``, by topic."""
     bag.records.update(content.metadata)
     for channel in content.channels.values():
         type_name = _full_type_name(channel.type_name)
@@ -216,9 +241,14 @@ def _add_content(bag, content, file):
                 f'{channel.topic} has several message types ({topic.type_name}, '
                 f'{type_name}); only the first is read.')
             continue
-        topic.payloads += channel.payloads
-        topic.log_time_ns += channel.log_time_ns
-        topic.publish_time_ns += channel.publish_time_ns
+        pieces.setdefault(channel.topic, []).append(channel.messages)
+
+
+def _join(topic, pieces):
+    for messages in pieces:
+        topic.payloads.extend(messages.payloads)
+    topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])
+    topic.publish_time_ns = joined([messages.publish_time_ns for messages in pieces])
 
 
 def _full_type_name(name):
@@ -234,24 +264,39 @@ def _read_with_rosbags(path, opened):
             for connection in reader.connections:
                 bag.topics.setdefault(
                     connection.topic, TopicData(connection.topic, connection.msgtype))
+            raws, times = ({name: [] for name in bag.topics} for _ in range(2))
             for connection, log_time_ns, raw in reader.messages():
                 topic = bag.topics[connection.topic]
                 if connection.msgtype == topic.type_name:
-                    topic.payloads.append(bytes(raw))
-                    topic.log_time_ns.append(log_time_ns)
-                    # This storage keeps only the receive time.
-                    topic.publish_time_ns.append(log_time_ns)
+                    raws[topic.name].append(bytes(raw))
+                    times[topic.name].append(log_time_ns)
+            for name, topic in bag.topics.items():
+                topic.payloads = Payloads(raws[name])
+                # This storage keeps only the receive time.
+                topic.log_time_ns = np.array(times[name], dtype=np.int64)
+                topic.publish_time_ns = topic.log_time_ns
             _add_custom_data(bag, getattr(reader.storage.metadata, 'custom', None))
     except (ReaderError, FileNotFoundError) as error:
-        raise InputError(f'not a readable rosbag2 bag: {error}', path) from None
+        raise InputError(f'not a readable rosbag2 bag: {_short(error)}', path) from None
     # The database library has its own family of exceptions, all meaning a broken file.
     except Exception as error:
         raise InputError(
-            f'not a readable rosbag2 bag ({type(error).__name__}: {error})', path) from None
+            f'not a readable rosbag2 bag ({type(error).__name__}: {_short(error)})',
+            path) from None
     return bag
+
+
+def _short(error):
+    """Return the text of a library's error as part of one sentence."""
+    text = ' '.join(str(error).split())
+    return text if len(text) < _LONGEST_REASON else f'{text[:_LONGEST_REASON]} …'
 
 
 def _add_custom_data(bag, custom):
     """Take the experiment from metadata.yaml where the file itself has no record of it."""
-    if custom and isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
-        bag.records[EXPERIMENT_RECORD] = {str(k): str(v) for k, v in custom.items()}
+    if isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
+        texts = {
+            key: value for key, value in custom.items()
+            if isinstance(key, str) and isinstance(value, str)}
+        if texts:
+            bag.records[EXPERIMENT_RECORD] = texts

@@ -17,7 +17,6 @@
 from pathlib import Path
 import shutil
 
-from mcap.writer import CompressionType, Writer
 import mcap_ros2.writer
 import numpy as np
 from pam_actuation import messages
@@ -27,9 +26,9 @@ from pam_actuation.bags.writer import BagWriter
 from pam_sim.errors import InputError
 from pam_sim.run import Run
 import pytest
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
-from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from sample_bag import example_messages, METADATA, START_NS, STEP_NS, write_bag
+from sample_foreign import write_mcap, write_with_rosbags
 
 COUNT = 40
 VALUES = {
@@ -100,56 +99,30 @@ def test_missing_optional_topics(tmp_path):
     assert run.reference_trajectories == ()
 
 
-def write_with_rosbags(directory, plugin, namespace='/rig_7/hip'):
-    store = layout.typestore()
-    with RosbagsWriter(directory, version=9, storage_plugin=plugin) as writer:
-        connections = {}
-        for i in range(COUNT):
-            for short, message in example_messages(i).items():
-                type_name = codecs.TOPIC_TYPES[short]
-                if short not in connections:
-                    connections[short] = writer.add_connection(
-                        full_name(short, namespace), type_name, typestore=store)
-                writer.write(
-                    connections[short], START_NS + i * STEP_NS, codecs.encode(short, message))
-    return directory
-
-
-@pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
-def test_bags_of_another_writer(tmp_path, plugin):
-    directory = write_with_rosbags(tmp_path / 'foreign', plugin)
-    run = load_run(directory)
-    assert_same_run(run)
-    assert run.namespace == '/rig_7/hip' and run.metadata == {}
+@pytest.mark.parametrize('plugin, compression', [
+    (StoragePlugin.MCAP, None), (StoragePlugin.SQLITE3, None),
+    (StoragePlugin.MCAP, CompressionMode.STORAGE), (StoragePlugin.SQLITE3, CompressionMode.FILE),
+    (StoragePlugin.SQLITE3, CompressionMode.MESSAGE)])
+def test_bags_of_another_writer(tmp_path, plugin, compression):
+    directory = write_with_rosbags(
+        tmp_path / 'foreign', COUNT, plugin, compression, ('/rig_7/hip', '/rig_7/knee'))
+    for namespace in ('/rig_7/hip', '/rig_7/knee'):
+        run = load_run(directory, namespace)
+        assert_same_run(run)
+        assert run.namespace == namespace and run.metadata == {}
+    if compression in (CompressionMode.FILE, CompressionMode.MESSAGE):
+        return
     data_file, = (path for path in directory.iterdir() if path.name != 'metadata.yaml')
-    assert_same_run(load_run(data_file))
+    assert_same_run(load_run(data_file, '/rig_7/hip'))
     (directory / 'metadata.yaml').unlink()
-    assert_same_run(load_run(directory))
+    assert_same_run(load_run(directory, '/rig_7/knee'))
 
 
-@pytest.mark.parametrize('options', [
-    {'compression': CompressionType.NONE},
-    {'compression': CompressionType.LZ4, 'chunk_size': 500},
-    {'use_chunking': False},
-    {'compression': CompressionType.ZSTD, 'enable_crcs': False},
-])
-def test_other_ways_to_write_mcap(tmp_path, options):
-    path = tmp_path / 'plain.mcap'
-    with open(path, 'wb') as stream:
-        writer = Writer(stream, **options)
-        writer.start('ros2')
-        channels = {}
-        for i in range(COUNT):
-            for short, message in example_messages(i).items():
-                if short not in channels:
-                    type_name = codecs.TOPIC_TYPES[short]
-                    schema = writer.register_schema(
-                        type_name, 'ros2msg', layout.schema_text(type_name).encode())
-                    channels[short] = writer.register_channel(
-                        full_name(short, ''), 'cdr', schema)
-                writer.add_message(
-                    channels[short], START_NS + i, codecs.encode(short, message), 0)
-        writer.finish()
+@pytest.mark.parametrize('compression, options', [
+    ('', {}), ('', {'use_chunking': False}), ('lz4', {'chunk_size': 500}),
+    ('zstd', {'enable_crcs': False})])
+def test_other_ways_to_write_mcap(tmp_path, compression, options):
+    path = write_mcap(tmp_path / 'plain', COUNT, compression, namespace='', **options)
     run = load_run(path)
     assert_same_run(run)
     assert run.namespace == ''
@@ -349,7 +322,15 @@ def test_places_without_a_bag(tmp_path):
         load_run(database)
 
 
-@pytest.mark.parametrize('text', ['', 'a: [', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
+def test_names_and_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputError, match='cannot be read: File name too long'):
+        load_run(tmp_path / ('x' * 300))
+    (tmp_path / 'folder.mcap').mkdir()
+    with pytest.raises(InputError, match='no bag in this directory'):
+        load_run(tmp_path)
+
+
+@pytest.mark.parametrize('text', ['', 'a: [', 'x: 2026-99-99', '[' * 5000, '- ' * 5000 + 'x', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
                                   'rosbag2_bagfile_information:\n  relative_file_paths: []\n'])
 def test_foreign_metadata_file(tmp_path, bag, text):
     shutil.copytree(bag, tmp_path / 'run')

@@ -40,6 +40,39 @@ def test_grid_interpolates_measurements_and_holds_commands():
     assert grid['valve_signal', 'ppr_voltage'][19] == pytest.approx(0.1)
 
 
+def test_gaps_are_interpolated_or_left_empty():
+    start = 10**18
+    stamp_ns = start + np.array([0, 10, 20, 520, 530]) * 1_000_000
+    run = Run({'pressure': Series(stamp_ns, {'pressure_pa': np.array([0., 1., 2., 52., 53.])}),
+               'valve_signal': Series(stamp_ns, {'ppr_voltage': np.arange(5.0)})})
+    bridged, cut = run.on_grid(0.005), run.on_grid(0.005, max_gap_s=0.1)
+    np.testing.assert_allclose(bridged['pressure', 'pressure_pa'], np.arange(107) / 2.0)
+    empty = np.isnan(cut['pressure', 'pressure_pa'])
+    assert list(np.flatnonzero(empty)) == list(range(5, 104))
+    np.testing.assert_array_equal(
+        cut['pressure', 'pressure_pa'][~empty], bridged['pressure', 'pressure_pa'][~empty])
+    assert cut['valve_signal', 'ppr_voltage'][103] == 2.0
+    assert cut['valve_signal', 'ppr_voltage'][104] == 3.0
+
+
+def test_of_repeated_stamps_a_held_signal_takes_the_last():
+    stamp_ns = np.array([0, 10, 10, 20]) * 1_000_000
+    run = Run({'force': Series(stamp_ns, {'force_n': np.arange(4.0)}),
+               'valve_signal': Series(stamp_ns, {'ppr_voltage': np.arange(4.0)})})
+    grid = run.on_grid(0.01)
+    assert list(grid['force', 'force_n']) == [0.0, 1.0, 3.0]
+    assert list(grid['valve_signal', 'ppr_voltage']) == [0.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize('wanted, said', [
+    ({'dt_s': 0.0}, 'dt_s: a grid step of 0.0 s'), ({'dt_s': float('nan')}, 'grid step of nan'),
+    ({'dt_s': 1e-9}, 'a grid of 490000001 points'),
+    ({'start_ns': 0, 'end_ns': 2**62}, 'at most 100000000')])
+def test_impossible_grids_are_refused(wanted, said):
+    with pytest.raises(InputError, match=said):
+        make_run().on_grid(**wanted)
+
+
 def test_missing_topics_are_told():
     run = make_run()
     assert 'pressure' in run and 'force' not in run and 'reference' not in run

@@ -1,0 +1,67 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bags in the forms that other writers choose, for tests of reading."""
+
+from mcap.writer import CompressionType, Writer
+from pam_actuation.bags import codecs, layout
+from rosbags.rosbag2 import CompressionFormat
+from rosbags.rosbag2 import Writer as RosbagsWriter
+from sample_bag import example_messages, full_name, START_NS, STEP_NS
+
+
+def write_mcap(directory, count, compression='', namespace='/muscle', **options):
+    """
+    Write ``directory/run.mcap`` with the MCAP library; return the directory.
+
+    ``options`` are those of the library's Writer; there is no metadata.yaml.
+    """
+    directory.mkdir(parents=True)
+    with open(directory / 'run.mcap', 'wb') as stream:
+        writer = Writer(stream, compression={
+            '': CompressionType.NONE, 'lz4': CompressionType.LZ4,
+            'zstd': CompressionType.ZSTD}[compression], **options)
+        writer.start('ros2')
+        channels = {}
+        for i in range(count):
+            for short, message in example_messages(i).items():
+                if short not in channels:
+                    type_name = codecs.TOPIC_TYPES[short]
+                    schema = writer.register_schema(
+                        type_name, 'ros2msg', layout.schema_text(type_name).encode())
+                    channels[short] = writer.register_channel(
+                        full_name(short, namespace), 'cdr', schema)
+                writer.add_message(
+                    channels[short], START_NS + i * STEP_NS, codecs.encode(short, message), 0)
+        writer.finish()
+    return directory
+
+
+def write_with_rosbags(directory, count, plugin, compression=None, namespaces=('/muscle',)):
+    """Write a bag with the rosbags package, compressed with zstd if asked to; return it."""
+    writer = RosbagsWriter(directory, version=9, storage_plugin=plugin)
+    if compression is not None:
+        writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for i in range(count):
+            for namespace in namespaces:
+                for short, message in example_messages(i).items():
+                    name = full_name(short, namespace)
+                    if name not in connections:
+                        connections[name] = writer.add_connection(
+                            name, codecs.TOPIC_TYPES[short], typestore=layout.typestore())
+                    writer.write(
+                        connections[name], START_NS + i * STEP_NS, codecs.encode(short, message))
+    return directory
