@@ -238,7 +238,7 @@ def examine(case, rates=None):
     missing_s = 0.0
     for topic in rates or RATES_HZ:
         data = content.topics.get(f'/muscle/{topic}')
-        payloads = data.payloads if data else []
+        payloads = list(data.payloads) if data else []
         first = 0
         if payloads and not case['from_zero']:
             first = next((n for n in range(10**6) if numbered(topic, n) == payloads[0]), 0)

@@ -113,6 +113,9 @@ class ExperimentRecorder(ManagedNode):
             source = PolledSubscription(self, message_type, name, qos.RECORDER, raw=True)
             self.subscriptions_polled.append(source)
             self.sources[name] = source
+        for type_name in set(self.types.values()):
+            layout.schema_text(type_name)       # looked up now, not at the first message
+            layout.type_hash(type_name)
 
     def _metadata(self):
         path = self.value('metadata_file')

@@ -54,9 +54,9 @@ def assert_is_beginning(bag, original):
     for name, topic in bag.topics.items():
         reference = original.topics[name]
         count = len(topic.payloads)
-        assert topic.payloads == reference.payloads[:count]
-        assert topic.log_time_ns == reference.log_time_ns[:count]
-        assert topic.publish_time_ns == reference.publish_time_ns[:count]
+        assert list(topic.payloads) == list(reference.payloads)[:count]
+        assert list(topic.log_time_ns) == list(reference.log_time_ns)[:count]
+        assert list(topic.publish_time_ns) == list(reference.publish_time_ns)[:count]
 
 
 def test_a_file_cut_anywhere_becomes_a_whole_bag(tmp_path, whole):

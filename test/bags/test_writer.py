@@ -219,7 +219,7 @@ def test_split_bags_are_one_bag_everywhere(tmp_path, limits):
         assert counts == {'/muscle/controller_state': count}
     found = read_bag(tmp_path / 'run')
     assert found.counts == {'/muscle/controller_state': count, '/muscle/pressure': 0}
-    assert found.topics['/muscle/controller_state'].log_time_ns == [
+    assert list(found.topics['/muscle/controller_state'].log_time_ns) == [
         START_NS + i * 500_000 for i in range(count)]
     # Every file alone is a bag too, with the experiment inside.
     assert read_bag(files[1]).experiment == METADATA
