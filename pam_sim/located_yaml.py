@@ -29,15 +29,38 @@ import re
 from pam_sim.errors import InputError
 import yaml
 
+# Bounds of what is read at all. The largest file of this kind holds some 10 kB and 500 values.
+MAX_BYTES = 300_000
+MAX_VALUES = 50_000       # counted where aliases put them, so that few bytes cannot become many
+MAX_DEPTH = 50
+MAX_DIGITS = 300          # of a whole number; such a number still fits a float
+
 
 class _Loader(yaml.SafeLoader):
     """Safe loader with the YAML 1.2 core scalars only."""
 
     yaml_implicit_resolvers: dict = {}
+    depth = 0
+
+    def compose_node(self, parent, index):
+        """Compose a node as the base class does, unless it is nested too deeply."""
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise yaml.composer.ComposerError(
+                problem=f'nested deeper than {MAX_DEPTH} levels',
+                problem_mark=self.peek_event().start_mark)
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
 
 def _construct_int(loader, node):
-    return int(loader.construct_scalar(node))       # YAML 1.2: a leading zero is not octal
+    text = loader.construct_scalar(node)
+    if len(text) > MAX_DIGITS:
+        raise yaml.constructor.ConstructorError(
+            problem=f'a whole number of {len(text)} digits is too large',
+            problem_mark=node.start_mark)
+    return int(text)       # YAML 1.2: a leading zero is not octal
 
 
 _Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
@@ -263,60 +286,108 @@ def load_yaml(path_or_text, name=None):
     Raises
     ------
     InputError
-        Missing file, not UTF-8 text, not YAML, duplicate key, not a mapping.
+        Missing file, not UTF-8 text, not YAML, duplicate key, not a mapping, or more than
+        anybody writes by hand (``MAX_BYTES``, ``MAX_VALUES``, ``MAX_DEPTH``).
 
     """
     is_text = isinstance(path_or_text, str) and (
         '\n' in path_or_text or ': ' in path_or_text) and not os.path.exists(path_or_text)
     if is_text:
-        text, name = path_or_text, name or '<text>'
+        raw, name = path_or_text.encode('utf-8', 'surrogatepass'), name or '<text>'
     else:
         path = os.fspath(path_or_text)
         name = name or path
-        try:
-            with open(path, 'rb') as file:
-                text = file.read().decode('utf-8')
-        except OSError as error:
-            raise InputError(f'cannot be read ({error.strerror})', name) from error
-        except UnicodeDecodeError as error:
-            raise InputError('is not a text file (UTF-8 expected)', name) from error
+        raw = _read(path, name)
+    if len(raw) > MAX_BYTES:
+        raise InputError(f'is larger than {MAX_BYTES // 1000} kB, which no file of this kind is',
+                         name)
+    try:
+        text = raw.decode('utf-8')
+    except UnicodeDecodeError as error:
+        raise InputError('is not a text file (UTF-8 expected)',
+                         _line_at(name, raw[:error.start])) from error
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
-            raise InputError('is empty; a mapping (key: value) is expected', name)
+            raise InputError('is empty; a mapping (key: value) is expected', f'{name}:1')
         if not isinstance(node, yaml.MappingNode):
             raise InputError('a mapping (key: value) is expected',
                              f'{name}:{node.start_mark.line + 1}')
-        return _convert(loader, node, name)
+        return _Conversion(loader, name).convert(node)
     except yaml.MarkedYAMLError as error:
-        line = f':{error.problem_mark.line + 1}' if error.problem_mark else ''
+        mark = error.problem_mark or error.context_mark
+        line = f':{mark.line + 1}' if mark else ''
         raise InputError(f'is not valid YAML: {error.problem}', f'{name}{line}') from error
-    except yaml.YAMLError as error:
-        raise InputError('is not a text file of YAML', name) from error
-    except RecursionError as error:
-        raise InputError('is nested too deeply', name) from error
+    except yaml.reader.ReaderError as error:
+        raise InputError('holds a character that is not text',
+                         _line_at(name, text[:error.position].encode())) from error
 
 
-def _convert(loader, node, name):
-    line = node.start_mark.line + 1
-    if isinstance(node, yaml.MappingNode):
+def _read(path, name):
+    """Return the bytes of a file, or what shows that it is too large."""
+    try:
+        with open(path, 'rb') as file:
+            return file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:      # ValueError: a path with a null character
+        why = getattr(error, 'strerror', None) or error
+        raise InputError(f'cannot be read ({why})', name) from error
+
+
+def _line_at(name, before):
+    """Return ``file:line`` of what follows some bytes."""
+    return f'{name}:{before.count(10) + 1}'     # 10: line feed
+
+
+class _Conversion:
+    """YAML nodes to located values, with a limit on their number and depth."""
+
+    def __init__(self, loader, name):
+        self._loader, self._name = loader, name
+        self._left = MAX_VALUES
+
+    def convert(self, node, depth=0):
+        """Return the value of a node and of everything below it."""
+        line = node.start_mark.line + 1
+        self._left -= 1
+        if self._left < 0 or depth > MAX_DEPTH:
+            raise InputError(
+                f'holds more than {MAX_VALUES} values or {MAX_DEPTH} levels once its aliases '
+                'are followed', f'{self._name}:{line}')
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, line, depth)
+        if isinstance(node, yaml.SequenceNode):
+            return LocatedList(
+                [self.convert(item, depth + 1) for item in node.value],
+                [item.start_mark.line + 1 for item in node.value], self._name, line)
+        return self._scalar(node)
+
+    def _mapping(self, node, line, depth):
         values, lines = {}, {}
         for key_node, value_node in node.value:
             key_line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
-                raise InputError('a key must be a plain word', f'{name}:{key_line}')
-            key = loader.construct_object(key_node)
+                raise InputError('a key must be a plain word', f'{self._name}:{key_line}')
+            key = self._scalar(key_node)
             if key in values:
-                raise InputError(f'`{key}` is given twice', f'{name}:{key_line}')
-            values[key] = _convert(loader, value_node, name)
+                raise InputError(f'`{key}` is given twice', f'{self._name}:{key_line}')
+            values[key] = self.convert(value_node, depth + 1)
             lines[key] = key_line
-        return Located(values, lines, name, line)
-    if isinstance(node, yaml.SequenceNode):
-        return LocatedList(
-            [_convert(loader, item, name) for item in node.value],
-            [item.start_mark.line + 1 for item in node.value], name, line)
-    return loader.construct_object(node)
+        return Located(values, lines, self._name, line)
+
+    def _scalar(self, node):
+        where = f'{self._name}:{node.start_mark.line + 1}'
+        try:
+            value = self._loader.construct_object(node)
+        except yaml.YAMLError:
+            raise
+        except Exception as error:
+            # A tag such as !!float in front of a text that is none; each tag fails its own way.
+            raise InputError(f'`{node.value[:40]}` does not fit its tag {node.tag}',
+                             where) from error
+        if isinstance(value, str) and any(c == '\0' or '\ud800' <= c <= '\udfff' for c in value):
+            raise InputError('holds a character that is not text', where)
+        return value
 
 
 def dump_yaml(data):

@@ -12,21 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``pam replay``: step controller and plant offline on what was recorded."""
+"""``pam replay``: step controller, driver and plant offline on what was recorded."""
 
 from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
 
-HELP = 'Step controller and plant offline on the recorded inputs and compare with the recording.'
-EXAMPLE = 'pam replay runs/first'
+HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
+        'chained, and compare with the recording.')
+EXAMPLE = 'pam replay runs/first --chain'
 
 
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', help='bag directory, or a lone .mcap file')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bag')
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        '--only', choices=('controller', 'driver', 'plant'), default=None,
+        help='replay this part alone (default: each of the three by itself)')
+    what.add_argument(
+        '--chain', action='store_true',
+        help='repeat the experiment: controller, driver and plant in a closed loop')
     parser.add_argument(
-        '--set', dest='controller', default=None, metavar='FILE',
-        help='another controller YAML: what would this tuning have commanded')
+        '--set', dest='changes', action='append', default=None, metavar='FILE|NAME=VALUE',
+        help='another controller YAML or one changed setting (may be repeated): what would '
+        'this tuning have commanded; with --chain: how would it have gone')
     parser.add_argument(
         '--out', default=None, metavar='FILE', help='write the replayed signals as an .npz file')
     add_recover_option(parser)
@@ -36,8 +45,10 @@ def run(args):
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.replay.compare import replay_run
+    from pam_actuation.replay.settings import changed_controller
     recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
-    result = replay_run(recorded, controller=args.controller)
+    result = replay_run(recorded, changed_controller(recorded, args.changes), args.only,
+                        args.chain)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

@@ -12,51 +12,68 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Replay a recorded run: the controller tick by tick, the plant on the recorded valve signal."""
+"""Replay a recorded run: controller, driver and plant, each alone or chained."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import os
 import tempfile
 
 import numpy as np
 
+from pam_actuation.replay.chain import replay_chain
 from pam_actuation.replay.controller import replay_controller
+from pam_actuation.replay.difference import difference
+from pam_actuation.replay.driver import replay_driver
 from pam_actuation.replay.plant import replay_plant
 from pam_sim.errors import InputError
+
+PARTS = ('controller', 'driver', 'plant')
 
 
 @dataclass
 class Replay:
     """
-    What a replay found.
+    What a replay found; a part that was not asked for or not possible is None.
 
     Parameters
     ----------
     controller : ReplayResult or None
-        Recorded against replayed pressure commands; None without a recorded controller.
-    controller_note : str
-        Why there is no controller replay, or what it was given.
+        Recorded against replayed pressure commands.
+    driver : DriverReplay or None
+        Recorded against replayed valve signals.
     plant : PlantReplay or None
-        Recorded against simulated signals.
-    plant_note : str
-        Why there is no plant replay.
+        Recorded against simulated signals, free run on the recorded valve signal.
+    chain : ChainReplay or None
+        The experiment repeated in a closed loop.
+    notes : dict of str to str
+        Why a part that was asked for is missing.
     counterfactual : bool
         True if another controller than the recorded one was asked for.
+    start_ns : int
+        First stamp of the recording; differences are placed in seconds after it.
 
     """
 
     controller: object = None
-    controller_note: str = ''
+    driver: object = None
     plant: object = None
-    plant_note: str = ''
+    chain: object = None
+    notes: dict = None
     counterfactual: bool = False
-    signals: dict = field(default_factory=dict)
+    start_ns: int = 0
 
     @property
     def unexpected_difference(self):
         """Whether the recorded controller was not reproduced to the bit."""
         return (self.controller is not None and not self.counterfactual
                 and not self.controller.identical)
+
+    @property
+    def command_difference(self):
+        """Return the Difference of the pressure commands of the controller replay."""
+        c = self.controller
+        return difference('pressure_command', 'Pa', c.stamp_ns, c.recorded_pa, c.replayed_pa,
+                          self.start_ns)
 
     def to_dict(self):
         """Return plain data for ``--json``."""
@@ -65,60 +82,78 @@ class Replay:
             out['controller'] = {
                 'ticks': int(len(self.controller.recorded_pa)),
                 'identical': bool(self.controller.identical),
-                'max_abs_difference_pa': float(self.controller.max_abs_difference_pa)}
-        else:
-            out['controller_note'] = self.controller_note
-        if self.plant is not None:
-            out['plant'] = self.plant.to_dict()
-        else:
-            out['plant_note'] = self.plant_note
+                'max_abs_difference_pa': float(self.controller.max_abs_difference_pa),
+                'signals': [self.command_difference.to_dict()],
+                'differing_states': dict(self.controller.differing_states)}
+        for name in ('driver', 'plant', 'chain'):
+            part = getattr(self, name)
+            if part is not None:
+                out[name] = part.to_dict()
+        out.update({f'{name}_note': note for name, note in (self.notes or {}).items()})
         return out
 
     def text(self):
         """Return the same for people."""
         lines = []
-        if self.controller is None:
-            lines.append(f'controller: not replayed, {self.controller_note}')
-        else:
-            c = self.controller
-            verdict = 'identical to the bit' if c.identical else (
-                f'largest difference {1e-3 * c.max_abs_difference_pa:.6g} kPa')
-            what = 'another tuning against the recorded commands' if self.counterfactual \
-                else 'replayed against recorded commands'
-            lines.append(f'controller: {len(c.recorded_pa)} ticks, {what}: {verdict}')
-        if self.plant is None:
-            lines.append(f'plant: not replayed, {self.plant_note}')
-        else:
-            lines.extend(self.plant.lines())
+        if self.controller is not None:
+            lines.extend(self._controller_lines())
+        for name in ('driver', 'plant', 'chain'):
+            if getattr(self, name) is not None:
+                lines.extend(getattr(self, name).lines())
+        lines.extend(f'{name}: not replayed, {note}' for name, note in (self.notes or {}).items())
         return '\n'.join(lines)
 
+    def _controller_lines(self):
+        what = 'another tuning against the recorded commands' if self.counterfactual \
+            else 'replayed against the recorded commands'
+        lines = [f'controller: {self.controller.ticks} ticks, {what}',
+                 self.command_difference.line()]
+        differing = self.controller.differing_states
+        if differing:
+            lines.append('  internals that differ (ticks): ' + ', '.join(
+                f'{name} ({n})' for name, n in differing.items()))
+        elif not self.counterfactual:
+            lines.append('  controller_state: every internal identical to the bit')
+        return lines
+
     def save(self, path):
-        """Write the replayed signals as .npz (written whole or not at all)."""
+        """Write the replayed signals as .npz, the same bytes each time, whole or not at all."""
         arrays = {}
         if self.controller is not None:
+            arrays['command_stamp_ns'] = np.asarray(self.controller.stamp_ns)
             arrays['recorded_command_pa'] = np.asarray(self.controller.recorded_pa)
             arrays['replayed_command_pa'] = np.asarray(self.controller.replayed_pa)
-        if self.plant is not None:
-            arrays.update(self.plant.arrays())
+        for part in (self.driver, self.plant, self.chain):
+            if part is not None:
+                arrays.update(part.arrays())
         folder = os.path.dirname(os.path.abspath(path))
         if not os.path.isdir(folder):
             raise InputError('the folder does not exist', folder)
         handle, temporary = tempfile.mkstemp(dir=folder, suffix='.npz')
         os.close(handle)
-        np.savez(temporary, **arrays)
-        os.replace(temporary, path)
+        try:
+            np.savez(temporary, **arrays)
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, path)
+        finally:
+            if os.path.exists(temporary):
+                os.unlink(temporary)
 
 
-def replay_run(run, controller=None):
+def replay_run(run, controller=None, only=None, chain=False):
     """
-    Step controller and plant offline on the recorded inputs.
+    Step the parts of the rig offline on the recorded inputs.
 
     Parameters
     ----------
     run : pam_sim.run.Run
         A loaded bag.
-    controller : str, optional
-        Name or path of another controller: what would it have commanded?
+    controller : optional
+        Another controller (an object, or its name or path): what would it have commanded?
+    only : {'controller', 'driver', 'plant'}, optional
+        Replay this part alone; by default each of the three by itself.
+    chain : bool
+        Close the loop instead: controller, driver and plant from the recorded reference.
 
     Returns
     -------
@@ -127,21 +162,51 @@ def replay_run(run, controller=None):
     Raises
     ------
     InputError
-        The bag has neither a controller nor a rig to replay; the other controller is unusable.
+        What was asked for cannot be replayed, or nothing can; the controller is unusable.
 
     """
-    result = Replay(counterfactual=controller is not None)
-    if 'controller_state' in run and (controller or run.metadata.get('controller')):
-        result.controller = replay_controller(run, controller=controller)
-    elif controller is not None:
+    result = Replay(counterfactual=controller is not None, start_ns=run.start_ns, notes={})
+    if chain:
+        result.chain = replay_chain(run, controller)
+        return result
+    wanted = PARTS if only is None else (only,)
+    if controller is not None and 'controller' not in wanted:
+        raise InputError(f'another controller changes nothing for the {only} alone', '--set')
+    for name in wanted:
+        why_not = _why_not(run, name, controller)
+        if why_not:
+            result.notes[name] = why_not
+        elif name == 'controller':
+            result.controller = replay_controller(run, controller)
+        elif name == 'driver':
+            _try_driver(run, result, only)
+        else:
+            result.plant = replay_plant(run)
+    if controller is not None and result.controller is None:
         raise InputError('the bag has no controller_state to replay against', str(run.path))
-    else:
-        result.controller_note = 'the bag has no recorded controller'
-    if run.metadata.get('rig') and 'valve_signal' in run:
-        result.plant = replay_plant(run)
-    else:
-        result.plant_note = 'the bag does not say which rig it is, or has no valve_signal'
-    if result.controller is None and result.plant is None:
-        raise InputError(
-            f'nothing to replay: {result.controller_note}; {result.plant_note}', str(run.path))
+    if all(getattr(result, name) is None for name in wanted):
+        raise InputError('nothing to replay: ' + '; '.join(result.notes.values()), str(run.path))
     return result
+
+
+def _why_not(run, name, controller):
+    """Return why a part cannot be replayed, '' if it can."""
+    if name == 'controller':
+        if 'controller_state' not in run or not (controller or run.metadata.get('controller')):
+            return 'the bag has no recorded controller'
+    elif name == 'driver':
+        if 'valve_signal' not in run or not os.path.exists(run.path):
+            return 'the run has no valve_signal or is not from a bag'
+    elif not run.metadata.get('rig') or 'valve_signal' not in run:
+        return 'the bag does not say which rig it is, or has no valve_signal'
+    return ''
+
+
+def _try_driver(run, result, only):
+    """Replay the driver; beside other parts, a bag whose clocks disagree is only noted."""
+    try:
+        result.driver = replay_driver(run)
+    except InputError as error:
+        if only is not None:
+            raise
+        result.notes['driver'] = error.problem

@@ -61,6 +61,8 @@ class ReplayResult:
         Internal numbers that differ, with the number of ticks.
     controller : object
         The controller after the last tick; with given inputs, equal to the live one.
+    states : dict of str -> numpy.ndarray
+        The replayed numbers of ``controller_state`` by name, if they were asked for.
 
     """
 
@@ -73,6 +75,7 @@ class ReplayResult:
     commands_missing: int = 0
     differing_states: dict = field(default_factory=dict)
     controller: object = None
+    states: dict = field(default_factory=dict)
 
     def sentence(self):
         """Return the outcome in one sentence."""
@@ -83,7 +86,7 @@ class ReplayResult:
                 f'{self.max_abs_difference_pa:g} Pa; differing: {where or "commands"}')
 
 
-def replay_controller(run, controller=None):
+def replay_controller(run, controller=None, keep_states=False):
     """
     Replay the controller of a recording.
 
@@ -95,6 +98,8 @@ def replay_controller(run, controller=None):
         By default the recording's own, built from its metadata. Another one (an object, or
         what ``load_controller`` takes) answers what it *would* have commanded; its internals
         are then not compared.
+    keep_states : bool
+        Also return every internal number of every tick.
 
     Returns
     -------
@@ -132,10 +137,13 @@ def replay_controller(run, controller=None):
         raise InputError(f'controller_state lacks {missing[0]}', run.path)
     differing = {}
     recorded, replayed = np.empty(len(order)), np.empty(len(order))
+    kept = np.empty((len(order), len(core.names))) if keep_states else None
     missing = 0
     for place, row in enumerate(order.tolist()):
         command_pa, values = core.run(_inputs(columns, row, lookups, run.path))
         replayed[place] = command_pa
+        if keep_states:
+            kept[place] = values
         stamp = int(states.stamp_ns[row])
         recorded[place] = command_at.get(stamp, np.nan)
         if stamp not in command_at:
@@ -150,7 +158,7 @@ def replay_controller(run, controller=None):
     return ReplayResult(
         states.stamp_ns[order], recorded, replayed, difference,
         bool(np.array_equal(recorded, replayed)) and not differing, len(order), missing,
-        differing, controller)
+        differing, controller, dict(zip(core.names, kept.T)) if keep_states else {})
 
 
 def _same(a, b):

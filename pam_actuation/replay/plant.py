@@ -17,13 +17,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+from pam_actuation.replay.difference import difference
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.health import check_health
+from pam_sim.gap.health import recorded_valve
+from pam_sim.gap.result import FIELD
 
-# What people read of a difference: factor, unit, digits.
-SHOWN = {'pressure': (1e-3, 'kPa', 2), 'contraction': (1e3, 'mm', 3), 'force': (1.0, 'N', 2)}
+MIN_DURATION_S = 0.1         # the start is read from half of it
+UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 
 
 @dataclass(frozen=True)
@@ -31,31 +33,32 @@ class PlantReplay:
     """
     Recorded and simulated signals at the recorded stamps.
 
-    ``time_s``, ``recorded`` and ``simulated`` map signal name to arrays of equal length, SI.
+    ``stamp_ns``, ``time_s``, ``recorded`` and ``simulated`` map signal name to arrays of equal
+    length, SI; ``start_ns`` is the first stamp of the recording.
     """
 
     rig: str
     time_s: dict
     recorded: dict
     simulated: dict
+    stamp_ns: dict
+    start_ns: int
 
-    def rmse(self, signal):
-        """Return the RMS difference of one signal, SI."""
-        return float(np.sqrt(np.mean((self.recorded[signal] - self.simulated[signal]) ** 2)))
+    @property
+    def differences(self):
+        """Return one Difference a signal."""
+        return [difference(signal, UNITS[signal], self.stamp_ns[signal], self.recorded[signal],
+                           self.simulated[signal], self.start_ns) for signal in self.recorded]
 
     def to_dict(self):
         """Return plain data for ``--json``."""
-        return {'rig': self.rig, 'rmse': {s: self.rmse(s) for s in self.recorded}}
+        return {'rig': self.rig, 'rmse': {d.signal: d.rms for d in self.differences},
+                'signals': [d.to_dict() for d in self.differences]}
 
     def lines(self):
         """Return one line a signal, for people."""
-        out = [f'plant: {self.rig} on the recorded valve signal, RMS difference from recorded']
-        for signal in self.recorded:
-            factor, unit, digits = SHOWN[signal]
-            spread = float(np.ptp(self.recorded[signal]))
-            out.append(f'  {signal}: {factor * self.rmse(signal):.{digits}f} {unit} '
-                       f'(range recorded {factor * spread:.{digits}f} {unit})')
-        return out
+        return [f'plant: {self.rig}, free run on the recorded valve signal (without sensor noise)',
+                *(one.line() for one in self.differences)]
 
     def arrays(self):
         """Return all arrays by name, for saving."""
@@ -81,11 +84,31 @@ def replay_plant(run):
     if not text:
         raise InputError('the recording does not say which rig it is', str(run.path))
     rig = load_rig(text)
-    health = check_health(run, rig.valve)
-    if not health.usable:
-        raise InputError('; '.join(health.problems), str(run.path))
+    _check(run, rig)
     recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
     simulated = free_run(rig, recording)
     return PlantReplay(
         rig.name, {s: recording.time_s[s] for s in recording.signals},
-        {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated)
+        {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated,
+        {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns)
+
+
+def _check(run, rig):
+    """Raise InputError unless the run has the input of the rig and the signals of its start."""
+    path = str(run.path)
+    valve = recorded_valve(run)
+    if valve != rig.valve:
+        raise InputError(f'the valve signal is of {valve or "no known"} valve, the rig has '
+                         f'{rig.valve}', path)
+    used = [run.require('valve_signal')]
+    for topic in ('pressure', 'contraction'):
+        series = run.require(topic)
+        if not np.isfinite(series.values[FIELD[topic]]).any():
+            raise InputError(f'{topic} has no finite value', path)
+        used.append(series)
+    common_ns = min(int(np.max(one.stamp_ns)) for one in used) - max(
+        int(np.min(one.stamp_ns)) for one in used)
+    if common_ns < MIN_DURATION_S * 1e9:
+        raise InputError(
+            f'pressure, contraction and valve signal have {max(common_ns, 0) * 1e-9:.3f} s in '
+            f'common, at least {MIN_DURATION_S:g} s are needed', path)

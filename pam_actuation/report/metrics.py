@@ -26,6 +26,7 @@ import numpy as np
 
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
+from pam_sim.units import RHO_REFERENCE
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
 STEP_WITHIN_S = 0.03
@@ -72,6 +73,7 @@ class RunMetrics:
     air_use_kg: float | None
     timing: tuple
     interruptions: tuple | None = None
+    air_fed_kg: float | None = None
 
 
 def rmse(error):
@@ -306,7 +308,41 @@ def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
     return float(used)
 
 
-def run_metrics(run, cycles=None, volume_m3=None):
+def air_fed(run, conductance_m3_per_s_pa, critical_ratio, supply_pa):
+    """
+    Return the air [kg] that flowed through the fill valve of an HSV pair, None without one.
+
+    The flow of ISO 6358 for the measured pressure, times the recorded duty, summed over the
+    record. Opening and closing times of the valve and a dead time are not in it.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        With ``valve_signal`` and ``pressure``; ``supply_pressure`` is used if it is there.
+    conductance_m3_per_s_pa, critical_ratio : float
+        C and b of the fill valve.
+    supply_pa : float
+        Absolute supply pressure where none was measured.
+
+    """
+    duty, pressure = signals.series(run, 'valve_signal', 'fill_duty'), signals.series(
+        run, 'pressure')
+    if duty is None or pressure is None or pressure[0].size < 2:
+        return None
+    time_s, pressure_pa = pressure
+    supply = signals.series(run, 'supply_pressure')
+    upstream_pa = np.full(time_s.size, supply_pa) if supply is None else np.interp(
+        time_s, *supply)
+    ratio = pressure_pa / upstream_pa
+    part = np.clip((ratio - critical_ratio) / (1.0 - critical_ratio), 0.0, 1.0)
+    held = np.searchsorted(duty[0], time_s, side='right') - 1
+    opening = np.where(held >= 0, duty[1][np.maximum(held, 0)], 0.0)
+    flow = conductance_m3_per_s_pa * RHO_REFERENCE * upstream_pa * np.sqrt(
+        1.0 - part ** 2) * opening
+    return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(time_s)))
+
+
+def run_metrics(run, cycles=None, volume_m3=None, rig=None):
     """
     Return the RunMetrics of a run.
 
@@ -318,6 +354,8 @@ def run_metrics(run, cycles=None, volume_m3=None):
         Of the repeating part; by default as ``find_cycles``.
     volume_m3 : callable, optional
         Muscle volume over contraction; without it air use is None.
+    rig : pam_sim.rig.Rig, optional
+        Gives the data sheet of the fill valve; without it the air through it is None.
 
     """
     cycles = find_cycles(run) if cycles is None else cycles
@@ -340,4 +378,6 @@ def run_metrics(run, cycles=None, volume_m3=None):
         steps=step_responses(run),
         saturation_low=saturation[0], saturation_high=saturation[1],
         air_use_kg=used, timing=tuple(t for t in timing if t is not None),
-        interruptions=interruptions(run))
+        interruptions=interruptions(run),
+        air_fed_kg=None if rig is None else air_fed(
+            run, rig.parameters['C'], rig.parameters['b'], rig.parameters['supply_pa']))

@@ -20,6 +20,7 @@ from pam_actuation.report.page import render, signed, write_text
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
+from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.replay import controller_replays, overlays
 from pam_actuation.report.sections.rules import rules
@@ -33,14 +34,21 @@ FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. T
           'no network.')
 
 
-def muscle_volume(run):
-    """Return the volume function [m^3 over m] of the rig in a run's metadata, or None."""
+def recorded_rig(run):
+    """Return the rig in a run's metadata, or None."""
     content = (run.metadata or {}).get('rig')
     if not content:
         return None
     try:
-        rig = load_rig(content)
+        return load_rig(content)
     except InputError:
+        return None
+
+
+def muscle_volume(run):
+    """Return the volume function [m^3 over m] of the rig in a run's metadata, or None."""
+    rig = recorded_rig(run)
+    if rig is None:
         return None
     x = np.linspace(0.0, 0.25 * LENGTH_M, 301)
     volume = np.array([rig.volume_m3(float(value)) for value in x])
@@ -85,9 +93,10 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     if not runs:
         raise InputError('a report needs at least one recording')
     titles = list(titles) if titles else default_titles(runs)
-    measured = [run_metrics(run, volume_m3=muscle_volume(run)) for run in runs]
+    measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
+                for run in runs]
     named = list(zip(titles, measured))
-    sections = [metrics(named), cycles(named)]
+    sections = [metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -142,6 +151,7 @@ def summary(m):
             'settling_s': [s.settling_s for s in m.steps],
             'interruptions': m.interruptions and m.interruptions[0],
             'saturation_high': m.saturation_high, 'air_use_kg': m.air_use_kg,
+            'air_fed_kg': m.air_fed_kg, 'saturation_low': m.saturation_low,
             'loop_period_s': {t.topic: t.median_s for t in m.timing},
             'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
 

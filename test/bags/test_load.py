@@ -330,8 +330,11 @@ def test_names_and_files_that_cannot_be_read(tmp_path):
         load_run(tmp_path)
 
 
-@pytest.mark.parametrize('text', ['', 'a: [', 'x: 2026-99-99', '[' * 5000, '- ' * 5000 + 'x', 'a: 1\n', 'rosbag2_bagfile_information: {}\n',
-                                  'rosbag2_bagfile_information:\n  relative_file_paths: []\n'])
+@pytest.mark.parametrize('text', [
+    '', 'a: [', 'x: 2026-99-99', '[' * 5000, '- ' * 5000 + 'x', 'a: 1\n',
+    'rosbag2_bagfile_information: {}\n',
+    'rosbag2_bagfile_information:\n  relative_file_paths: []\n',
+    'rosbag2_bagfile_information:\n  relative_file_paths: [5]\n'])
 def test_foreign_metadata_file(tmp_path, bag, text):
     shutil.copytree(bag, tmp_path / 'run')
     (tmp_path / 'run' / 'metadata.yaml').write_text(text)

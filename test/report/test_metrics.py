@@ -135,6 +135,22 @@ def test_air_use_counts_fillings_and_not_noise():
     assert used == pytest.approx(10 * one, rel=0.03)
 
 
+def test_air_through_the_fill_valve_is_the_choked_flow_times_duty():
+    run = tracking_run(AMPLITUDES, valve='hsv')
+    values = run.topics['valve_signal'].values
+    values['fill_duty'][:] = 0.25
+    run.topics['pressure'].values['pressure_pa'][:] = 2e5        # below b p: choked
+    seconds = 1e-9 * np.ptp(run.topics['pressure'].stamp_ns)
+    fed = metrics.air_fed(run, 1e-9, 0.4, 8e5)
+    assert fed == pytest.approx(0.25 * 1e-9 * 1.185 * 8e5 * seconds, rel=1e-9)
+    run.topics['supply_pressure'] = Series(
+        run.topics['pressure'].stamp_ns, {'pressure_pa': np.full(values['fill_duty'].size, 6e5)})
+    assert metrics.air_fed(run, 1e-9, 0.4, 8e5) == pytest.approx(0.75 * fed, rel=1e-9)
+    run.topics['pressure'].values['pressure_pa'][:] = 7e5        # no way back into the supply
+    assert metrics.air_fed(run, 1e-9, 0.4, 8e5) == 0.0
+    assert metrics.air_fed(tracking_run(AMPLITUDES), 1e-9, 0.4, 8e5) is None
+
+
 def test_decimation_keeps_extremes_and_ends():
     y = np.zeros(100_000)
     y[54_321], y[77_777] = 5.0, -3.0

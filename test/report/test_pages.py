@@ -22,6 +22,7 @@ import numpy as np
 from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
 from pam_actuation.report import demo_page, figures, page, pages
 from pam_actuation.report.sections.replay import Overlay
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap.result import Calibrated, GapResult, Share, SignalGap, Trace
 import pytest
@@ -123,6 +124,33 @@ def test_a_report_of_nothing_is_refused(tmp_path):
 def test_runs_of_equal_name_stay_apart(tmp_path):
     found = pages.bag_report([step_run(), step_run()], tmp_path / 'page.html')
     assert len(found) == 2
+
+
+def test_several_runs_are_laid_over_each_other(tmp_path):
+    runs = [tracking_run(AMPLITUDES), tracking_run(AMPLITUDES[::-1]), step_run()]
+    pages.bag_report(runs, tmp_path / 'page.html', ['one', 'two', 'three'])
+    html, plots = markup(tmp_path / 'page.html')
+    assert 'id="overlaid"' in html
+    together = next(p for p in plots
+                    if [t['name'] for t in p['data'][:4]] == ['one', 'two', 'three', 'reference'])
+    assert len({t['line']['color'] for t in together['data'][:4]}) == 4
+    assert len([t for t in together['data'] if t['yaxis'] == 'y3']) == 2   # pressure of two runs
+    pages.bag_report(runs[:1], tmp_path / 'single.html')
+    assert 'id="overlaid"' not in (tmp_path / 'single.html').read_text()
+
+
+def test_the_table_of_figures_has_loops_saturation_and_air(tmp_path):
+    rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv').to_yaml()
+    run = tracking_run(AMPLITUDES, valve='hsv', metadata={**METADATA, 'rig': rig})
+    found = pages.bag_report([run], tmp_path / 'page.html', ['hsv'])['hsv']
+    table = markup(tmp_path / 'page.html')[0].partition('id="metrics"')[2].partition('</table>')[0]
+    for name in ('Tracking RMSE', 'Largest error', 'Valve at its upper limit',
+                 'Air filled into the muscle', 'Air through the fill valve', 'Controller loop',
+                 'Driver loop'):
+        assert name in table
+    assert found['air_fed_kg'] > 0.0 and found['air_use_kg'] > 0.0
+    pages.bag_report([step_run()], tmp_path / 'step.html')
+    assert 'Settling into 5 % after a step' in (tmp_path / 'step.html').read_text()
 
 
 def test_the_demo_page_is_small_and_has_the_key_numbers(tmp_path):

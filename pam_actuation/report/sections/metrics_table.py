@@ -48,6 +48,9 @@ def metrics(named, key='metrics', title='Figures of merit'):
         ('Valve at its lower limit', [_percent(m.saturation_low) for _, m in named]),
         ('Vented for missing or old input', [_interrupted(m) for _, m in named]),
         ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
+        ('Air through the fill valve', [_air(m.air_fed_kg) for _, m in named]),
+        ('Controller loop', [_loop(m, 'pressure_command') for _, m in named]),
+        ('Driver loop', [_loop(m, 'valve_signal') for _, m in named]),
     ]
     rows = [[name, *cells] for name, cells in rows if any(c is not None for c in cells)]
     body = table([''] + [name for name, _ in named], rows)
@@ -55,7 +58,10 @@ def metrics(named, key='metrics', title='Figures of merit'):
         body += paragraph(
             'Air is the sum of all increases of the air mass in the muscle, from measured '
             'pressure and the volume of the model; litres at the reference atmosphere. What '
-            'leaks or a regulator bleeds is not in it.', 'note')
+            'leaks or a regulator bleeds is not in it.'
+            + (' Air through the fill valve is the flow that its data sheet gives for the '
+               'recorded duty and pressures, leaks included.'
+               if any(m.air_fed_kg is not None for _, m in named) else ''), 'note')
     return Section(key, title, body)
 
 
@@ -95,3 +101,12 @@ def _air(value):
     if value is None:
         return None
     return f'{value * 1e3:.2f} g ({value / AIR_DENSITY * 1e3:.2f} l)'
+
+
+def _loop(m, topic):
+    """Return period, jitter and late share of one loop; None if it was not recorded."""
+    timing = next((t for t in m.timing if t.topic == topic), None)
+    if timing is None:
+        return None
+    return (f'{timing.median_s * 1e3:.2f} ms, jitter {timing.jitter_s * 1e3:.2f} ms, '
+            f'{100 * timing.late_share:.2f} % late')

@@ -1,0 +1,106 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far a replayed signal is from the recorded one: rms, largest, and where."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+# SI unit -> what people read: factor, unit.
+_SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'V': (1e3, 'mV')}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """
+    One signal, recorded against replayed, SI.
+
+    Attributes
+    ----------
+    signal, unit : str
+        ``topic`` or ``topic.field``, and its SI unit.
+    count, differing : int
+        Messages compared, and how many of them are not equal to the bit.
+    rms, largest : float
+        Root mean square and largest absolute difference.
+    at_s : float or None
+        Where the largest stands, seconds after the first message of the run; None if all are
+        equal.
+    span : float
+        Range of the recorded signal, to judge the others by.
+
+    """
+
+    signal: str
+    unit: str
+    count: int
+    differing: int
+    rms: float
+    largest: float
+    at_s: float | None
+    span: float
+
+    @property
+    def identical(self):
+        """Return whether every message is equal to the bit."""
+        return self.differing == 0
+
+    def to_dict(self):
+        """Return plain data for ``--json``."""
+        return {**asdict(self), 'identical': self.identical}
+
+    def line(self):
+        """Return one line for people."""
+        if self.identical:
+            return f'  {self.signal}: {self.count} messages, identical to the bit'
+        factor, unit = _SHOWN.get(self.unit, (1.0, '' if self.unit == '1' else self.unit))
+        rms, largest, span = (f'{factor * v:.4g} {unit}'.rstrip()
+                              for v in (self.rms, self.largest, self.span))
+        return (f'  {self.signal}: rms {rms}, largest {largest} at {self.at_s:.3f} s '
+                f'(range recorded {span}; {self.differing} of {self.count} messages differ)')
+
+
+def difference(signal, unit, stamp_ns, recorded, replayed, start_ns):
+    """
+    Compare two signals message by message.
+
+    Parameters
+    ----------
+    signal, unit : str
+        See ``Difference``.
+    stamp_ns : array_like of int, shape (N,)
+        Header stamps.
+    recorded, replayed : array_like, shape (N,)
+        SI values; two NaN are equal, one NaN is a difference of infinite size.
+    start_ns : int
+        Stamp from which ``at_s`` counts.
+
+    """
+    recorded = np.asarray(recorded, dtype=float)
+    replayed = np.asarray(replayed, dtype=float)
+    missing = np.isnan(recorded) & np.isnan(replayed)
+    same = missing | ((recorded == replayed) & (np.signbit(recorded) == np.signbit(replayed)))
+    with np.errstate(invalid='ignore'):
+        away = np.where(missing, 0.0, np.abs(recorded - replayed))
+    away = np.where(np.isnan(away), np.inf, away)
+    known = recorded[np.isfinite(recorded)]
+    span = float(np.ptp(known)) if known.size else 0.0
+    count, differing = int(recorded.size), int(np.sum(~same))
+    if not differing:
+        return Difference(signal, unit, count, 0, 0.0, 0.0, None, span)
+    worst = int(np.argmax(away))
+    return Difference(
+        signal, unit, count, differing, float(np.sqrt(np.mean(away ** 2))),
+        float(away[worst]), (int(stamp_ns[worst]) - int(start_ns)) * 1e-9, span)

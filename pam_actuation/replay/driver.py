@@ -1,0 +1,137 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Step a valve driver offline on the messages a recording holds, and compare valve signals.
+
+Ticks are taken at the header stamps of the recorded ``valve_signal``; each tick is given
+what had arrived by then. A simulated bag is reproduced to the bit. Of a live bag three things
+are not in the recording: the exact moment a message reached the driver (the recorder's
+receive time stands in for it, so that near a tick a message may count one tick early or late),
+calls of the services emergency_stop and reset, and the signal that vents when the node stops.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.replay.arrivals import arrivals
+from pam_actuation.replay.difference import difference
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+
+UNITS = {'ppr_voltage': 'V', 'fill_duty': '1', 'vent_duty': '1'}
+COMMANDS = ('pressure_command', 'valve_command')
+_TAKEN_BY = {'pressure': 'on_pressure', 'supply_pressure': 'on_supply',
+             'pressure_command': 'on_command', 'valve_command': 'on_valve_command'}
+
+
+@dataclass(frozen=True)
+class DriverReplay:
+    """
+    Recorded and replayed valve signals at the ticks of the driver.
+
+    ``recorded`` and ``replayed`` map signal name to arrays, shape (N,), V or duty 0..1;
+    ``note`` says what the driver was told of the rig.
+    """
+
+    stamp_ns: np.ndarray
+    recorded: dict
+    replayed: dict
+    note: str
+    start_ns: int
+
+    @property
+    def differences(self):
+        """Return one Difference a signal."""
+        return [difference(f'valve_signal.{name}', UNITS[name], self.stamp_ns,
+                           self.recorded[name], self.replayed[name], self.start_ns)
+                for name in self.recorded]
+
+    @property
+    def identical(self):
+        """Return whether every valve signal is equal to the bit."""
+        return all(one.identical for one in self.differences)
+
+    def to_dict(self):
+        """Return plain data for ``--json``."""
+        return {'ticks': len(self.stamp_ns), 'identical': self.identical, 'note': self.note,
+                'signals': [one.to_dict() for one in self.differences]}
+
+    def lines(self):
+        """Return the outcome for people."""
+        return [f'driver: {len(self.stamp_ns)} ticks on the recorded commands and pressures'
+                + (f' ({self.note})' if self.note else ''),
+                *(one.line() for one in self.differences)]
+
+    def arrays(self):
+        """Return all arrays by name, for saving."""
+        out = {'driver_stamp_ns': self.stamp_ns}
+        for name in self.recorded:
+            out[f'driver_{name}_recorded'] = self.recorded[name]
+            out[f'driver_{name}_replayed'] = self.replayed[name]
+        return out
+
+
+def replay_driver(run):
+    """
+    Replay the driver of a recording.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        A loaded bag with ``valve_signal`` and what the driver was told to do.
+
+    Returns
+    -------
+    DriverReplay
+
+    Raises
+    ------
+    InputError
+        The bag lacks one of the two, or its clocks cannot be compared.
+
+    """
+    signals = run.require('valve_signal')
+    driver, note = _driver(run, signals)
+    rows = []
+    found = arrivals(run, (*_TAKEN_BY, 'valve_signal'), ticks=('valve_signal',))
+    if not any(one.topic in COMMANDS for one in found):
+        run.require('pressure_command')
+    for _, topic, message in found:
+        if topic in _TAKEN_BY:
+            getattr(driver, _TAKEN_BY[topic])(message)
+        else:
+            signal, _ = driver.tick(message.stamp_ns)
+            rows.append((message.stamp_ns, dict(zip(message.names, message.efforts)),
+                         dict(zip(signal.names, signal.efforts))))
+    names = [name for name in UNITS if name in rows[0][2]]
+    return DriverReplay(
+        np.array([stamp for stamp, _, _ in rows], dtype=np.int64),
+        {name: np.array([old.get(name, np.nan) for _, old, _ in rows]) for name in names},
+        {name: np.array([new[name] for _, _, new in rows]) for name in names},
+        note, run.start_ns)
+
+
+def _driver(run, signals):
+    """Return the driver of a run's rig, and what it was not told."""
+    text = run.metadata.get('rig')
+    if text:
+        rig = load_rig(text)
+        return DriverLoop(rig.valve, driver_config(rig)), ''
+    valve = 'ppr' if 'ppr_voltage' in signals.values else 'hsv'
+    if not set(signals.values) & set(UNITS):
+        raise InputError('valve_signal has none of the known signals', str(run.path))
+    return DriverLoop(valve), 'the bag does not say which rig it is: default settings'

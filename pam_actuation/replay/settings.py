@@ -1,0 +1,76 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Another tuning for a replay: a controller file, single changed numbers, or both."""
+
+import os
+
+from pam_actuation.control.config import load_controller
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import dump_yaml, load_yaml
+
+
+def changed_controller(run, wanted):
+    """
+    Return the controller that ``--set`` asks for, None if it asks for nothing.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        The recording, whose own controller the single numbers change.
+    wanted : sequence of str
+        Each a controller (preset or YAML file; at most one) or ``NAME=VALUE`` with the name of
+        a setting.
+
+    Raises
+    ------
+    InputError
+        Two controllers, an unknown setting, a value that is no number or out of range, or a
+        recording without a controller to change.
+
+    """
+    if not wanted:
+        return None
+    files = [one for one in wanted if '=' not in one or os.path.exists(one)]
+    changes = [one for one in wanted if one not in files]
+    if len(files) > 1:
+        raise InputError(f'gives two controllers, {files[0]} and {files[1]}', '--set')
+    base = run.metadata.get('controller')
+    if files:
+        rig = run.metadata.get('rig')
+        controller = load_controller(files[0], load_rig(rig) if rig else None)
+        if not changes:
+            return controller
+        base = controller.to_yaml()
+    if not base:
+        raise InputError('the recording does not say which controller ran, so that single '
+                         'settings cannot be changed; give a controller', '--set')
+    tree = load_yaml(base, name='recorded controller').plain()
+    settings = tree.setdefault('settings', {})
+    for change in changes:
+        name, _, value = change.partition('=')
+        settings[name.strip()] = _number(value.strip())
+    try:
+        return load_controller(dump_yaml(tree))
+    except InputError as error:
+        raise InputError(error.problem, f'--set {" ".join(changes)}') from None
+
+
+def _number(text):
+    """Return the number in a text, or the text itself (some settings are words)."""
+    try:
+        return float(text)
+    except ValueError:
+        return text

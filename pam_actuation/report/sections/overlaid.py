@@ -1,0 +1,85 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Several runs in the same axes, each on the clock of its own experiment."""
+
+from pam_actuation.report import figures, signals
+from pam_actuation.report.metrics import tracking_error
+from pam_actuation.report.page import paragraph, plot, Section
+from pam_sim.units import P_ATM_PA
+
+ROLES = ('measured', 'second', 'green', 'command', 'after')
+_DASHES = (None, 'dash', 'dot')      # once the colours are used up
+
+
+def overlaid(named, key='overlaid', title='Runs laid over each other', max_points=1600):
+    """
+    Return the section that draws all runs into the same plots, None for a single run.
+
+    Parameters
+    ----------
+    named : list of (title, pam_sim.run.Run)
+        The runs; the reference is drawn from the first one.
+    key, title : str
+        Anchor and heading.
+    max_points : int
+        Most points per trace.
+
+    """
+    if len(named) < 2:
+        return None
+    rows = [('contraction [mm]', _lines(named, _topic('contraction', 1e3), max_points)
+             + _reference(named[0][1], max_points)),
+            ('tracking error [mm]', _lines(named, _error, max_points)),
+            ('pressure [kPa gauge]',
+             _lines(named, _topic('pressure', 1e-3, P_ATM_PA), max_points)),
+            ('force [N]', _lines(named, _topic('force', 1.0), max_points))]
+    rows = [(label, traces) for label, traces in rows if traces]
+    if not rows:
+        return None
+    body = paragraph('Time counts from the first reference of each run, so runs of the same '
+                     'experiment lie over each other.')
+    return Section(key, title, body + plot(
+        figures.stack(rows, 'time since the start of the experiment [s]'),
+        'Drag to zoom, all rows follow; click a name to hide that run.'))
+
+
+def _lines(named, read, points):
+    traces = []
+    for k, (title, run) in enumerate(named):
+        pair = read(run)
+        if pair is not None:
+            traces.append(figures.line(
+                *pair, title, ROLES[k % len(ROLES)], width=1.3, max_points=points,
+                dash=_DASHES[k // len(ROLES) % len(_DASHES)]))
+    return traces
+
+
+def _topic(topic, factor, offset=0.0):
+    def read(run):
+        pair = signals.series(run, topic)
+        return None if pair is None else (pair[0], (pair[1] - offset) * factor)
+    return read
+
+
+def _error(run):
+    tracked = tracking_error(run)
+    return None if tracked is None else (tracked[0], tracked[1] * 1e3)
+
+
+def _reference(run, points):
+    pair = signals.series(run, 'reference')
+    return [] if pair is None else [figures.line(
+        pair[0], pair[1] * 1e3, 'reference', 'reference', dash='dash', width=1.1,
+        max_points=points)]

@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A sample of wrong YAML files: loaded, or refused with file and line, and never anything else."""
+
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import load_yaml, MAX_BYTES
+import pytest
+from yaml_mutations import BOMB, mutated, outcome, run, sources
+
+
+def test_wrong_files_are_loaded_or_refused_with_file_and_line():
+    outcomes, bad = run(500)
+    assert bad == []
+    assert outcomes['refused'] > 300 and outcomes['loaded'] > 20
+
+
+def test_the_same_number_is_the_same_file():
+    found = sources()
+    assert [mutated(k, found)[1] for k in range(40)] == [mutated(k, found)[1] for k in range(40)]
+
+
+def test_every_file_loads_before_it_is_made_wrong(tmp_path):
+    path = tmp_path / 'right.yaml'
+    for name, text, load in sources():
+        path.write_text(text, encoding='utf-8')
+        assert outcome(path, load) == 'loaded', name
+
+
+def test_what_is_neither_is_noticed(tmp_path):
+    def fails(path):
+        raise KeyError('x')
+
+    def vague(path):
+        raise InputError('is wrong', 'somewhere')
+
+    assert outcome(tmp_path / 'a.yaml', fails).startswith('traceback: ')
+    assert outcome(tmp_path / 'a.yaml', vague).startswith('refused without file and line')
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    (BOMB, '50000 values'),
+    ('a: &x [*x]\n', '50 levels'),
+    ('a: 1\nb: ' + '[' * 100_000 + '\n', ':2: .*nested deeper than 50'),
+    ('a: 1\nb: ' + '9' * 5000 + '\n', ':2: .*5000 digits'),
+    ('a: 1\nb: !!float x\n', ':2: .*does not fit its tag'),
+    ('a: 1\nb: !!timestamp x\n', ':2: .*does not fit its tag'),
+    ('a: 1\nb: "\\ud800"\n', ':2: .*not text'),
+    ('a: 1\nb: "\\0"\n', ':2: .*not text'),
+    ('a: 1\nb: \x01\n', ':2: .*not text'),
+    ('a: 1\nb: *unknown\n', ':2: .*undefined alias'),
+    ('a: 1\nb: !!python/object:os.system x\n', ':2: .*constructor'),
+    ('a: 1\n' + 'b' * MAX_BYTES, 'larger than'),
+    ('\n', ':1: is empty')])
+def test_single_traps(text, words):
+    with pytest.raises(InputError, match=f'<text>.*{words}'):
+        load_yaml(text)
+
+
+def test_an_endless_file_is_not_read_to_its_end():
+    with pytest.raises(InputError, match='larger than'):
+        load_yaml('/dev/zero')
+
+
+def test_bytes_that_are_no_text_have_a_line(tmp_path):
+    path = tmp_path / 'a.yaml'
+    path.write_bytes(b'a: 1\nb: 2\nc: \xff\n')
+    with pytest.raises(InputError, match=r'a\.yaml:3: is not a text file'):
+        load_yaml(path)

@@ -1,0 +1,169 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Driver and chain on pinned bags: to the bit, twice the same bytes, and honest where not."""
+
+import json
+import shutil
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.source import read_bag
+from pam_actuation.cli.main import main
+from pam_actuation.replay.arrivals import arrivals
+from pam_actuation.replay.chain import replay_chain
+from pam_actuation.replay.compare import replay_run
+from pam_actuation.replay.difference import difference
+from pam_actuation.replay.driver import replay_driver
+from pam_actuation.replay.plant import replay_plant
+from pam_actuation.replay.settings import changed_controller
+from pam_sim.errors import InputError
+from pam_sim.run import Run, Series
+from process_replay import bag_of, CASES
+import pytest
+
+
+@pytest.fixture(scope='module')
+def runs():
+    return {case: load_run(bag_of(case)) for case in CASES}
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_a_simulated_bag_is_reproduced_to_the_bit_by_every_part(runs, case):
+    result = replay_run(runs[case])
+    assert result.controller.identical, result.controller.sentence()
+    assert result.driver.identical, result.driver.lines()
+    assert result.driver.to_dict()['signals'][0]['count'] > 50
+    # The free run of the plant has no sensor noise; it stays within a few deviations.
+    assert {d.signal for d in result.plant.differences} == {'pressure', 'contraction', 'force'}
+    assert result.plant.to_dict()['rmse']['contraction'] < 2e-4
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_the_chain_repeats_a_simulated_experiment_to_the_bit(runs, case):
+    result = replay_chain(runs[case])
+    assert result.identical, result.lines()
+    names = set(result.recorded)
+    assert {'pressure.pressure_pa', 'contraction.contraction_m', 'force.force_n',
+            'pressure_command.pressure_pa'} < names
+    assert len(result.recorded['pressure.pressure_pa']) == len(runs[case].topics['pressure'])
+
+
+@pytest.mark.parametrize('options', [(), ('--chain',), ('--only', 'driver')])
+def test_the_verb_gives_the_same_bytes_twice(options, tmp_path, capsys):
+    found = []
+    for name in ('once.npz', 'again.npz'):
+        assert main(['replay', str(bag_of('sofc_hsv')), '--json', '--out',
+                     str(tmp_path / name), *options]) == 0
+        found.append((capsys.readouterr().out, (tmp_path / name).read_bytes()))
+    assert found[0] == found[1]
+    parts = json.loads(found[0][0])
+    wanted = {(): {'controller', 'driver', 'plant'}, ('--chain',): {'chain'},
+              ('--only', 'driver'): {'driver'}}[options]
+    assert set(parts) == wanted | {'counterfactual'}
+
+
+def test_another_tuning_in_the_closed_loop_changes_what_the_muscle_did(runs, capsys):
+    bag = str(bag_of('sofc_ppr'))
+    assert main(['replay', bag, '--chain', '--set', 'lead_s=0.02', '--json']) == 0
+    signals = {s['signal']: s for s in json.loads(capsys.readouterr().out)['chain']['signals']}
+    assert signals['contraction.contraction_m']['largest'] > 1e-4
+    assert main(['replay', bag, '--only', 'controller', '--set', 'lead_s=0.02']) == 0
+    assert 'another tuning' in capsys.readouterr().out
+
+
+def test_single_settings_change_the_recorded_controller(runs):
+    run = runs['sofc_ppr']
+    assert changed_controller(run, None) is None
+    changed = changed_controller(run, ['lead_s=0.05', 'index_form=table'])
+    assert changed.settings['lead_s'] == 0.05 and changed.settings['index_form'] == 1.0
+    both = changed_controller(run, ['sofc_untuned', 'learning_rate=0.5'])
+    assert both.settings['learning_rate'] == 0.5
+    assert both.settings['lead_s'] != changed_controller(
+        run, ['learning_rate=0.5']).settings['lead_s']
+    for wanted, words in ((['lead=1'], 'did you mean lead_s'), (['lead_s=fast'], 'a number'),
+                          (['lead_s=99'], 'outside'), (['sofc_ppr', 'pid'], 'two controllers')):
+        with pytest.raises(InputError, match=words):
+            changed_controller(run, wanted)
+    with pytest.raises(InputError, match='does not say which controller'):
+        changed_controller(Run({}, {}, '/muscle', 'x'), ['lead_s=0.1'])
+
+
+def test_arrivals_are_in_the_order_of_the_loops(runs):
+    found = arrivals(runs['sofc_hsv'], ('pressure', 'pressure_command', 'valve_signal'))
+    times = [one.time_ns for one in found]
+    assert times == sorted(times)
+    at_start = [one.topic for one in found if one.time_ns == times[0]]
+    assert at_start == ['pressure', 'pressure_command', 'valve_signal']
+
+
+def test_clocks_that_disagree_are_noted_beside_other_parts_and_refused_alone(
+        runs, monkeypatch):
+    run = runs['pid_ppr']
+
+    def shifted(path, recover=False):
+        bag = read_bag(path, recover=recover)
+        for topic in bag.topics.values():
+            topic.log_time_ns = [int(t) + 7_000_000_000 for t in topic.log_time_ns]
+        return bag
+
+    monkeypatch.setattr('pam_actuation.replay.arrivals.read_bag', shifted)
+    result = replay_run(run)
+    assert result.driver is None and '7.0 s apart' in result.notes['driver']
+    assert 'driver: not replayed' in result.text()
+    for options in ({'only': 'driver'}, {'chain': True}):
+        with pytest.raises(InputError, match='7.0 s apart'):
+            replay_run(run, **options)
+
+
+def test_what_cannot_be_replayed_is_said_in_a_sentence(runs):
+    run = runs['pid_ppr']
+    bare = Run(run.topics, {}, run.namespace, run.path)
+    assert 'default settings' in replay_driver(bare).note
+    with pytest.raises(InputError, match='which rig'):
+        replay_chain(bare)
+    with pytest.raises(InputError, match='nothing to replay'):
+        replay_run(bare, only='plant')
+    with pytest.raises(InputError, match='changes nothing'):
+        replay_run(run, controller=object(), only='driver')
+    without = Run({k: v for k, v in run.topics.items() if k != 'valve_signal'}, run.metadata,
+                  run.namespace, run.path)
+    with pytest.raises(InputError, match='valve_signal'):
+        replay_chain(without)
+    brief = Run({name: Series(s.stamp_ns[:8], {k: v[:8] for k, v in s.values.items()})
+                 for name, s in run.topics.items()}, run.metadata, run.namespace, run.path)
+    with pytest.raises(InputError, match='in common'):
+        replay_plant(brief)
+
+
+def test_a_folder_that_does_not_exist_is_refused(runs, tmp_path):
+    result = replay_run(runs['pid_ppr'], only='driver')
+    with pytest.raises(InputError, match='folder'):
+        result.save(tmp_path / 'no' / 'x.npz')
+    result.save(tmp_path / 'x.npz')
+    assert [path.name for path in tmp_path.iterdir()] == ['x.npz']
+    shutil.rmtree(tmp_path)
+
+
+def test_a_difference_says_how_large_and_where():
+    stamps = 1_000_000_000 + np.arange(4) * 100_000_000
+    one = difference('a', 'Pa', stamps, [1.0, 2.0, np.nan, 4.0], [1.0, 2.5, np.nan, 4.0],
+                     1_000_000_000)
+    assert (one.differing, one.count, one.largest, one.span) == (1, 4, 0.5, 3.0)
+    assert one.at_s == pytest.approx(0.1) and one.rms == pytest.approx(0.25)
+    assert not one.identical and 'at 0.100 s' in one.line()
+    same = difference('a', 'Pa', stamps, [0.0, np.nan], [0.0, np.nan], 0)
+    assert same.identical and same.at_s is None and 'identical' in same.line()
+    assert not difference('a', 'Pa', stamps, [0.0], [-0.0], 0).identical
+    assert difference('a', 'Pa', stamps, [1.0], [np.nan], 0).largest == np.inf
