@@ -17,7 +17,7 @@ The whole rig: plant, valve driver, controller, reference and recorder.
 
     ros2 launch pam_actuation rig.launch.py valve:=hsv experiment:=sine_quarter_hz
 
-Ends by itself when the experiment is over, and when the driver or the plant ends.
+Ends by itself when the experiment is over, and when the driver, the plant or the recorder ends.
 """
 
 from datetime import datetime
@@ -127,7 +127,7 @@ def generate_launch_description():
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
             (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
-            (plant, 'the plant ended'))]
+            (plant, 'the plant ended'), (recorder, 'the recorder ended'))]
     return LaunchDescription([*_arguments(), *nodes, *ends])
 
 

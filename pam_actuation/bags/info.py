@@ -29,6 +29,7 @@ from pam_actuation.bags import cdr, codecs, layout, plausibility, series
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.recorder import RECORDING_RECORD
+from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import read_bag
 from pam_sim.errors import InputError
 
@@ -159,6 +160,13 @@ def bag_info(path, recover=False):
     recording = bag.records.get(RECORDING_RECORD, {})
     published = _published(bag)
     remarks = list(bag.remarks)
+    if recording.get('write_error'):
+        remarks.append(f'The recorder could not go on: {recording["write_error"]}.')
+    recovery = bag.records.get(RECOVERY_RECORD)
+    if recovery:
+        remarks.append(
+            'The recording broke off and was made a whole bag again; '
+            f'{recovery.get("unreadable_bytes", "?")} bytes were not readable.')
     topics = []
     for name in sorted(bag.topics):
         topic = bag.topics[name]
@@ -175,7 +183,7 @@ def bag_info(path, recover=False):
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
         duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
         namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
-        notes=notes, recovered=bag.recovered)
+        notes=notes, recovered=bag.recovered or bool(recovery))
 
 
 def _size(path):

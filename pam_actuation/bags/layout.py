@@ -21,7 +21,10 @@ Message definitions and RIHS01 hashes come from the Jazzy type store of the
 
 from dataclasses import dataclass
 import functools
+import os
+from pathlib import Path
 
+from pam_actuation.bags import disk
 from pam_sim.errors import InputError
 from rosbags.typesys import get_typestore, Stores
 import yaml
@@ -102,32 +105,37 @@ def to_yaml(data):
         allow_unicode=True, width=2**31)
 
 
-def bag_metadata(file_name, topics, start_ns, end_ns, custom_data=None):
+@dataclass(frozen=True)
+class FileFacts:
+    """One data file of a bag: name, first and last receive time [ns] (None if empty), count."""
+
+    name: str
+    start_ns: int | None
+    end_ns: int | None
+    count: int
+
+
+def bag_metadata(files, topics, custom_data=None):
     """
     Return the content of metadata.yaml (version 9) below its root key.
 
     Parameters
     ----------
-    file_name : str
-        The one data file, relative to the bag's directory.
+    files : list of FileFacts
+        The data files in order, their names relative to the bag's directory.
     topics : list of TopicFacts
         In the order of registration.
-    start_ns, end_ns : int or None
-        First and last receive time [ns]; None for a bag without messages.
     custom_data : dict of str to str, optional
         Free texts that rosbag2 carries along when a bag is converted.
 
     """
-    empty = start_ns is None
-    start = {'nanoseconds_since_epoch': NO_START_TIME_NS if empty else start_ns}
-    duration = {'nanoseconds': 0 if empty else end_ns - start_ns}
-    count = sum(topic.count for topic in topics)
+    starts = [file.start_ns for file in files if file.start_ns is not None]
+    ends = [file.end_ns for file in files if file.end_ns is not None]
     return {
         'version': METADATA_VERSION,
         'storage_identifier': STORAGE_IDENTIFIER,
-        'duration': duration,
-        'starting_time': start,
-        'message_count': count,
+        **_times(min(starts, default=None), max(ends, default=None)),
+        'message_count': sum(topic.count for topic in topics),
         'topics_with_message_count': [
             {
                 'topic_metadata': {
@@ -143,13 +151,40 @@ def bag_metadata(file_name, topics, start_ns, end_ns, custom_data=None):
         ],
         'compression_format': '',
         'compression_mode': '',
-        'relative_file_paths': [file_name],
-        'files': [{
-            'path': file_name,
-            'starting_time': dict(start),
-            'duration': dict(duration),
-            'message_count': count,
-        }],
+        'relative_file_paths': [file.name for file in files],
+        'files': [_file_metadata(file) for file in files],
         'custom_data': dict(custom_data or {}) or None,
         'ros_distro': ROS_DISTRO,
     }
+
+
+def _times(start_ns, end_ns):
+    """Return duration and start, as rosbag2 writes them also for what is empty."""
+    empty = start_ns is None
+    return {
+        'duration': {'nanoseconds': 0 if empty else end_ns - start_ns},
+        'starting_time': {
+            'nanoseconds_since_epoch': NO_START_TIME_NS if empty else start_ns},
+    }
+
+
+def _file_metadata(file):
+    times = _times(file.start_ns, file.end_ns)
+    return {
+        'path': file.name, 'starting_time': times['starting_time'],
+        'duration': times['duration'], 'message_count': file.count}
+
+
+def write_metadata(directory, content):
+    """Write metadata.yaml atomically and onto the disk."""
+    directory = Path(directory)
+    temporary = directory / f'.{METADATA_FILE}.{os.getpid()}'
+    try:
+        with open(temporary, 'w', encoding='utf-8') as stream:
+            stream.write(to_yaml({METADATA_ROOT: content}))
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(temporary, directory / METADATA_FILE)
+    finally:
+        temporary.unlink(missing_ok=True)
+    disk.sync_directory(directory)

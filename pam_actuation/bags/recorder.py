@@ -21,13 +21,18 @@ the disk cannot follow, the newest messages are dropped and counted.
 """
 
 from collections import deque
+import contextlib
 from dataclasses import asdict, dataclass, field
+import os
 import threading
+import time
 
-from pam_actuation.bags.source import read_bag
+from pam_actuation.bags import disk
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
+WRITE_EVERY_S = 0.1         # the writer thread takes what has come, in few large portions
+WAKE_AT = 1000              # messages that wake it earlier
 
 
 @dataclass
@@ -141,13 +146,14 @@ class RecorderCore:
     writer : BagWriter
         The open bag; the recorder closes it.
     max_queued : int
-        Messages that may wait for the disk (default 20 000: about ten seconds of a rig).
+        Messages that may wait for the disk (default 20 000: about ten seconds of a rig at 200 Hz).
     flush_every_s : float
-        How often finished chunks are handed to the operating system.
+        How often what was written is brought onto the disk: with the time in the queue,
+        what the loss of power or of the process may cost.
 
     """
 
-    def __init__(self, writer, max_queued=20_000, flush_every_s=1.0):
+    def __init__(self, writer, max_queued=20_000, flush_every_s=0.4):
         if max_queued < 1:
             raise InputError(f'{max_queued} is below 1 message', 'max_queued')
         self._writer = writer
@@ -163,6 +169,9 @@ class RecorderCore:
         self.write_error = ''
         self._thread = threading.Thread(target=self._run, name='bag_writer', daemon=True)
         self._thread.start()
+        self._ended = threading.Event()
+        self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
+        self._syncing.start()
 
     def add_topic(self, full_name, type_name, check_sequence=None, qos=None):
         """
@@ -214,9 +223,34 @@ class RecorderCore:
             self._queue.append((
                 full_name, data, receive_timestamp_ns,
                 source_timestamp_ns or receive_timestamp_ns))
-            if len(self._queue) == 1:
+            if len(self._queue) == WAKE_AT:
                 self._wake.notify()
             return True
+
+    def receive_all(self, full_name, messages):
+        """
+        Take what arrived on one topic, in order.
+
+        Parameters
+        ----------
+        full_name : str
+            Announced topic.
+        messages : iterable of (bytes, dict)
+            As rclpy takes them: serialized message; ``source_timestamp``,
+            ``received_timestamp`` [ns] and ``publication_sequence_number``.
+
+        Returns
+        -------
+        int
+            How many were taken; the others were dropped and counted.
+
+        """
+        receive = self.receive
+        with self._wake:            # reentrant: one turn of the lock for all of them
+            return sum(
+                receive(full_name, data, info['source_timestamp'], info['received_timestamp'],
+                        info['publication_sequence_number'])
+                for data, info in messages)
 
     @property
     def counts(self):
@@ -242,14 +276,17 @@ class RecorderCore:
             self._closing = True
             self._wake.notify()
         self._thread.join()
+        self._ended.set()
+        self._syncing.join()
         try:
-            if not self.write_error:
-                self._writer.add_metadata(RECORDING_RECORD, _as_texts(self.counts))
-                self._writer.close()
+            if self.write_error:
+                self._count_what_is_kept()
+            self._writer.add_metadata(RECORDING_RECORD, _as_texts(self.counts, self.write_error))
+            self._writer.close()
         except OSError as error:
             self._fail(error)
-        if self.write_error:
-            self._keep_beginning()
+            self._count_what_is_kept()
+            self._writer.abandon()
         self._summary = RecordingSummary(
             str(self._writer.directory), self.counts, self.write_error)
         return self._summary
@@ -258,43 +295,60 @@ class RecorderCore:
         if not self.write_error:
             reason = getattr(error, 'strerror', None) or error
             self.write_error = (
-                f'{self._writer.file}: writing failed ({reason}); the bag ends early, free '
+                f'{self._writer.directory}: writing failed ({reason}); the bag ends early, free '
                 'some space or record elsewhere')
 
-    def _keep_beginning(self):
-        """Close the file as it is and count what can be read back from it."""
-        self._writer.abandon()
-        try:
-            readable = read_bag(self._writer.file, recover=True).counts
-        except (InputError, OSError):
-            readable = {}
+    def _count_what_is_kept(self):
+        """Take back what was half written; only what is in the file counts as written."""
+        with contextlib.suppress(OSError):
+            self._writer.cut()
+        kept = self._writer.counts
         with self._wake:
             for name, counts in self._counts.items():
-                counts.written = readable.get(name, 0)
+                counts.written = kept.get(name, 0)
                 counts.dropped = counts.received - counts.written
 
     def _run(self):
+        flushed = time.monotonic()
         while True:
             with self._wake:
-                if not self._queue and not self._closing:
-                    self._wake.wait(self._flush_every_s)
+                if len(self._queue) < WAKE_AT and not self._closing:
+                    self._wake.wait(min(WRITE_EVERY_S, self._flush_every_s))
                 batch, self._queue = self._queue, deque()
                 finished = self._closing and not batch
             if finished:
                 return
-            self._write(batch)
+            now = time.monotonic()
+            flush = now - flushed >= self._flush_every_s
+            if flush:
+                flushed = now
+            self._write(batch, flush)
 
-    def _write(self, batch):
+    def _sync(self):
+        """Bring what was written onto the disk; a slow one must not hold up the writing."""
+        while not self._ended.wait(self._flush_every_s):
+            with self._disk:
+                handle = self._writer.handle_to_sync()
+            if handle is not None:
+                try:
+                    disk.sync(handle)
+                except OSError as error:
+                    self._fail(error)
+                finally:
+                    os.close(handle)
+
+    def _write(self, batch, flush):
         written = {}
         refused = {}
         with self._disk:
             try:
                 while batch and not self.write_error:
                     name, data, log_time_ns, publish_time_ns = batch[0]
-                    self._writer.write(name, bytes(data), log_time_ns, publish_time_ns)
+                    self._writer.write(name, data, log_time_ns, publish_time_ns)
                     written[name] = written.get(name, 0) + 1
                     batch.popleft()
-                self._writer.flush()
+                if flush and not self.write_error:
+                    self._writer.flush()
             # Whatever went wrong must reach the summary: a thread dies silently.
             except Exception as error:
                 self._fail(error)
@@ -307,8 +361,9 @@ class RecorderCore:
                 self._counts[name].dropped += number
 
 
-def _as_texts(counts):
+def _as_texts(counts, write_error):
     """Return the counts as flat texts: ``<topic>.received`` and so on."""
-    return {
+    texts = {
         f'{name}.{key}': 'unknown' if value is None else str(value)
         for name, topic in counts.items() for key, value in asdict(topic).items()}
+    return {**texts, 'write_error': write_error} if write_error else texts

@@ -15,26 +15,23 @@
 """
 Write a rosbag2 directory in the Jazzy MCAP layout.
 
-``run/run_0.mcap`` grows while recording, in small compressed chunks with
-checksums, so that a killed process leaves a readable beginning; the experiment
-metadata is the first record. ``run/metadata.yaml`` appears, complete, at close.
+``run/run_0.mcap`` grows while recording, in compressed chunks with checksums, so that a
+killed process leaves a readable beginning; the experiment metadata is among the first
+records. With a limit of size or time ``run_1.mcap`` and so on follow, each a complete
+file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
-import contextlib
-import io
-import os
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
-
-from pam_actuation.bags import layout
+from pam_actuation.bags import disk, layout
+from pam_actuation.bags.data_file import DataFile
 from pam_sim.errors import InputError
 
-# About one second of a rig's messages: what a killed recorder may lose.
-CHUNK_BYTES = 128 * 1024
+# Every file holds the metadata of the experiment; a smaller limit would be full of it.
+SMALLEST_FILE_BYTES = 100_000
+SHORTEST_FILE_S = 0.1
 EXPERIMENT_RECORD = 'pam_experiment'
 ROSBAG2_RECORD = 'rosbag2'
-LIBRARY = 'pam_actuation'
 
 
 class BagWriter:
@@ -51,41 +48,72 @@ class BagWriter:
         metadata.yaml, so that converted bags have it.
     overwrite : bool
         Replace an existing bag. Files that are no part of a bag are never touched.
+    max_file_bytes : int
+        Go on in the next file from about this size on; 0: never.
+    max_file_s : float
+        Go on in the next file after this time between first and newest message [s]; 0: never.
 
     Raises
     ------
     InputError
-        The directory exists already, or holds something else than a bag.
+        The directory exists already, or holds something else than a bag; a limit so small that
+        a file could not hold anything.
     OSError
         The file system refuses (no space, no right to write).
 
     """
 
-    def __init__(self, directory, metadata=None, overwrite=False):
+    def __init__(self, directory, metadata=None, overwrite=False, max_file_bytes=0,
+                 max_file_s=0.0):
+        check_limits(max_file_bytes, max_file_s)
         self.directory = Path(directory).resolve()
-        records = _records(metadata or {})
-        self._experiment = records.get(EXPERIMENT_RECORD, {})
+        self._records = _records(metadata or {})
+        self._limit_bytes = max_file_bytes or float('inf')
+        self._limit_ns = round(max_file_s * 1e9) or float('inf')
         self._topics = {}
-        self._channels = {}
-        self._schemas = {}
-        self._start_ns = None
-        self._end_ns = None
+        self._finished = []
+        self._in_former_files = {}
         self._closed = False
         _make_room(self.directory, overwrite)
-        self.file = self.directory / f'{self.directory.name}_0.mcap'
-        self._stream = io.open(self.file, 'xb')
-        self._mcap = Writer(
-            self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._mcap.start(profile='ros2', library=LIBRARY)
-        self._write_rosbag2_record()
-        for name, texts in records.items():
-            self._mcap.add_metadata(name, texts)
-        self._stream.flush()
+        self._current = None
+        self._current = self._next_file()
+
+    def _next_file(self):
+        """Begin the next file: header, metadata, all topics so far."""
+        number = len(self._finished) + (self._current is not None)
+        made = DataFile(self.directory / f'{self.directory.name}_{number}.mcap', self._begin)
+        disk.sync_directory(self.directory)
+        return made
+
+    def _begin(self, file):
+        self._write_rosbag2_record(file)
+        for name, texts in self._records.items():
+            file.mcap.add_metadata(name, texts)
+        for name, facts in self._topics.items():
+            file.register(name, facts['type'], facts['qos'], facts['hash'])
+
+    def _split(self):
+        # The next file first: where it cannot be made, the present one can still be finished.
+        following = self._next_file()
+        self._finish_file()
+        self._current = following
+        self._in_former_files = self.counts
 
     @property
     def counts(self):
         """Return the messages written so far, by full topic name."""
         return {name: facts['count'] for name, facts in self._topics.items()}
+
+    @property
+    def files(self):
+        """Return the paths of all files of the bag, in order."""
+        files = [self.directory / facts.name for facts in self._finished]
+        return files if self._current is None else [*files, self._current.path]
+
+    @property
+    def file(self):
+        """Return the path of the newest file."""
+        return self.files[-1]
 
     def add_topic(self, full_name, type_name, qos=None):
         """
@@ -103,18 +131,12 @@ class BagWriter:
             return
         if not full_name.startswith('/') or full_name.endswith('/'):
             raise InputError('give the full topic name, such as /muscle/pressure', full_name)
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.register_schema(
-                type_name, 'ros2msg', layout.schema_text(type_name).encode())
         profiles = [layout.qos_profile()] if qos is None else list(qos)
-        type_hash = layout.type_hash(type_name)
-        self._channels[full_name] = self._mcap.register_channel(
-            full_name, 'cdr', self._schemas[type_name], {
-                'offered_qos_profiles': layout.to_yaml(profiles),
-                'topic_type_hash': type_hash,
-            })
         self._topics[full_name] = {
-            'type': type_name, 'qos': tuple(profiles), 'hash': type_hash, 'count': 0}
+            'type': type_name, 'qos': tuple(profiles), 'hash': layout.type_hash(type_name),
+            'count': 0}
+        facts = self._topics[full_name]
+        self._current.register(full_name, type_name, facts['qos'], facts['hash'])
 
     def write(self, full_name, cdr_bytes, log_time_ns, publish_time_ns):
         """
@@ -122,44 +144,67 @@ class BagWriter:
 
         Raises OSError when the file system refuses; what was written before stays.
         """
-        self._mcap.add_message(
-            self._channels[full_name], log_time_ns, cdr_bytes, publish_time_ns)
+        file = self._current
+        if file.count and (log_time_ns - file.start_ns >= self._limit_ns
+                           or file.size >= self._limit_bytes):
+            self._split()
+        self._current.write(full_name, cdr_bytes, log_time_ns, publish_time_ns)
         self._topics[full_name]['count'] += 1
-        if self._start_ns is None:
-            self._start_ns = self._end_ns = log_time_ns
-        elif log_time_ns > self._end_ns:
-            self._end_ns = log_time_ns
-        elif log_time_ns < self._start_ns:
-            self._start_ns = log_time_ns
 
     def add_metadata(self, name, values):
         """Append a named metadata record of texts."""
-        self._mcap.add_metadata(name, _texts(values))
+        self._current.mcap.add_metadata(name, _texts(values))
 
     def flush(self):
-        """Hand all finished chunks to the operating system."""
-        self._stream.flush()
+        """Close the open chunk, so that all messages written survive the end of the process."""
+        self._current.mcap.close_chunk()
+
+    def handle_to_sync(self):
+        """
+        Return a file descriptor for ``disk.sync``, None if nothing was written since the last.
+
+        The caller waits for the disk, in a thread of its own, and closes it; what was flushed
+        then survives the loss of power.
+        """
+        return None if self._current is None else self._current.handle_to_sync()
 
     def close(self):
         """Finish the index and metadata.yaml; a second call does nothing."""
         if self._closed:
             return
-        self._closed = True
         try:
-            self._write_rosbag2_record()
-            self._mcap.finish()
-        finally:
-            self._stream.close()
-        text = layout.to_yaml({layout.METADATA_ROOT: self._bag_metadata()})
-        temporary = self.directory / f'.{layout.METADATA_FILE}.{os.getpid()}'
-        temporary.write_text(text, encoding='utf-8')
-        os.replace(temporary, self.directory / layout.METADATA_FILE)
+            if self._current is not None:
+                self._finish_file()
+            layout.write_metadata(self.directory, self._bag_metadata())
+        except OSError:
+            self.abandon()
+            raise
+        self._closed = True
+
+    def _finish_file(self):
+        self._write_rosbag2_record(self._current)
+        self._current.finish()
+        self._finished.append(self._current.facts)
+        self._current = None
+
+    def cut(self):
+        """
+        After a write error: take back what is half written and count what is in the bag.
+
+        What can still be written by ``add_metadata`` and ``close`` makes it a whole bag; where
+        that fails, or after ``abandon``, the file has no index but is readable.
+        """
+        if self._closed or self._current is None:
+            return
+        in_file = self._current.cut()
+        for name, facts in self._topics.items():
+            facts['count'] = self._in_former_files.get(name, 0) + in_file.get(name, 0)
 
     def abandon(self):
         """Close the file without an index, after a write error; what is in it stays readable."""
+        if not self._closed and self._current is not None:
+            self._current.abandon()
         self._closed = True
-        with contextlib.suppress(OSError):
-            self._stream.close()
 
     def __enter__(self):
         """Return the writer itself."""
@@ -169,17 +214,34 @@ class BagWriter:
         """Close the bag, whatever happened: what was written stays readable."""
         self.close()
 
-    def _bag_metadata(self):
+    def _bag_metadata(self, begun=None):
         topics = [
             layout.TopicFacts(name, facts['type'], facts['qos'], facts['hash'], facts['count'])
             for name, facts in self._topics.items()]
-        return layout.bag_metadata(
-            self.file.name, topics, self._start_ns, self._end_ns, self._experiment)
+        files = list(self._finished)
+        if self._current is not None:
+            files.append(self._current.facts)
+        if begun is not None:
+            files.append(begun.facts)
+        return layout.bag_metadata(files, topics, self._records.get(EXPERIMENT_RECORD))
 
-    def _write_rosbag2_record(self):
+    def _write_rosbag2_record(self, file):
         # Written at open and at close, as rosbag2 does; readers take the last one.
-        self._mcap.add_metadata(
-            ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(self._bag_metadata())})
+        metadata = self._bag_metadata(file if file is not self._current else None)
+        file.mcap.add_metadata(
+            ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(metadata)})
+
+
+def check_limits(max_file_bytes, max_file_s):
+    """Raise InputError for limits of a file that are neither 0 nor large enough."""
+    if max_file_bytes != 0 and max_file_bytes < SMALLEST_FILE_BYTES:
+        raise InputError(
+            f'{max_file_bytes} bytes are too few for a file, give 0 (no limit) or at least '
+            f'{SMALLEST_FILE_BYTES}', 'largest file size')
+    if max_file_s != 0.0 and not SHORTEST_FILE_S <= max_file_s <= 1e9:
+        raise InputError(
+            f'{max_file_s:g} s is not allowed, give 0 (no limit) or {SHORTEST_FILE_S} to 1e9',
+            'longest file duration')
 
 
 def _texts(values):

@@ -14,7 +14,9 @@
 
 """``pam info``: what is in a bag, and whether it can be trusted."""
 
-from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
+from pathlib import Path
+
+from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
 
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
@@ -23,12 +25,27 @@ EXAMPLE = 'pam info runs/first'
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', help='bag directory, or a lone .mcap file')
-    add_recover_option(parser)
+    parser.add_argument(
+        '--recover', action='store_true',
+        help='first repair a recording that broke off: rebuild the index of its files and '
+             'metadata.yaml, so that every tool opens it; a whole bag stays as it is')
 
 
 def run(args):
     """Print the facts; exit code 1 where messages were lost or remarks were made."""
     from pam_actuation.bags.info import bag_info, render_text
+    recovery = None
+    if args.recover and _is_mcap(Path(args.bag)):
+        from pam_actuation.bags.recover import recover_bag
+        recovery = recover_bag(args.bag)
     info = bag_info(args.bag, recover=args.recover)
-    emit(args, info.to_dict(), render_text(info))
+    payload, lines = info.to_dict(), []
+    if recovery is not None:
+        payload['recovery'] = recovery.to_dict()
+        lines = recovery.sentences()
+    emit(args, payload, '\n'.join([*lines, render_text(info)]))
     return EXIT_FINDING if info.has_findings else EXIT_DONE
+
+
+def _is_mcap(path):
+    return path.suffix == '.mcap' or path.is_dir() and any(path.glob('*.mcap'))

@@ -14,15 +14,17 @@
 
 """The recorder on ROS: every message of the rig, as it came, into a bag."""
 
+import importlib
 import json
 import sys
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
+from pam_actuation.bags import layout
 from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
-from pam_actuation.bags.writer import BagWriter
+from pam_actuation.bags.writer import BagWriter, check_limits
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
@@ -45,7 +47,8 @@ class ExperimentRecorder(ManagedNode):
     Record while active; each activation writes one bag.
 
     Messages are taken in serialized form with the times of sending and receiving and
-    the number their publisher gave them, so that losses are seen. When the node is
+    the number their publisher gave them, so that losses are seen. A write error ends the
+    node with exit code 1; what was written is kept. When the node is
     stopped by a signal it goes on until the other nodes are gone (at most 2 s).
     """
 
@@ -57,6 +60,15 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter(
             'topics', list(TOPIC_TYPES), 'Topics to record, relative to the namespace '
             '(diagnostics is /diagnostics).'),
+        NodeParameter(
+            'extra_topics', [''], 'Further topics, each as NAME=TYPE, for instance '
+            '/bench/imu=sensor_msgs/msg/Imu.'),
+        NodeParameter(
+            'max_bagfile_size_bytes', 0, 'Go on in the next file from about this size on '
+            '[bytes]; 0: never.', 0, 2**53),
+        NodeParameter(
+            'max_bagfile_duration_s', 0.0, 'Go on in the next file after this time [s]; 0: '
+            'never.', 0.0, 1e9),
         NodeParameter(
             'await_topics', [''], 'Activation waits for the publishers of these topics.'),
         NodeParameter(
@@ -79,6 +91,9 @@ class ExperimentRecorder(ManagedNode):
                     raise InputError(
                         f'{topic!r} is not a topic of the rig; known are '
                         f'{", ".join(TOPIC_TYPES)}', f'parameter {name}')
+        check_limits(
+            self.value('max_bagfile_size_bytes'), self.value('max_bagfile_duration_s'))
+        self.extra = dict(parse_extra_topic(text) for text in self.value('extra_topics') if text)
 
     def setup(self):
         """Read the metadata, subscribe."""
@@ -92,6 +107,15 @@ class ExperimentRecorder(ManagedNode):
             else:
                 source = self.add_subscription(topic, profile=qos.RECORDER, raw=True)
             self.sources[topic] = source
+        self.types = dict(TOPIC_TYPES)
+        for name, (type_name, message_type) in self.extra.items():
+            self.types[name] = type_name
+            source = PolledSubscription(self, message_type, name, qos.RECORDER, raw=True)
+            self.subscriptions_polled.append(source)
+            self.sources[name] = source
+        for type_name in set(self.types.values()):
+            layout.schema_text(type_name)       # looked up now, not at the first message
+            layout.type_hash(type_name)
 
     def _metadata(self):
         path = self.value('metadata_file')
@@ -119,7 +143,9 @@ class ExperimentRecorder(ManagedNode):
         """Open the bag; wait until the publishers asked for are connected."""
         writer = BagWriter(
             self.value('output'), {'pam_experiment': self.metadata},
-            overwrite=self.value('overwrite'))
+            overwrite=self.value('overwrite'),
+            max_file_bytes=self.value('max_bagfile_size_bytes'),
+            max_file_s=self.value('max_bagfile_duration_s'))
         self.core = RecorderCore(writer)
         self.known = set()
         for source in self.sources.values():
@@ -146,9 +172,21 @@ class ExperimentRecorder(ManagedNode):
         """Hand over what arrived."""
         self._take_all()
         if self.core.write_error:
-            self.diagnostics.update(ERROR, self.core.write_error)
+            self._give_up()
         elif self.timing.ticks % CHECK_EVERY == 1:
             self._check_losses()
+
+    def _give_up(self):
+        """
+        End after a write error: keep what is written, tell everybody, exit with 1.
+
+        An experiment without a record is not worth its risk; whoever started the rig sees
+        this node end and stops the others, which vents.
+        """
+        summary = self.core.close()
+        self.core = None
+        self.fail(f'{summary.write_error} ({summary.written} messages kept, '
+                  f'{summary.dropped} not written)')
 
     def _check_losses(self):
         counts = self.core.counts.values()
@@ -163,18 +201,15 @@ class ExperimentRecorder(ManagedNode):
     def _take_all(self):
         """Take what arrived on all topics; return how many messages it was."""
         taken = 0
-        receive = self.core.receive
         for topic, source in self.sources.items():
             messages = source.take()
             if not messages:
                 continue
             name = source.topic
             if name not in self.known:
-                self.core.add_topic(name, TOPIC_TYPES[topic])
+                self.core.add_topic(name, self.types[topic])
                 self.known.add(name)
-            for data, info in messages:
-                receive(name, data, info['source_timestamp'], info['received_timestamp'],
-                        info['publication_sequence_number'])
+            self.core.receive_all(name, messages)
             taken += len(messages)
         return taken
 
@@ -221,6 +256,22 @@ class ExperimentRecorder(ManagedNode):
             if counts.lost:
                 rows.append((f'lost.{name}', counts.lost))
         return (*values, *rows)
+
+
+def parse_extra_topic(text):
+    """Return name and (type name, message class) of ``NAME=TYPE``; InputError with a reason."""
+    where = 'parameter extra_topics'
+    name, _, type_name = text.partition('=')
+    parts = type_name.split('/')
+    if not name or len(parts) != 3 or parts[1] != 'msg':
+        raise InputError(
+            f'{text!r} is not NAME=TYPE, such as /bench/imu=sensor_msgs/msg/Imu', where)
+    layout.type_hash(type_name)
+    try:
+        message_type = getattr(importlib.import_module(f'{parts[0]}.msg'), parts[2])
+    except (ImportError, AttributeError):
+        raise InputError(f'the message type {type_name} is not installed', where) from None
+    return name, (type_name, message_type)
 
 
 def main(args=None):

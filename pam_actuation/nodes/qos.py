@@ -30,7 +30,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 PUBLISHER_DEPTH = 100     # half a second of a 200 Hz topic survives a busy receiver
 CONSUMER_DEPTH = 10       # consumers use the newest message; old ones are stale anyway
-RECORDER_DEPTH = 5000     # ten seconds of the fastest topic may wait for the recorder
+RECORDER_DEPTH = 5000     # five seconds of a 1 kHz topic may wait for the recorder
 
 
 def reliable(depth):

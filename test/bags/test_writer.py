@@ -19,6 +19,8 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from pam_actuation.bags import codecs, layout
+from pam_actuation.bags.check import independent_readers
+from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_sim.errors import InputError
 import pytest
@@ -188,3 +190,43 @@ def test_same_messages_give_the_same_bytes(tmp_path):
         tmp_path / 'b/run/run_0.mcap').read_bytes()
     assert (tmp_path / 'a/run/metadata.yaml').read_bytes() == (
         tmp_path / 'b/run/metadata.yaml').read_bytes()
+
+
+@pytest.mark.parametrize('limits', ({'max_file_s': 0.05 * 4}, {'max_file_bytes': 100_000}))
+def test_split_bags_are_one_bag_everywhere(tmp_path, limits):
+    count = 3000
+    raw = codecs.encode('controller_state', example_messages()['controller_state'])
+    with BagWriter(tmp_path / 'run', METADATA, **limits) as writer:
+        writer.add_topic('/muscle/controller_state', codecs.TOPIC_TYPES['controller_state'])
+        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+        for i in range(count):
+            writer.write('/muscle/controller_state', raw, START_NS + i * 500_000, START_NS)
+    files = writer.files
+    assert len(files) >= 3 and [file.name for file in files] == [
+        f'run_{k}.mcap' for k in range(len(files))]
+    facts = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())[
+        layout.METADATA_ROOT]
+    assert facts['relative_file_paths'] == [file.name for file in files]
+    assert sum(file['message_count'] for file in facts['files']) == count
+    assert facts['message_count'] == count
+    for first, second in zip(facts['files'], facts['files'][1:]):
+        end = first['starting_time']['nanoseconds_since_epoch'] + first['duration'][
+            'nanoseconds']
+        assert second['starting_time']['nanoseconds_since_epoch'] == end + 500_000
+    if 'max_file_s' in limits:
+        assert {f['message_count'] for f in facts['files'][:-1]} == {400}
+    for counts in independent_readers(tmp_path / 'run').values():
+        assert counts == {'/muscle/controller_state': count}
+    found = read_bag(tmp_path / 'run')
+    assert found.counts == {'/muscle/controller_state': count, '/muscle/pressure': 0}
+    assert list(found.topics['/muscle/controller_state'].log_time_ns) == [
+        START_NS + i * 500_000 for i in range(count)]
+    # Every file alone is a bag too, with the experiment inside.
+    assert read_bag(files[1]).experiment == METADATA
+
+
+def test_limits_too_small_for_a_file_are_refused(tmp_path):
+    for limits in ({'max_file_bytes': 5000}, {'max_file_s': 0.01}, {'max_file_s': -1.0}):
+        with pytest.raises(InputError, match='give 0'):
+            BagWriter(tmp_path / 'run', **limits)
+    assert not (tmp_path / 'run').exists()

@@ -44,6 +44,10 @@ MISTAKES = {
         'reference_generator', ['experiment:=nothing'], 'nothing', 'sine_quarter_hz'),
     'experiment_recorder topic': (
         'experiment_recorder', ['topics:=[pressure, tension]'], "'tension'", 'contraction'),
+    'experiment_recorder extra': (
+        'experiment_recorder', ['extra_topics:=[/bench/imu]'], "'/bench/imu'", 'NAME=TYPE'),
+    'experiment_recorder size': (
+        'experiment_recorder', ['max_bagfile_size_bytes:=1000'], '1000 bytes', '100000'),
 }
 
 

@@ -1,0 +1,128 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One data file of a bag while it is written: stream, lock, topics and counts."""
+
+import contextlib
+import functools
+import os
+
+from pam_actuation.bags import disk, layout
+from pam_actuation.bags.mcap_write import McapWriter
+
+LIBRARY = 'pam_actuation'
+
+
+class DataFile:
+    """
+    One .mcap file being written; a failed start leaves no file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Must not exist.
+    begin : callable
+        Gets this object and writes what the file begins with.
+
+    Raises
+    ------
+    OSError
+        The file system refuses.
+
+    """
+
+    def __init__(self, path, begin):
+        self.path = path
+        self.count = 0
+        self.start_ns = self.end_ns = None
+        self._synced = 0
+        self._schemas, self._channels = {}, {}
+        self._stream = open(path, 'xb', buffering=0)
+        try:
+            # Held while recording, so that nobody repairs a file that is being written.
+            disk.lock(self._stream)
+            self.mcap = McapWriter(
+                functools.partial(disk.write_all, self._stream), library=LIBRARY)
+            begin(self)
+        except OSError:
+            self._stream.close()
+            path.unlink()
+            raise
+
+    def register(self, name, type_name, qos, type_hash):
+        """Announce a topic with its definition."""
+        if type_name not in self._schemas:
+            self._schemas[type_name] = self.mcap.add_schema(
+                type_name, 'ros2msg', layout.schema_text(type_name).encode())
+        self._channels[name] = self.mcap.add_channel(
+            name, self._schemas[type_name], {
+                'offered_qos_profiles': layout.to_yaml(list(qos)),
+                'topic_type_hash': type_hash,
+            })
+
+    def write(self, name, data, log_time_ns, publish_time_ns):
+        """Append one message; KeyError for a topic that was not announced."""
+        self.mcap.add_message(self._channels[name], log_time_ns, data, publish_time_ns)
+        self.count += 1
+        if self.start_ns is None:
+            self.start_ns = self.end_ns = log_time_ns
+        elif log_time_ns > self.end_ns:
+            self.end_ns = log_time_ns
+        elif log_time_ns < self.start_ns:
+            self.start_ns = log_time_ns
+
+    @property
+    def size(self):
+        """Return the bytes written, those of the open chunk included."""
+        return self.mcap.offset + self.mcap.pending
+
+    @property
+    def facts(self):
+        """Return what metadata.yaml says of the file."""
+        return layout.FileFacts(self.path.name, self.start_ns, self.end_ns, self.count)
+
+    def handle_to_sync(self):
+        """Return a file descriptor of its own for ``disk.sync``, None if nothing is new."""
+        if self.mcap.offset == self._synced:
+            return None
+        self._synced = self.mcap.offset
+        return os.dup(self._stream.fileno())
+
+    def finish(self):
+        """Write the index and close."""
+        self.mcap.finish()
+        disk.sync(self._stream.fileno())
+        self._stream.close()
+
+    def cut(self):
+        """Take back what a failed write left behind; return messages in the file by topic."""
+        with contextlib.suppress(OSError):
+            self._truncate()
+            self.mcap.close_chunk()
+        self._truncate()
+        in_file = self.mcap.counts
+        self.count = sum(in_file.values())
+        self.start_ns, self.end_ns = self.mcap.span_ns
+        return {name: in_file.get(channel, 0) for name, channel in self._channels.items()}
+
+    def _truncate(self):
+        self._stream.truncate(self.mcap.offset)
+        self._stream.seek(self.mcap.offset)
+
+    def abandon(self):
+        """Close without an index."""
+        with contextlib.suppress(OSError):
+            self._truncate()
+        with contextlib.suppress(OSError):
+            self._stream.close()

@@ -1,0 +1,180 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Walk over a damaged MCAP file and yield every record that is whole."""
+
+import struct
+import zlib
+
+import lz4.frame
+from mcap.opcode import Opcode
+from pam_actuation.bags.mcap_write import CHUNK_HEAD, MAGIC, RECORD
+import zstandard
+
+_TEXT = struct.Struct('<I')
+_LENGTH = struct.Struct('<Q')
+_MESSAGE_HEAD = struct.Struct('<HIQQ')
+# No recorder makes chunks near this size; a damaged length must not fill the memory.
+LARGEST_CHUNK_BYTES = 2**30
+_TAKEN = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA)
+
+
+class Walk:
+    """
+    Iterate over (opcode, content, unpacked records of a chunk or None).
+
+    Attributes
+    ----------
+    bytes : int
+        Bytes that could not be read.
+    inside : bool
+        Whether some of them are more than a last record that was not written to its end.
+    finished : bool
+        Whether the end of the data was marked.
+
+    """
+
+    def __init__(self, data):
+        self._data = data
+        self._channels, self._schemas = set(), {0}
+        self.bytes = 0
+        self.inside = False
+        self.finished = False
+
+    def __iter__(self):
+        """Yield the whole records in file order."""
+        data, size = self._data, len(self._data)
+        position = len(MAGIC) if size >= len(MAGIC) else size
+        while position < size:
+            if position + RECORD.size > size:
+                self.bytes += size - position
+                return
+            opcode, length = RECORD.unpack_from(data, position)
+            begin, end = position + RECORD.size, position + RECORD.size + length
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                self.finished = data[size - len(MAGIC):size] == MAGIC
+                return
+            if end > size or not 1 <= opcode <= 15:
+                self._lost_from(position)
+                return
+            if opcode == Opcode.CHUNK:
+                yield from self._chunk(data[begin:end], end == size)
+            elif opcode in _TAKEN:
+                yield from self._single(opcode, data[begin:end])
+            elif opcode == Opcode.ATTACHMENT:
+                self.bytes += length        # nothing of ours has them: the former file is kept
+                self.inside = True
+            position = end
+
+    def _lost_from(self, position):
+        """Count the rest; an unknown opcode means damage unless only zeros follow it."""
+        rest = self._data[position:]
+        self.bytes += len(rest)
+        torn = RECORD.unpack_from(rest)[0] in (
+            Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.HEADER)
+        self.inside = self.inside or (not torn and bool(rest.strip(b'\0')))
+
+    def _chunk(self, content, is_last):
+        records = unpack(content)
+        if records is None or not self._known(records):
+            self.bytes += len(content)
+            self.inside = self.inside or not is_last
+            return
+        yield Opcode.CHUNK, content, records
+
+    def _known(self, records):
+        """Tell whether all records of a chunk fit together with what came before."""
+        channels, schemas = set(self._channels), set(self._schemas)
+        position, size = 0, len(records)
+        try:
+            while position < size:
+                opcode, length = RECORD.unpack_from(records, position)
+                begin, position = position + RECORD.size, position + RECORD.size + length
+                if position > size or not _fits(opcode, records, begin, channels, schemas):
+                    return False
+        except struct.error:
+            return False
+        self._channels, self._schemas = channels, schemas
+        return True
+
+    def _single(self, opcode, content):
+        try:
+            if _fits(opcode, content, 0, self._channels, self._schemas):
+                yield opcode, content, None
+                return
+        except struct.error:
+            pass
+        self.bytes += len(content)
+        self.inside = True
+
+
+def _fits(opcode, data, begin, channels, schemas):
+    """Tell whether a record's numbers are known; remember those it announces."""
+    if opcode == Opcode.MESSAGE:
+        return _MESSAGE_HEAD.unpack_from(data, begin)[0] in channels
+    if opcode == Opcode.SCHEMA:
+        schemas.add(int.from_bytes(data[begin:begin + 2], 'little'))
+    elif opcode == Opcode.CHANNEL:
+        channels.add(int.from_bytes(data[begin:begin + 2], 'little'))
+        return int.from_bytes(data[begin + 2:begin + 4], 'little') in schemas
+    return True
+
+
+def unpack(content):
+    """Return the records of a chunk; None if it is not whole."""
+    try:
+        _, _, size, crc = CHUNK_HEAD.unpack_from(content)
+        begin = CHUNK_HEAD.size + _TEXT.size
+        compression = content[begin:begin + _TEXT.unpack_from(content, CHUNK_HEAD.size)[0]]
+        begin += len(compression)
+        length = _LENGTH.unpack_from(content, begin)[0]
+        packed = content[begin + _LENGTH.size:]
+        if length != len(packed) or size > LARGEST_CHUNK_BYTES:
+            return None
+        if compression == b'zstd':
+            records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+        elif compression == b'lz4':
+            records = lz4.frame.decompress(packed)
+        else:
+            records = packed if compression == b'' else None
+    except (struct.error, zstandard.ZstdError, RuntimeError, MemoryError):
+        return None
+    if records is None or len(records) != size or (crc and zlib.crc32(records) != crc):
+        return None
+    return records
+
+
+def message(content):
+    """Return channel, log time [ns], data, publish time [ns] and sequence of a message."""
+    channel, sequence, log_time_ns, publish_time_ns = _MESSAGE_HEAD.unpack_from(content)
+    return channel, log_time_ns, content[_MESSAGE_HEAD.size:], publish_time_ns, sequence
+
+
+def header(data):
+    """Return (profile, library) of a file's first record, ('', '') if it cannot be read."""
+    try:
+        opcode, _ = RECORD.unpack_from(data, len(MAGIC))
+        if opcode != Opcode.HEADER:
+            return '', ''
+        texts, position = [], len(MAGIC) + RECORD.size
+        for _ in range(2):
+            length = _TEXT.unpack_from(data, position)[0]
+            text = data[position + _TEXT.size:position + _TEXT.size + length]
+            if len(text) < length:
+                return '', ''
+            texts.append(text.decode())
+            position += _TEXT.size + length
+        return tuple(texts)
+    except (struct.error, UnicodeDecodeError):
+        return '', ''

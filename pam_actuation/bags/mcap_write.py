@@ -1,0 +1,288 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Write MCAP so that every moment leaves a readable file: chunks closed on demand.
+
+Records come from the ``mcap`` package. Its own writer closes a chunk only by size, packs
+every message field by field and cannot take over chunks of another file; a recorder
+needs a chunk to end by the clock, few microseconds per message, and recovery copies
+chunks as they are. Format: https://mcap.dev/spec.
+"""
+
+import io
+import struct
+import zlib
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex, Schema, Statistics,
+    SummaryOffset)
+import numpy as np
+import zstandard
+
+MAGIC = b'\x89MCAP0\r\n'
+CHUNK_BYTES = 128 * 1024           # of unpacked records: what one damaged place may cost
+RECORD = struct.Struct('<BQ')
+MESSAGE = struct.Struct('<BQHIQQ')
+MESSAGE_OVERHEAD = MESSAGE.size - RECORD.size
+CHUNK_HEAD = struct.Struct('<QQQI')
+_TEXT_LENGTH = struct.Struct('<I')
+_DATA_LENGTH = struct.Struct('<Q')
+_INDEX_HEAD = struct.Struct('<BQHI')
+_CONTENT_CRC = struct.Struct('<BQQQ')
+
+
+class McapWriter:
+    """
+    One file being written.
+
+    Parameters
+    ----------
+    write : callable
+        Takes bytes and writes all of them, or raises OSError.
+    profile, library : str
+        Content of the header.
+    chunk_bytes : int
+        A chunk of this size is closed; ``close_chunk`` closes it earlier.
+
+    Attributes
+    ----------
+    offset : int
+        Bytes written so far.
+    pending : int
+        Bytes of records in the open chunk.
+
+    """
+
+    def __init__(self, write, profile='ros2', library='', chunk_bytes=CHUNK_BYTES):
+        self._write_all = write
+        self._chunk_bytes = chunk_bytes
+        self._compressor = zstandard.ZstdCompressor()
+        self.offset = 0
+        self._schemas = {}
+        self._channels = {}
+        self._counts = {}
+        self._chunks = []
+        self._metadata = []
+        self._start_ns = self._end_ns = None
+        self._begin_chunk()
+        self._write(MAGIC + _bytes(Header(profile=profile, library=library)))
+
+    def _write(self, data):
+        self._write_all(data)
+        self.offset += len(data)
+
+    def _begin_chunk(self):
+        self._parts = []
+        self.pending = 0
+        self._index = {}
+
+    def add_schema(self, name, encoding, data):
+        """Announce a message definition (bytes); returns its number."""
+        schema = Schema(
+            id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
+        self._schemas[schema.id] = schema
+        self._append(_bytes(schema))
+        return schema.id
+
+    def add_channel(self, topic, schema, metadata, encoding='cdr'):
+        """Announce a topic with the number of its definition; returns its number."""
+        channel = Channel(
+            id=len(self._channels) + 1, topic=topic, message_encoding=encoding,
+            schema_id=schema, metadata=metadata)
+        self._channels[channel.id] = channel
+        self._append(_bytes(channel))
+        return channel.id
+
+    def _append(self, record):
+        self._parts.append(record)
+        self.pending += len(record)
+
+    def add_message(self, channel, log_time_ns, data, publish_time_ns, sequence=0):
+        """Append one message to the open chunk."""
+        size = len(data)
+        self._parts += (
+            MESSAGE.pack(5, MESSAGE_OVERHEAD + size, channel, sequence, log_time_ns,
+                         publish_time_ns), data)
+        index = self._index.get(channel)
+        if index is None:
+            index = self._index[channel] = []
+        index += (log_time_ns, self.pending)
+        self.pending += MESSAGE.size + size
+        if self.pending >= self._chunk_bytes:
+            self.close_chunk()
+
+    def add_metadata(self, name, texts):
+        """Append a named record of texts, after the chunk before it."""
+        self.close_chunk()
+        record = _bytes(Metadata(name=name, metadata=texts))
+        self._metadata.append(MetadataIndex(offset=self.offset, length=len(record), name=name))
+        self._write(record)
+
+    def close_chunk(self):
+        """Write the open chunk, with checksum and message index, in one piece."""
+        if not self._parts:
+            return
+        records = b''.join(self._parts)
+        index = self._index
+        self._begin_chunk()
+        times = [time for entries in index.values() for time in entries[::2]]
+        packed = self._compressor.compress(records)
+        compression = b'zstd'
+        content = b''.join((
+            CHUNK_HEAD.pack(
+                min(times, default=0), max(times, default=0), len(records),
+                zlib.crc32(records)),
+            _TEXT_LENGTH.pack(len(compression)), compression,
+            _DATA_LENGTH.pack(len(packed)), packed))
+        self._write_chunk(content, index)
+
+    def copy_chunk(self, content, records):
+        """
+        Append a chunk of another file as it is.
+
+        Parameters
+        ----------
+        content : bytes
+            The chunk record without opcode and length.
+        records : bytes
+            The same, unpacked; its schemas and channels keep their numbers.
+
+        """
+        self.close_chunk()
+        index = {}
+        position = 0
+        while position < len(records):
+            opcode, length = RECORD.unpack_from(records, position)
+            begin = position + RECORD.size
+            if opcode == Opcode.MESSAGE:
+                _, _, channel, _, log_time_ns, _ = MESSAGE.unpack_from(records, position)
+                index.setdefault(channel, []).extend((log_time_ns, position))
+            else:
+                self.note(opcode, records[begin:begin + length])
+            position = begin + length
+        self._write_chunk(content, index)
+
+    def note(self, opcode, content):
+        """Remember a schema or channel that stands in a copied part of the file."""
+        stream = ReadDataStream(io.BytesIO(content))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self._schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream)
+            self._channels.setdefault(channel.id, channel)
+
+    def copy_record(self, opcode, content):
+        """Append a schema or channel of another file that stood outside of chunks."""
+        self.note(opcode, content)
+        self._append(RECORD.pack(opcode, len(content)) + content)
+
+    def _write_chunk(self, content, index):
+        chunk = RECORD.pack(Opcode.CHUNK, len(content)) + content
+        start_ns, end_ns, size, _ = CHUNK_HEAD.unpack_from(content)
+        compression, packed = _compression(content)
+        parts, offsets, position = [chunk], {}, self.offset + len(chunk)
+        for channel, entries in index.items():
+            pairs = np.array(entries, dtype='<u8').tobytes()
+            record = _INDEX_HEAD.pack(
+                Opcode.MESSAGE_INDEX, 6 + len(pairs), channel, len(pairs)) + pairs
+            parts.append(record)
+            offsets[channel] = position
+            position += len(record)
+        summary = ChunkIndex(
+            chunk_length=len(chunk), chunk_start_offset=self.offset, compression=compression,
+            compressed_size=packed, message_end_time=end_ns, message_start_time=start_ns,
+            message_index_length=position - self.offset - len(chunk),
+            message_index_offsets=offsets, uncompressed_size=size)
+        self._write(b''.join(parts))
+        self._chunks.append(summary)
+        for channel, entries in index.items():
+            self._counts[channel] = self._counts.get(channel, 0) + len(entries) // 2
+        if index:
+            self._start_ns = start_ns if self._start_ns is None else min(
+                self._start_ns, start_ns)
+            self._end_ns = end_ns if self._end_ns is None else max(self._end_ns, end_ns)
+
+    @property
+    def schemas(self):
+        """Return the schemas by number."""
+        return self._schemas
+
+    @property
+    def channels(self):
+        """Return the channels by number."""
+        return self._channels
+
+    @property
+    def counts(self):
+        """Return the number of messages in closed chunks, by channel number."""
+        return dict(self._counts)
+
+    @property
+    def span_ns(self):
+        """Return the first and last log time [ns] of closed chunks, (None, None) if none."""
+        return self._start_ns, self._end_ns
+
+    def finish(self):
+        """Close the last chunk; write summary, footer and end mark."""
+        self.close_chunk()
+        self._write(_bytes(DataEnd(data_section_crc=0)))
+        start = self.offset
+        summary, offsets = b'', b''
+        for opcode, records in (
+                (Opcode.SCHEMA, self._schemas.values()),
+                (Opcode.CHANNEL, self._channels.values()),
+                (Opcode.STATISTICS, [self._statistics()]),
+                (Opcode.CHUNK_INDEX, self._chunks),
+                (Opcode.METADATA_INDEX, self._metadata)):
+            group = b''.join(map(_bytes, records))
+            if group:
+                offsets += _bytes(SummaryOffset(
+                    group_opcode=opcode, group_start=start + len(summary),
+                    group_length=len(group)))
+                summary += group
+        offset_start = start + len(summary)
+        body = summary + offsets
+        crc = zlib.crc32(_CONTENT_CRC.pack(Opcode.FOOTER, 20, start, offset_start),
+                         zlib.crc32(body))
+        footer = Footer(
+            summary_start=start, summary_offset_start=offset_start, summary_crc=crc)
+        self._write(body + _bytes(footer) + MAGIC)
+
+    def _statistics(self):
+        return Statistics(
+            attachment_count=0, channel_count=len(self._channels),
+            channel_message_counts=dict(self._counts), chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()), metadata_count=len(self._metadata),
+            message_start_time=self._start_ns or 0, message_end_time=self._end_ns or 0,
+            schema_count=len(self._schemas))
+
+
+def _bytes(record):
+    """Return a record of the ``mcap`` package as bytes."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()
+
+
+def _compression(content):
+    """Return (name, packed size) of a chunk record."""
+    begin = CHUNK_HEAD.size
+    length = _TEXT_LENGTH.unpack_from(content, begin)[0]
+    begin += _TEXT_LENGTH.size
+    name = content[begin:begin + length].decode()
+    return name, _DATA_LENGTH.unpack_from(content, begin + length)[0]

@@ -1,0 +1,272 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Make a whole bag of a recording that broke off: ``recover_bag(path)``.
+
+Every chunk whose checksum holds is copied byte for byte, so that no message changes; the
+indexes, the statistics and metadata.yaml are made anew. A file is replaced only when
+its successor is complete and on the disk.
+"""
+
+from dataclasses import asdict, dataclass
+import io
+import mmap
+import os
+from pathlib import Path
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Metadata
+from pam_actuation.bags import disk, layout, mcap_salvage
+from pam_actuation.bags.data_file import LIBRARY
+from pam_actuation.bags.mcap_write import MAGIC, McapWriter
+from pam_actuation.bags.metadata import software_version
+from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
+from pam_sim.errors import InputError
+import yaml
+
+RECOVERY_RECORD = 'pam_recovery'
+DAMAGED_SUFFIX = '.damaged'
+
+
+@dataclass
+class RecoveredFile:
+    """
+    What became of one file.
+
+    ``rebuilt`` is False for a file that was whole and stays as it is. ``unreadable_bytes``
+    could not be taken over; where they are more than an end that was not written,
+    the former file is kept beside the new one under the name ``kept``.
+    """
+
+    name: str
+    rebuilt: bool
+    messages: int
+    unreadable_bytes: int = 0
+    kept: str = ''
+
+
+@dataclass
+class Recovery:
+    """What ``recover_bag`` did; ``changed`` is False for a bag that was whole."""
+
+    path: str
+    changed: bool
+    files: list
+
+    @property
+    def messages(self):
+        """Return how many messages the bag holds."""
+        return sum(file.messages for file in self.files)
+
+    def to_dict(self):
+        """Return everything as plain data for JSON."""
+        return {**asdict(self), 'messages': self.messages}
+
+    def sentences(self):
+        """Return what was done, one sentence per line."""
+        if not self.changed:
+            return ['Nothing to repair: the bag is whole.']
+        lines = []
+        for file in self.files:
+            if file.rebuilt:
+                lines.append(
+                    f'{file.name}: index rebuilt, {file.messages} messages, '
+                    f'{file.unreadable_bytes} bytes were not readable'
+                    + (f'; the former file is {file.kept}.' if file.kept else '.'))
+        return lines or [f'{layout.METADATA_FILE} rebuilt.']
+
+
+def recover_bag(path):
+    """
+    Repair a bag where it lies; a whole bag is left untouched.
+
+    Parameters
+    ----------
+    path : path
+        Directory of a bag with MCAP storage, or one .mcap file.
+
+    Returns
+    -------
+    Recovery
+
+    Raises
+    ------
+    InputError
+        Nothing there, no MCAP file, one that is still being recorded, or no right or space to
+        write the repaired file.
+
+    """
+    path = Path(path)
+    if path.is_dir():
+        files = sorted(path.glob('*.mcap'), key=_by_number)
+    else:
+        files = [path] if path.is_file() and path.suffix == '.mcap' else []
+    if not files:
+        raise InputError('there is no .mcap file to repair here', path)
+    try:
+        return _recover(path, files)
+    except OSError as error:
+        raise InputError(
+            f'the repaired bag cannot be written ({error.strerror or error}); the recording is '
+            'as it was, copy it where there is space and the right to write', path) from None
+
+
+def _by_number(path):
+    digits = path.stem.rsplit('_', 1)[-1]
+    return (int(digits) if digits.isdigit() else -1, path.name)
+
+
+def _recover(path, files):
+    contents, done = _Contents(), []
+    for file in files:
+        done.append(_recover_file(file, contents))
+    changed = any(file.rebuilt for file in done)
+    if path.is_dir() and (changed or _announced(path) != contents.metadata()['message_count']):
+        layout.write_metadata(path, contents.metadata())
+        changed = True
+    return Recovery(str(path), changed, done)
+
+
+def _announced(path):
+    """Return the number of messages metadata.yaml announces, None if it cannot be read."""
+    try:
+        text = (path / layout.METADATA_FILE).read_text(encoding='utf-8')
+        return yaml.safe_load(text)[layout.METADATA_ROOT]['message_count']
+    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+        return None
+
+
+class _Contents:
+    """The topics and files seen so far, for metadata.yaml."""
+
+    def __init__(self):
+        self._files = []
+        self._topics = {}
+        self._experiment = {}
+
+    def add(self, name, writer, records):
+        """Take over what a file holds, as its writer knows it."""
+        counts = writer.counts
+        self._files.append(layout.FileFacts(name, *writer.span_ns, sum(counts.values())))
+        for number, channel in writer.channels.items():
+            schema = writer.schemas.get(channel.schema_id)
+            before = self._topics.get(channel.topic)
+            self._topics[channel.topic] = layout.TopicFacts(
+                channel.topic, schema.name if schema else '', _profiles(channel),
+                channel.metadata.get('topic_type_hash', ''),
+                counts.get(number, 0) + (before.count if before else 0))
+        self._experiment = records.get(EXPERIMENT_RECORD, self._experiment)
+
+    def metadata(self):
+        """Return the content of metadata.yaml."""
+        return layout.bag_metadata(self._files, list(self._topics.values()), self._experiment)
+
+
+def _profiles(channel):
+    try:
+        profiles = yaml.safe_load(channel.metadata.get('offered_qos_profiles', '') or '[]')
+        return tuple(dict(profile) for profile in profiles)
+    except (yaml.YAMLError, TypeError, ValueError):
+        return ()
+
+
+def _recover_file(file, contents):
+    with open(file, 'rb') as stream:
+        if not disk.lock(stream):
+            raise InputError('the file is still being recorded; end the recording first', file)
+        size = os.fstat(stream.fileno()).st_size
+        if not size:
+            return _rebuild(file, b'', contents)
+        with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            begin = data[:len(MAGIC)]
+            if not MAGIC.startswith(begin):
+                raise InputError('not an MCAP file (it begins with other bytes)', file)
+            return _rebuild(file, data, contents)
+
+
+def _rebuild(file, data, contents):
+    temporary = file.with_name(f'.{file.name}.{os.getpid()}')
+    try:
+        with open(temporary, 'xb', buffering=0) as stream:
+            profile, library = mcap_salvage.header(data)
+            writer = McapWriter(
+                lambda piece: disk.write_all(stream, piece), profile or 'ros2',
+                library or LIBRARY)
+            records, lost = _copy(data, writer)
+            writer.close_chunk()
+            messages = sum(writer.counts.values())
+            contents.add(file.name, writer, records)
+            if not lost.bytes and lost.finished and _is_indexed(file, messages):
+                return RecoveredFile(file.name, False, messages)
+            writer.add_metadata(RECOVERY_RECORD, {
+                'messages': str(messages), 'unreadable_bytes': str(lost.bytes),
+                'software_version': software_version()})
+            writer.add_metadata(
+                ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(contents.metadata())})
+            writer.finish()
+            os.fsync(stream.fileno())
+        kept = _keep_former(file) if lost.inside else ''
+        os.replace(temporary, file)
+        disk.sync_directory(file.parent)
+        return RecoveredFile(file.name, True, messages, lost.bytes, kept)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _copy(data, writer):
+    """Copy what is whole; returns the named records of texts and what was lost."""
+    named = {}
+    walk = mcap_salvage.Walk(data)
+    for opcode, content, records in walk:
+        if opcode == Opcode.CHUNK:
+            writer.copy_chunk(content, records)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            writer.copy_record(opcode, content)
+        elif opcode == Opcode.MESSAGE:
+            writer.add_message(*mcap_salvage.message(content))
+        elif opcode == Opcode.METADATA:
+            record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+            named[record.name] = record.metadata
+            if record.name != ROSBAG2_RECORD:
+                writer.add_metadata(record.name, record.metadata)
+    return named, walk
+
+
+def _is_indexed(file, messages):
+    """Tell whether the file's own index is there and counts the same messages."""
+    try:
+        with open(file, 'rb') as stream:
+            summary = make_reader(stream).get_summary()
+    except (McapError, ValueError, OSError):
+        return False
+    if summary is None or summary.statistics is None:
+        return False
+    chunks = summary.statistics.chunk_count
+    return summary.statistics.message_count == messages and (
+        len(summary.chunk_indexes) == chunks and (chunks > 0 or not messages))
+
+
+def _keep_former(file):
+    """Give a file that is damaged inside a second name, so that nothing is thrown away."""
+    kept = file.with_name(file.name + DAMAGED_SUFFIX)
+    number = 1
+    while kept.exists():
+        number += 1
+        kept = file.with_name(f'{file.name}{DAMAGED_SUFFIX}{number}')
+    os.link(file, kept)
+    return kept.name

@@ -1,0 +1,220 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Repairing a recording that broke off: whole again, nothing altered, nothing thrown away."""
+
+import random
+
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+from pam_actuation.bags import disk, recover
+from pam_actuation.bags.check import independent_readers
+from pam_actuation.bags.info import bag_info
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.recover import recover_bag
+from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.writer import BagWriter
+from pam_sim.errors import InputError
+import pytest
+from sample_bag import example_messages, METADATA, START_NS, write_bag
+import yaml
+
+COUNT = 300
+TOPICS = 11
+
+
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory):
+    bag = write_bag(tmp_path_factory.mktemp('whole') / 'run', COUNT)
+    return (bag / 'run_0.mcap').read_bytes(), read_bag(bag)
+
+
+def broken(tmp_path, data):
+    """Return a bag as a killed recorder leaves it: one file, no metadata.yaml."""
+    bag = tmp_path / 'run'
+    bag.mkdir(exist_ok=True)
+    for path in bag.iterdir():
+        path.unlink()
+    (bag / 'run_0.mcap').write_bytes(data)
+    return bag
+
+
+def assert_is_beginning(bag, original):
+    for name, topic in bag.topics.items():
+        reference = original.topics[name]
+        count = len(topic.payloads)
+        assert list(topic.payloads) == list(reference.payloads)[:count]
+        assert list(topic.log_time_ns) == list(reference.log_time_ns)[:count]
+        assert list(topic.publish_time_ns) == list(reference.publish_time_ns)[:count]
+
+
+def test_a_file_cut_anywhere_becomes_a_whole_bag(tmp_path, whole):
+    data, original = whole
+    rng = random.Random(4)
+    for length in (0, 5, 30, 300, *(rng.randrange(len(data)) for _ in range(4))):
+        bag = broken(tmp_path, data[:length])
+        done = recover_bag(bag)
+        assert done.changed and done.files[0].rebuilt and not done.files[0].kept
+        assert sorted(path.name for path in bag.iterdir()) == ['metadata.yaml', 'run_0.mcap']
+        found = read_bag(bag)
+        assert_is_beginning(found, original)
+        assert done.messages == sum(found.counts.values())
+        facts = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+        assert facts['version'] == 9 and facts['message_count'] == done.messages
+        for counts in independent_readers(bag).values():
+            assert sum(counts.values()) == done.messages
+        assert not recover_bag(bag).changed
+    info = bag_info(broken_and_repaired(tmp_path, data))
+    assert info.recovered and info.complete is False
+    assert any('broke off' in remark for remark in info.remarks)
+
+
+def broken_and_repaired(tmp_path, data):
+    bag = broken(tmp_path, data[:len(data) // 2])
+    recover_bag(bag)
+    return bag
+
+
+def test_the_repaired_bag_has_all_of_a_finished_one(tmp_path, whole):
+    data, _ = whole
+    bag = broken_and_repaired(tmp_path, data)
+    with open(bag / 'run_0.mcap', 'rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert len(summary.channels) == TOPICS and summary.chunk_indexes
+        assert all(index.message_index_offsets for index in summary.chunk_indexes)
+        messages = list(reader.iter_messages())
+        assert len(messages) == summary.statistics.message_count
+        times = [message.log_time for _, _, message in messages]
+        assert times == sorted(times) and times[0] == summary.statistics.message_start_time
+        names = [record.name for record in reader.iter_metadata()]
+    assert names == ['pam_experiment', 'pam_recovery', 'rosbag2']
+    facts = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert facts['custom_data'] == METADATA
+    topic = facts['topics_with_message_count'][0]['topic_metadata']
+    assert topic['offered_qos_profiles'][0]['reliability'] == 'reliable'
+    assert topic['type_description_hash'].startswith('RIHS01_')
+    assert load_run(bag).metadata['experiment_name'] == 'sine'
+
+
+def test_a_whole_bag_is_not_touched(tmp_path):
+    bag = write_bag(tmp_path / 'run', 20)
+    before = {path.name: (path.read_bytes(), path.stat().st_ino) for path in bag.iterdir()}
+    done = recover_bag(bag)
+    assert not done.changed and 'whole' in done.sentences()[0]
+    assert before == {
+        path.name: (path.read_bytes(), path.stat().st_ino) for path in bag.iterdir()}
+    (bag / 'metadata.yaml').unlink()
+    assert recover_bag(bag).changed
+    assert (bag / 'metadata.yaml').read_bytes() == before['metadata.yaml'][0]
+
+
+def test_a_damaged_chunk_is_left_out_and_the_former_file_kept(tmp_path, whole):
+    data, original = whole
+    with_hole = bytearray(data)
+    with open(broken(tmp_path, data) / 'run_0.mcap', 'rb') as stream:
+        second = make_reader(stream).get_summary().chunk_indexes[1]
+    with_hole[second.chunk_start_offset + second.chunk_length // 2] ^= 0xff
+    bag = broken(tmp_path, with_hole)
+    done = recover_bag(bag)
+    file, = done.files
+    assert file.kept == 'run_0.mcap.damaged'
+    assert (bag / file.kept).read_bytes() == with_hole
+    found = read_bag(bag)
+    assert 0 < done.messages < sum(original.counts.values())
+    for name, topic in found.topics.items():
+        assert set(topic.payloads) <= set(original.topics[name].payloads)
+        assert topic.payloads[-1] == original.topics[name].payloads[-1]
+
+
+def test_zeros_behind_the_last_chunk_are_an_end_not_damage(tmp_path, whole):
+    data, original = whole
+    bag = broken(tmp_path, data)
+    with open(bag / 'run_0.mcap', 'rb') as stream:
+        last = make_reader(stream).get_summary().chunk_indexes[-1]
+    bag = broken(tmp_path, data[:last.chunk_start_offset] + bytes(4096))
+    file, = recover_bag(bag).files
+    assert file.unreadable_bytes == 4096 and not file.kept
+    assert_is_beginning(read_bag(bag), original)
+
+
+def test_a_split_recording_is_repaired_from_all_its_files(tmp_path):
+    writer = BagWriter(tmp_path / 'run', METADATA, max_file_s=0.25)
+    payload = example_payload()
+    writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
+    for i in range(120):
+        writer.write('/muscle/pressure', payload, START_NS + i * 5_000_000, START_NS)
+    writer.flush()
+    writer.abandon()
+    names = ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
+    assert [path.name for path in writer.files] == names
+    done = recover_bag(tmp_path / 'run')
+    assert [file.rebuilt for file in done.files] == [False, False, True]
+    facts = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())[
+        'rosbag2_bagfile_information']
+    assert facts['relative_file_paths'] == names
+    assert [file['message_count'] for file in facts['files']] == [50, 50, 20]
+    assert facts['duration'] == {'nanoseconds': 119 * 5_000_000}
+    for counts in independent_readers(tmp_path / 'run').values():
+        assert counts == {'/muscle/pressure': 120}
+
+
+def example_payload():
+    from pam_actuation.bags.codecs import encode
+    return encode('pressure', example_messages()['pressure'])
+
+
+def test_foreign_files_are_indexed_too(tmp_path):
+    path = tmp_path / 'foreign.mcap'
+    for chunked in (False, True):
+        with open(path, 'wb') as stream:
+            writer = Writer(
+                stream, use_chunking=chunked, index_types=IndexType.NONE,
+                compression=CompressionType.LZ4, chunk_size=2000)
+            writer.start(profile='ros2')
+            schema = writer.register_schema('pkg/msg/Odd', 'ros2msg', b'int8 x')
+            channel = writer.register_channel('/odd', 'cdr', schema)
+            for i in range(200):
+                writer.add_message(channel, START_NS + i, bytes(range(30)), START_NS + 2 * i, i)
+            writer.finish()
+        assert recover_bag(path).files[0].rebuilt
+        with open(path, 'rb') as stream:
+            messages = [m for _, _, m in make_reader(stream).iter_messages()]
+        assert [m.sequence for m in messages] == list(range(200))
+        assert messages[7].publish_time == START_NS + 14
+        assert messages[7].data == bytes(range(30))
+
+
+def test_what_cannot_be_repaired_is_told(tmp_path, whole, monkeypatch):
+    data, _ = whole
+    with pytest.raises(InputError, match='no .mcap file'):
+        recover_bag(tmp_path)
+    other = tmp_path / 'other.mcap'
+    other.write_bytes(b'something else')
+    with pytest.raises(InputError, match='not an MCAP file'):
+        recover_bag(other)
+    writer = BagWriter(tmp_path / 'live', METADATA)
+    with pytest.raises(InputError, match='still being recorded'):
+        recover_bag(tmp_path / 'live')
+    writer.close()
+    bag = broken(tmp_path, data[:len(data) // 2])
+
+    def refuse(stream, piece):
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(disk, 'write_all', refuse)
+    with pytest.raises(InputError, match='No space left'):
+        recover.recover_bag(bag)
+    assert [path.name for path in bag.iterdir()] == ['run_0.mcap']
+    assert (bag / 'run_0.mcap').read_bytes() == data[:len(data) // 2]

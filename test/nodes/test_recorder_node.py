@@ -1,0 +1,117 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test the recorder as a process: splitting, further topics, a full disk, changing senders."""
+
+import resource
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
+from pam_actuation.bags.check import independent_readers                    # noqa: E402
+from pam_actuation.bags.codecs import encode                                # noqa: E402
+from pam_actuation.bags.info import bag_info                                # noqa: E402
+from pam_actuation.bags.recover import recover_bag                          # noqa: E402
+from pam_actuation.messages import Pressure                                 # noqa: E402
+from pam_actuation.nodes import qos                                         # noqa: E402
+from pam_actuation.rigging import session                                   # noqa: E402
+from pam_actuation.rigging.plan import make_plan, RECORDER                  # noqa: E402
+from sensor_msgs.msg import FluidPressure                                   # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+LONG = """\
+name: long
+domain: pressure
+segments:
+  - rest: {duration_s: 0.2}
+  - step: {to_pa: 300000.0, duration_s: 60.0}
+"""
+EXTRA = '/bench/supply'
+
+
+def message(number):
+    return encode('pressure', Pressure(time.time_ns(), 2e5 + number))
+
+
+def test_split_files_further_topics_and_changing_publishers(tmp_path):
+    bag = tmp_path / 'bag'
+    rig = LiveRig(tmp_path)
+    try:
+        rig.start(
+            RECORDER, output=str(bag), topics=['pressure', 'diagnostics'],
+            extra_topics=[f'{EXTRA}=sensor_msgs/msg/FluidPressure'], max_bagfile_duration_s=0.5)
+        rig.listen()
+        wait_for(lambda: any(h.message == 'recording' for h in rig.health[RECORDER]), 30.0,
+                 'the recorder')
+        node = rig.node
+
+        def send(topic, count, first=0):
+            """Join late, send, leave: what a sensor does that is plugged in on the way."""
+            publisher = node.create_publisher(FluidPressure, topic, qos.PUBLISHER)
+            wait_for(lambda: publisher.get_subscription_count() >= node.count_subscribers(topic)
+                     and node.count_subscribers(topic) > 0, 10.0, 'the subscription')
+            for number in range(first, first + count):
+                publisher.publish(message(number))
+                time.sleep(0.01)
+            time.sleep(0.1)
+            node.destroy_publisher(publisher)
+
+        send('/muscle/pressure', 60)
+        send(EXTRA, 50)
+        send('/muscle/pressure', 40, first=60)
+        recorder = rig.processes[RECORDER]
+        recorder.send_signal(15)
+        assert recorder.wait(20.0) and recorder.exit_code == 0, recorder.last_line()
+    finally:
+        rig.close()
+    info = bag_info(bag)
+    for topic, count in (('/muscle/pressure', 100), (EXTRA, 50)):
+        found = info.topic(topic)
+        assert (found.count, found.lost, found.dropped, found.missed_at_start) == (
+            count, 0, 0, 0)
+    assert len(list(bag.glob('bag_*.mcap'))) >= 3
+    for counts in independent_readers(bag).values():
+        assert counts['/muscle/pressure'] == 100 and counts[EXTRA] == 50
+
+
+def test_a_disk_that_refuses_ends_the_experiment_safely_and_keeps_the_record(tmp_path):
+    bag = tmp_path / 'bag'
+    plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'ppr', bag)
+    result = session.Result(str(bag))
+    limited = []
+    with session.RigSession(plan) as rig:
+        def fill_the_disk(done_s, total_s):
+            if done_s > 1.5 and not limited:
+                size = sum(path.stat().st_size for path in bag.iterdir()) + 2000
+                limited.append(size)
+                resource.prlimit(
+                    rig.processes[RECORDER].pid, resource.RLIMIT_FSIZE, (size, size))
+
+        session.run_guarded(rig, result, fill_the_disk)
+        driver = rig.client.statuses['/muscle/valve_driver']
+    plan.remove()
+    assert 'experiment_recorder ended with exit code 1' in result.failure
+    assert 'writing failed (File too large)' in result.failure
+    assert 2.0 < result.duration_s < 12.0
+    assert result.exit_codes.pop(RECORDER) == 1 and set(result.exit_codes.values()) == {0}
+    assert driver[1] == 'deactivated'           # with the signal that vents
+    recover_bag(bag)
+    info = bag_info(bag)
+    assert info.message_count > 500 and info.complete is False
+    for counts in independent_readers(bag).values():
+        assert sum(counts.values()) == info.message_count
