@@ -26,6 +26,7 @@ import struct
 import zlib
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex, Schema, Statistics,
@@ -177,19 +178,23 @@ class McapWriter:
         self._write_chunk(content, index)
 
     def note(self, opcode, content):
-        """Remember a schema or channel that stands in a copied part of the file."""
+        """Remember a schema or channel of a copied part; return whether it can be read."""
         stream = ReadDataStream(io.BytesIO(content))
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            self._schemas.setdefault(schema.id, schema)
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream)
-            self._channels.setdefault(channel.id, channel)
+        try:
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self._schemas.setdefault(schema.id, schema)
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream)
+                self._channels.setdefault(channel.id, channel)
+        except (McapError, ValueError, struct.error):
+            return False
+        return True
 
     def copy_record(self, opcode, content):
-        """Append a schema or channel of another file that stood outside of chunks."""
-        self.note(opcode, content)
-        self._append(RECORD.pack(opcode, len(content)) + content)
+        """Append a schema or channel of another file, outside of chunks, unless it is damaged."""
+        if self.note(opcode, content):
+            self._append(RECORD.pack(opcode, len(content)) + content)
 
     def _write_chunk(self, content, index):
         chunk = RECORD.pack(Opcode.CHUNK, len(content)) + content

@@ -25,6 +25,7 @@ import io
 import mmap
 import os
 from pathlib import Path
+import struct
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -240,7 +241,10 @@ def _copy(data, writer):
         elif opcode == Opcode.MESSAGE:
             writer.add_message(*mcap_salvage.message(content))
         elif opcode == Opcode.METADATA:
-            record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+            try:
+                record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+            except (McapError, ValueError, struct.error):
+                continue
             named[record.name] = record.metadata
             if record.name != ROSBAG2_RECORD:
                 writer.add_metadata(record.name, record.metadata)
@@ -252,7 +256,7 @@ def _is_indexed(file, messages):
     try:
         with open(file, 'rb') as stream:
             summary = make_reader(stream).get_summary()
-    except (McapError, ValueError, OSError):
+    except (McapError, ValueError, OSError, MemoryError, struct.error):
         return False
     if summary is None or summary.statistics is None:
         return False

@@ -40,6 +40,7 @@ VALUES = {
     'force': {'force_n': 'N'},
     'external_force': {'force_n': 'N'},
     'valve_signal': {'ppr_voltage': 'V'},
+    'valve_command': {'ppr_voltage': 'V'},
     'controller_state': {'tick': '1', 'error_m': 'm', 'learning': '1'},
 }
 
@@ -93,7 +94,8 @@ def test_hsv_signals(tmp_path):
 
 def test_missing_optional_topics(tmp_path):
     left_out = ('force', 'supply_pressure', 'reference', 'reference_trajectory',
-                'external_force', 'controller_state', 'pressure_command', 'diagnostics')
+                'external_force', 'controller_state', 'pressure_command', 'valve_command',
+                'diagnostics')
     run = load_run(write_bag(tmp_path / 'run', 5, leave_out=left_out))
     assert set(run.topics) == {'pressure', 'contraction', 'valve_signal'}
     assert run.reference_trajectories == ()

@@ -20,6 +20,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from pam_actuation.bags import disk, recover
 from pam_actuation.bags.check import independent_readers
+from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.recover import recover_bag
@@ -31,7 +32,7 @@ from sample_bag import example_messages, METADATA, START_NS, write_bag
 import yaml
 
 COUNT = 300
-TOPICS = 11
+TOPICS = len(TOPIC_TYPES)
 
 
 @pytest.fixture(scope='module')
