@@ -28,7 +28,6 @@ from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.muscle.geometry import LENGTH_M
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
@@ -50,9 +49,8 @@ def muscle_volume(run):
     rig = recorded_rig(run)
     if rig is None:
         return None
-    x = np.linspace(0.0, 0.25 * LENGTH_M, 301)
-    volume = np.array([rig.volume_m3(float(value)) for value in x])
-    return lambda contraction_m: np.interp(contraction_m, x, volume)
+    return lambda contraction_m: rig.volume_m3(
+        np.clip(contraction_m, 0.0, rig.muscle.stroke_m))
 
 
 def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,
