@@ -15,12 +15,11 @@
 """Model files and presets: YAML in, Rig out, and back."""
 
 from dataclasses import replace
-import os
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+from pam_sim.located_yaml import dump_yaml, Located
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
 from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import check_parameters
@@ -62,16 +61,9 @@ def load_rig(source, valve=None, fidelity=None):
     """
     if isinstance(source, Rig):
         rig = source
-    elif isinstance(source, Located):
-        rig = _from_mapping(source, None, ())
-    elif isinstance(source, str) and source in preset_names():
-        rig = _from_mapping(_PRESETS.read(source), source, (source,))
-    elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
-            and ': ' not in source and not source.endswith(('.yaml', '.yml')):
-        raise InputError(f'rig `{source}` is neither a preset nor a file; presets: '
-                         + ', '.join(preset_names()))
     else:
-        rig = _from_mapping(load_yaml(source), None, ())
+        data, name = _PRESETS.locate(source, 'rig')
+        rig = _from_mapping(data, name, (name,) if name else ())
     for value, choices, what in ((valve, VALVES, 'valve'), (fidelity, hsv.FIDELITIES, 'fidelity')):
         if value is not None and value not in choices:
             raise InputError(f'{what} `{value}` is not known; allowed: {", ".join(choices)}')

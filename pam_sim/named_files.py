@@ -14,9 +14,11 @@
 
 """Presets: YAML files of one folder of the package, each found by its name."""
 
+import os
 from pathlib import Path
 
-from pam_sim.located_yaml import load_yaml
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import load_yaml, Located
 
 _HERE = Path(__file__).parent
 
@@ -43,3 +45,31 @@ class NamedFiles:
         """Return the content of a file as a Located mapping."""
         path = self._folder / f'{name}.yaml'
         return load_yaml(path.read_text(encoding='utf-8'), name=path.name)
+
+    def locate(self, source, what):
+        """
+        Return (content, name): of a preset, a file or a text; the name is None but for a preset.
+
+        Parameters
+        ----------
+        source : str, os.PathLike or Located
+            Preset name, path, YAML text, or a mapping already read.
+        what : str
+            What is looked for, for the message.
+
+        Raises
+        ------
+        InputError
+            Neither a preset nor a file, or no YAML.
+
+        """
+        if isinstance(source, Located):
+            return source, None
+        if isinstance(source, str):
+            if source in self.names():
+                return self.read(source), source
+            if '\n' not in source and not os.path.exists(source) \
+                    and ': ' not in source and not source.endswith(('.yaml', '.yml')):
+                raise InputError(f'{what} `{source}` is neither a preset nor a file; presets: '
+                                 + ', '.join(self.names()))
+        return load_yaml(source), None

@@ -146,6 +146,11 @@ class Rig:
         """Names of the valve signals, in order."""
         return ppr.SIGNAL_NAMES if self.valve == 'ppr' else hsv.SIGNAL_NAMES
 
+    @property
+    def signal_range(self):
+        """Smallest and largest value of a valve signal, and its unit."""
+        return ppr.SIGNAL_RANGE if self.valve == 'ppr' else hsv.SIGNAL_RANGE
+
     def effect(self, name):
         """Return the setting of an effect of this rig, or None."""
         return next((item for item in self.effects if item.name == name), None)

@@ -14,8 +14,6 @@
 
 """Model files and presets of joints: YAML in, JointRig out, and back."""
 
-import os
-
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS
 from pam_sim.joint.rig import JointRig, SIDES
@@ -56,16 +54,8 @@ def load_joint(source, valve=None, fidelity=None):
     """
     if isinstance(source, JointRig):
         joint = source
-    elif isinstance(source, Located):
-        joint = _from_mapping(source, None)
-    elif isinstance(source, str) and source in joint_preset_names():
-        joint = _from_mapping(_PRESETS.read(source), source)
-    elif isinstance(source, str) and '\n' not in source and not os.path.exists(source) \
-            and ': ' not in source and not source.endswith(('.yaml', '.yml')):
-        raise InputError(f'joint `{source}` is neither a preset nor a file; presets: '
-                         + ', '.join(joint_preset_names()))
     else:
-        joint = _from_mapping(load_yaml(source), None)
+        joint = _from_mapping(*_PRESETS.locate(source, 'joint'))
     return joint.with_(valve=valve, fidelity=fidelity)
 
 

@@ -19,9 +19,8 @@ The compiled kernel of the registered effects.
 arrays are laid out as in :mod:`pam_sim.rollout.layout`.
 """
 
-from pam_sim.rollout.generate import kernel_hash, load_kernel
+from pam_sim.rollout.generate import load_kernel
 
-KERNEL_HASH = kernel_hash()
 _module = load_kernel()
 step = _module.step
 look = _module.look

@@ -27,7 +27,7 @@ from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.generate import effect_layout, hook_flag, law_codes
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
-from pam_sim.valve import hsv, ppr
+from pam_sim.valve import hsv
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
 _PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
@@ -82,7 +82,7 @@ def _numbers(rig, dt_s, pressure, contraction, signal):
                   if rig.valve == 'ppr' else (0.0, 0.0))
     else:
         signal = np.atleast_1d(np.asarray(signal, dtype=float))
-        lower, upper, unit = ppr.SIGNAL_RANGE if rig.valve == 'ppr' else hsv.SIGNAL_RANGE
+        lower, upper, unit = rig.signal_range
         if signal.shape != (len(rig.signal_names),):
             raise InputError(f'`initial_signal` has {signal.size} numbers; valve `{rig.valve}` '
                              f'takes {len(rig.signal_names)}')

@@ -24,7 +24,6 @@ from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.response import Response
 from pam_sim.rollout import kernel, layout
 from pam_sim.units import P_ATM_PA
-from pam_sim.valve import hsv, ppr
 
 MAX_FORCE_N = 1e5
 # Of the length at rest: a sensor may read a little below zero.
@@ -103,9 +102,8 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
         raise InputError(f'has shape {np.shape(valve_signal)}; valve `{rig.valve}` takes {shape}, '
                          'N at least 1', 'valve_signal')
     count = len(signal)
-    limits = ppr.SIGNAL_RANGE if rig.valve == 'ppr' else hsv.SIGNAL_RANGE
     for column, name in enumerate(rig.signal_names):
-        _check_range(signal[:, column], *limits, name)
+        _check_range(signal[:, column], *rig.signal_range, name)
     inputs = np.zeros((count, layout.INP_SIZE))
     inputs[:, :wanted] = signal
     if external_force_n is not None:
