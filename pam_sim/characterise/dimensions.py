@@ -15,10 +15,10 @@
 """Size of a muscle, and the air in it when it is taken for a cylinder."""
 
 from dataclasses import dataclass
-import math
 
 from pam_sim.errors import InputError
 from pam_sim.muscle import geometry
+from pam_sim.muscle.muscle import Muscle
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 
 
@@ -72,10 +72,8 @@ class Dimensions:
         """Return the volume [m^3] of muscle and dead volume at a contraction; broadcasts."""
         if self.bore_m is None:
             raise InputError('is not known, so the volume of air is not either', 'muscle, bore')
-        thread, turns = geometry.braid(self.length_m, self.bore_m, self.braid_angle_rad)
-        return self.dead_volume_m3 + geometry.volume_of(
-            self.length_m * strain, self.length_m, thread * thread,
-            1.0 / (4.0 * math.pi * turns * turns))
+        muscle = Muscle('measured', self.length_m, self.bore_m, self.braid_angle_rad)
+        return self.dead_volume_m3 + muscle.volume_m3(self.length_m * strain)
 
     def volume_slope_m3(self, strain):
         """Return dV/d(contraction as a fraction) [m^3]; broadcasts."""
