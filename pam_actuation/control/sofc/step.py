@@ -50,6 +50,7 @@ def _start(par, inverse, values, kept, st, inp):
     st[:] = 0.0
     st[at.S_STARTED] = 1.0
     st[at.S_RATE_FACTOR] = 1.0
+    st[at.S_RATE_CEILING] = 1.0
     st[at.S_SHARE] = 0.5
     st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
     st[at.S_CONTRACTION] = x
@@ -137,7 +138,7 @@ def _learn(par, values, initial, ring, st, index):
     tick = int(st[at.S_TICK])
     delay = int(par[at.P_DELAY])
     spread = int(par[at.P_SPREAD])
-    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR]
+    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
     dose = rate * index * par[at.P_PERIOD]
     leak = abs(index) * par[at.P_PERIOD]
     fb_squares = 0.0
@@ -379,7 +380,7 @@ def _guard(par, values, kept, st, inp, error, reason, out):
         st[at.S_HISTORY] = 1.0        # no credit for rules that are gone
     out[at.O_WINDOW] = st[at.S_FORMER]
     out[at.O_BEST] = st[at.S_BEST]
-    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR]
+    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
     out[at.O_ROLLED_BACK] = st[at.S_ROLLED_BACK]
 
 
