@@ -233,7 +233,7 @@ class ClosedLoop:
         log = np.empty((self.ticks, module.LOG_SIZE))
         rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
         rollout(
-            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver(), self._timing,
-            controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
+            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver(),
+            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
             self._quantum, self._disturbance, mask, controller.compiled_arguments(), log)
         return log
