@@ -237,13 +237,15 @@ def _copy(data, writer):
         if opcode == Opcode.CHUNK:
             writer.copy_chunk(content, records)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            writer.copy_record(opcode, content)
+            if not writer.copy_record(opcode, content):
+                walk.lose(content)
         elif opcode == Opcode.MESSAGE:
             writer.add_message(*mcap_salvage.message(content))
         elif opcode == Opcode.METADATA:
             try:
                 record = Metadata.read(ReadDataStream(io.BytesIO(content)))
             except (McapError, ValueError, struct.error):
+                walk.lose(content)
                 continue
             named[record.name] = record.metadata
             if record.name != ROSBAG2_RECORD:
