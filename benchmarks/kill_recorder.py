@@ -215,7 +215,8 @@ def publish(path):
     from pam_actuation.nodes.conversions import MESSAGE_TYPES
     from pam_actuation.nodes.endpoints import CountedPublisher, wait_until_matched
     import rclpy
-    rclpy.init()
+    from rclpy.signals import SignalHandlerOptions
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)      # SIGTERM ends it at once
     node = rclpy.create_node('numbers', namespace='/muscle')
     publishers = {topic: CountedPublisher(node, MESSAGE_TYPES[topic], topic)
                   for topic in NODE_RATES_HZ}

@@ -153,6 +153,15 @@ def test_an_unreadable_description_is_lost_not_forgotten(tmp_path, whole):
     assert done.messages == sum(original.counts.values())
 
 
+@pytest.mark.parametrize('text', ('[' * 100_000, 'a: ' * 3000, 'n: 1e999999999', '- 2024-99-99'))
+def test_a_description_that_is_none_is_made_anew(tmp_path, whole, text):
+    data, original = whole
+    bag = broken(tmp_path, data)
+    (bag / 'metadata.yaml').write_text(text)
+    assert recover_bag(bag).changed
+    assert read_bag(bag).counts == original.counts
+
+
 def test_zeros_behind_the_last_chunk_are_an_end_not_damage(tmp_path, whole):
     data, original = whole
     bag = broken(tmp_path, data)
