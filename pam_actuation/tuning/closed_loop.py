@@ -32,6 +32,7 @@ from pam_actuation.control.sofc import step as sofc_step_module
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import initial_state
+from pam_actuation.tuning import loop_parts
 from pam_sim.errors import InputError
 from pam_sim.rollout import layout
 from pam_sim.rollout.generate import kernel_hash, load_cached_module
@@ -48,7 +49,7 @@ def compiled_rollouts():
     key.update(kernel_hash().encode())
     for names in (sofc_step_module.SOURCES, pid.SOURCES):
         key.update(str(compiled_entry.source_key(*names)).encode())
-    for module in (hsv_kernel, ppr):
+    for module in (hsv_kernel, ppr, loop_parts):
         key.update(Path(module.__file__).read_bytes())
     return load_cached_module('pam_closed_loop', source, key.hexdigest()[:12])
 
