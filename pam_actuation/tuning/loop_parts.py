@@ -29,6 +29,14 @@ def read(value, step_size):
 
 
 @njit(error_model='numpy', nogil=True)
+def look_up(values, place):
+    """Return values at a fractional place, linear in between, the last one beyond the end."""
+    whole = min(int(place), values.shape[0] - 2)
+    part = min(place - whole, 1.0)
+    return (1.0 - part) * values[whole] + part * values[whole + 1]
+
+
+@njit(error_model='numpy', nogil=True)
 def drive(driver, hsv, command_pa, measured_pa):
     """
     Run a driver law once and return its two valve signals.

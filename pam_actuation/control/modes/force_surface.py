@@ -90,9 +90,10 @@ def tabulate_force_surface(rig, upper_force_n=None):
         [force_n[1], _FORCES, contraction_m[1], _CONTRACTIONS], pressure_pa.ravel()])
 
 
-def highest_force_n(rig, gauge_pa=6e5):
-    """Return the force [N] of the nominal muscle at a gauge pressure, not contracted."""
-    return float(rig.muscle.law.law.force_n(gauge_pa, 0.0, 'allow')
+def highest_force_n(rig, gauge_pa=6e5, contraction_m=0.0):
+    """Return the force [N] of the nominal muscle at a gauge pressure and contraction."""
+    strain = contraction_m / rig.muscle.length_m
+    return float(rig.muscle.law.law.force_n(gauge_pa, strain, 'allow')
                  * rig.parameters['force_map_gain'])
 
 
