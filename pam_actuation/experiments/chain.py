@@ -56,6 +56,9 @@ DOMAINS = {d.name: d for d in (
 FORCE = Domain('disturbance', 'n', 0.0, -200.0, 200.0, 10_000.0)
 
 
+TRACKED = ('contraction', 'force')      # domains that a controller of one muscle tracks
+
+
 class Chain:
     """
     Primitives one after another, each from where the former ended.

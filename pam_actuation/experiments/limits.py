@@ -15,6 +15,7 @@
 """What a rig can do of an experiment, asked before the first message is sent."""
 
 from pam_actuation.control.modes.force_surface import highest_force_n
+from pam_actuation.control.modes.tracked import tracked_by
 from pam_actuation.drivers.for_rig import driver_config
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
@@ -55,6 +56,17 @@ def check_rig(experiment, rig):
         raise InputError(
             f'it needs supply_pressure, which {rig.name} with valve {rig.valve} does not measure',
             place)
+
+
+def check_tracked(experiment, controller):
+    """Raise InputError where an experiment is in one quantity, its controller in another."""
+    if not experiment.tracked:
+        return
+    tracked = tracked_by(controller)
+    if tracked.topic != experiment.domain:
+        raise InputError(
+            f'is in {experiment.domain}; the controller has `mode: {tracked.mode}`',
+            f'experiment "{experiment.name}"')
 
 
 def _check_stroke(experiment, rig, place):

@@ -209,6 +209,7 @@ class ClosedLoop:
         rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
         rollout(
             (state, self._par, plant_inp, plant_out), self.hsv, self._driver.fresh(),
-            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
-            self._quantum, self._external, mask, controller.compiled_arguments(), log)
+            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._noise, self._quantum, self._external, mask, controller.compiled_arguments(),
+            log)
         return log

@@ -24,6 +24,12 @@ KINDS = ('sofc', 'pid')       # laws that can be wrapped
 _MODES = {FORCE.mode: ForceMode, JOINT.mode: JointMode}
 
 
+def preset_for(experiment, rig):
+    """Return the name of the self-organizing controller for an experiment's quantity."""
+    mode = 'force_' if experiment.domain == FORCE.topic else ''
+    return f'sofc_{mode}{rig.valve}'
+
+
 def read_mode(tree, rig):
     """
     Return the mode a controller file asks for, None for contraction.
