@@ -25,7 +25,7 @@ import os
 
 import numpy as np
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.modes.tracked import tracked_by
+from pam_actuation.control.modes.tracked import TRACKED, tracked_by
 from pam_actuation.control.tick import (
     input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
 from pam_sim import load_rig
@@ -170,6 +170,9 @@ def _same(a, b):
 
 def _columns(states, unit, path):
     """Return the columns of ``controller_state``, refusing foreign ones."""
+    if f'reference_{unit}' not in states.values and any(
+            f'reference_{one.unit}' in states.values for one in TRACKED.values()):
+        raise InputError('the recorded controller and this one track different quantities', path)
     missing = [name for name in input_names(unit) if name not in states.values]
     if missing:
         raise InputError(

@@ -18,6 +18,7 @@ from pam_actuation.control.modes.force import force_to_mapping, ForceMode
 from pam_actuation.control.modes.joint import joint_to_mapping, JointMode
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED, tracked_by
 from pam_sim.errors import InputError
+from pam_sim.load import LOADS
 
 KEYS = ('mode', 'force', 'joint')
 KINDS = ('sofc', 'pid')       # laws that can be wrapped
@@ -48,6 +49,10 @@ def read_mode(tree, rig):
         if hasattr(rig, 'flexor'):
             raise InputError(
                 f'{rig.name} is a joint; its controller needs `mode: joint`', tree.where())
+        if rig is not None and not LOADS[rig.load].MOVES_FREELY and 'static_inverse' not in tree:
+            raise InputError(
+                f'the load `{rig.load}` of {rig.name} has its contraction prescribed; its '
+                'controller needs `mode: force`', tree.where())
         return None
     kind = tree.require('controller', str)
     if kind not in KINDS:
