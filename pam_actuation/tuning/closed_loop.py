@@ -112,6 +112,8 @@ class ClosedLoop:
         scheduling of the live nodes).
     external_force_n : callable or None
         Force [N] against contraction as a function of time [s].
+    supply_pa : callable or None
+        Supply pressure [absolute Pa] as a function of time [s]; that of the rig by default.
     driver : DriverConfig, optional
         What the valve driver knows; by default the data sheet of ``rig``. Give that of the
         nominal rig where ``rig`` differs from what its model file says.
@@ -126,7 +128,7 @@ class ClosedLoop:
     DOMAIN = 'contraction'
 
     def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
-                 external_force_n=None, driver=None):
+                 external_force_n=None, driver=None, supply_pa=None):
         if experiment.domain != self.DOMAIN:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -142,9 +144,12 @@ class ClosedLoop:
                 f'the rig is packed for {self._par[layout.PAR_DT]} s, not {PHYSICS_S} s')
         self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
         self._noise, self._quantum = sensor_noise(rig, self.ticks, seed)
-        self._external = np.zeros(self.ticks)
-        if external_force_n is not None:
-            self._external[:] = [external_force_n(k * (1.0 / rate_hz)) for k in range(self.ticks)]
+        self._disturbance = np.zeros((self.ticks, 2))
+        self._disturbance[:, 1] = rig.parameters['supply_pa']
+        for column, course in enumerate((external_force_n, supply_pa)):
+            if course is not None:
+                self._disturbance[:, column] = [
+                    course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, self._driver.every, latency)
@@ -208,8 +213,8 @@ class ClosedLoop:
         log = np.empty((self.ticks, module.LOG_SIZE))
         rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
         rollout(
-            (state, self._par, plant_inp, plant_out), self.hsv, self._driver.fresh(),
+            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
-            self._noise, self._quantum, self._external, mask, controller.compiled_arguments(),
-            log)
+            self._noise, self._quantum, self._disturbance, mask,
+            controller.compiled_arguments(), log)
         return log

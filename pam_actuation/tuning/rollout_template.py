@@ -67,13 +67,14 @@ def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, i
 
 @njit(error_model='numpy', nogil=True)
 def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
-             external_n, plant_state, plant_par, plant_inp, plant_out, row):
+             disturbance, plant_state, plant_par, plant_inp, plant_out, row):
     """Run the driver law where it is due and the physics of one controller period."""
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
     signal_1 = plant_inp[layout.INP_SIGNAL_1]
     if tick % driver_every == 0:
         signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa)
-    plant_inp[layout.INP_EXTERNAL_FORCE] = external_n[tick]
+    plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
+    plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
     for j in range(steps):
         if j == latency_steps:
             plant_inp[layout.INP_SIGNAL_0] = signal_0
@@ -85,7 +86,7 @@ def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, la
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
-def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                  learn, controller, log):
     """
     Track a reference with the self-organizing controller; its rules change in place.
@@ -104,9 +105,9 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
         Preview in ticks.
     reference : tuple
         Position [m] and rate [m/s] per tick, longer than ``log`` by the preview.
-    noise, quantum, external_n, learn : float64 arrays
-        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force
-        (N) [N]; 1 where the rules may change (N).
+    noise, quantum, disturbance, learn : float64 arrays
+        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force [N]
+        and supply pressure [Pa] (N, 2); 1 where the rules may change (N).
     controller : tuple
         Arguments of ``sofc_step``.
     log : float64[:, :]
@@ -116,20 +117,17 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    inp = controller[10]
+    inp = controller[8]
     for tick in range(log.shape[0]):
         row = log[tick]
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
-        command_pa = sofc_step(
-            controller[0], controller[1], controller[2], controller[3], controller[4],
-            controller[5], controller[6], controller[7], controller[8], controller[9], inp,
-            controller[11])
+        command_pa = sofc_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
-def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                 learn, controller, log):
     """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
     plant_state, plant_par, plant_inp, plant_out = plant
@@ -141,4 +139,4 @@ def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
         command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)
