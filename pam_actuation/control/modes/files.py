@@ -49,7 +49,8 @@ def read_mode(tree, rig):
         if hasattr(rig, 'flexor'):
             raise InputError(
                 f'{rig.name} is a joint; its controller needs `mode: joint`', tree.where())
-        if rig is not None and not LOADS[rig.load].MOVES_FREELY and 'static_inverse' not in tree:
+        load = LOADS.get(getattr(rig, 'load', None))
+        if load is not None and not load.MOVES_FREELY and 'static_inverse' not in tree:
             raise InputError(
                 f'the load `{rig.load}` of {rig.name} has its contraction prescribed; its '
                 'controller needs `mode: force`', tree.where())
