@@ -28,6 +28,14 @@ from pam_sim.units import P_ATM_PA
 import pytest
 
 VALVES = ('ppr', 'hsv')
+SHORT = """
+name: short
+domain: {domain}
+segments:
+  - rest: {{duration_s: 0.3}}
+  - ramp: {{{values}, duration_s: 0.8}}
+  - hold: {{duration_s: 0.4}}
+"""
 
 
 def isometric(valve):
@@ -71,6 +79,45 @@ def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(valve):
         np.full(len(late), P_ATM_PA + controller.co_contraction_gauge_pa), abs=1.0)
     again = loop.run(load_controller(f'sofc_joint_{valve}', joint))
     assert np.array_equal(again.value, result.value)
+
+
+def test_the_compiled_loop_of_force_mode_steps_the_live_class():
+    rig = load_rig('dmsp_5_300_driven')
+    experiment = load_experiment(SHORT.format(domain='force', values='to_n: 30.0'))
+    loop = ForceLoop(rig, experiment, contraction_m=lambda t: 0.005 + 0.002 * t)
+    result = loop.run(load_controller('sofc_force_ppr', rig))
+    controller = load_controller('sofc_force_ppr', rig)
+    lead = controller.lead_s
+    position, rate = loop._position, loop._rate
+    for k in range(loop.ticks):
+        ahead = k + lead * loop.rate_hz
+        wanted = (position[k], rate[k], *(
+            np.interp(ahead, np.arange(len(values)), values) for values in (position, rate)))
+        command_pa = controller.step(
+            result.signals['contraction_m'][k], *wanted, True, math.nan,
+            result.signals['pressure_pa'][k], result.value[k])
+        assert command_pa == pytest.approx(result.signals['command_pa'][k], abs=1e-6)
+
+
+def test_the_compiled_loop_of_joint_mode_steps_the_live_class():
+    joint = load_joint('joint_dmsp_5_300')
+    experiment = load_experiment(SHORT.format(domain='joint_angle', values='to_rad: 0.2'))
+    loop = JointLoop(joint, experiment, angle_noise_rad=0.0, angle_step_rad=0.0)
+    result = loop.run(load_controller('sofc_joint_ppr', joint))
+    controller = load_controller('sofc_joint_ppr', joint)
+    lead = controller.lead_s
+    position, rate = loop._position, loop._rate
+    for k in range(loop.ticks):
+        ahead = k + lead * loop.rate_hz
+        wanted = (position[k], rate[k], *(
+            np.interp(ahead, np.arange(len(values)), values) for values in (position, rate)))
+        commands_pa = controller.step(
+            result.value[k], *wanted, True, math.nan,
+            *([result.signals[f'{side}_{name}'][k] for side in ('flexor', 'extensor')]
+              for name in ('pressure_pa', 'force_n')))
+        assert commands_pa == pytest.approx(
+            [result.signals[f'{side}_command_pa'][k] for side in ('flexor', 'extensor')],
+            abs=1e-6)
 
 
 def test_frozen_rules_stay_as_they_are():
