@@ -27,6 +27,7 @@ signal arrives after ``latency_steps`` of them.
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
+from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
@@ -156,5 +157,21 @@ def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
         row = log[tick]
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
         command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
+        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
+                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+
+
+@njit(cache=True, error_model='numpy', nogil=True)
+def lqi_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+                learn, controller, log):
+    """Track a reference with the LQI; arguments as ``sofc_rollout``, of ``lqi_step``."""
+    plant_state, plant_par, plant_inp, plant_out = plant
+    steps, driver_every, latency_steps = timing
+    position, rate = reference
+    inp = controller[3]
+    for tick in range(log.shape[0]):
+        row = log[tick]
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
+        command_pa = lqi_step(controller[0], controller[1], controller[2], inp, controller[4])
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
                  latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
