@@ -21,7 +21,7 @@ over the recorded inputs, its rules frozen: the muscle did not follow *its*
 commands, so the comparison shows how differently it acts, not how well.
 """
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from pam_actuation.control.config import load_controller
@@ -44,7 +44,6 @@ class ModelCheck:
     ``signal`` the one it belongs to, ``rms`` its size in SI.
     """
 
-    bag: str
     signal: str
     share: float
     rms: float
@@ -78,17 +77,19 @@ class Counterfactual:
     """
     Commands of the tuned controller on recorded inputs against the recorded commands.
 
-    Gauge-free differences [Pa] over the ticks with usable inputs; ``saturated`` and
-    ``recorded_saturated`` are shares of these ticks.
+    Differences [Pa] over the ticks with usable inputs; ``saturated`` and
+    ``recorded_saturated`` are shares of ticks at a pressure limit. The arrays hold every tick.
     """
 
-    bag: str
     ticks: int
     rms_pa: float
     largest_pa: float
     at_s: float
     saturated: float
     recorded_saturated: float
+    time_s: np.ndarray = field(repr=False)
+    recorded_pa: np.ndarray = field(repr=False)
+    tuned_pa: np.ndarray = field(repr=False)
 
     def sentence(self):
         """Return the outcome as one sentence."""
@@ -100,8 +101,45 @@ class Counterfactual:
             f'{100 * self.recorded_saturated:.1f} %).')
 
     def to_dict(self):
+        """Return plain data, without the arrays."""
+        plain = {name: value for name, value in vars(self).items() if np.ndim(value) == 0}
+        return {**plain, 'sentence': self.sentence()}
+
+
+@dataclass(frozen=True)
+class RecordingCheck:
+    """Both checks of one bag; one that was not possible is None and ``notes`` says why."""
+
+    bag: str
+    model: ModelCheck = None
+    counterfactual: Counterfactual = None
+    notes: tuple = ()
+
+    def lines(self):
+        """Return the outcome as sentences."""
+        done = [one.sentence() for one in (self.model, self.counterfactual) if one is not None]
+        return [f'{self.bag}: {text}' for text in (*done, *self.notes)]
+
+    def to_dict(self):
         """Return plain data."""
-        return {**asdict(self), 'sentence': self.sentence()}
+        return {'bag': self.bag, 'notes': list(self.notes), **{
+            name: None if one is None else one.to_dict() for name, one in (
+                ('model', self.model), ('counterfactual', self.counterfactual))}}
+
+
+def check_recordings(runs, rig, controller):
+    """Return a RecordingCheck of every run for a model and a tuned controller."""
+    checks = []
+    for run in runs:
+        found, notes = {}, []
+        for name, check, thing in (('model', check_model, rig),
+                                   ('counterfactual', counterfactual, controller)):
+            try:
+                found[name] = check(run, thing)
+            except InputError as error:
+                notes.append(f'No {name} check: {error.problem}.')
+        checks.append(RecordingCheck(str(run.path), notes=tuple(notes), **found))
+    return checks
 
 
 def check_model(run, rig):
@@ -119,7 +157,7 @@ def check_model(run, rig):
     for one in again.differences:
         if one.signal in ('pressure', 'contraction') and one.span > 0.0:
             if worst is None or one.rms / one.span > worst.share:
-                worst = ModelCheck(str(run.path), one.signal, one.rms / one.span, one.rms)
+                worst = ModelCheck(one.signal, one.rms / one.span, one.rms)
     if worst is None:
         raise InputError('neither pressure nor contraction moves', str(run.path))
     return worst
@@ -155,6 +193,7 @@ def counterfactual(run, controller):
     recorded = sum(np.asarray(before[name]) > 0.5 for name in (
         'saturated_low', 'saturated_high') if name in before)
     return Counterfactual(
-        str(run.path), int(used.sum()), float(np.sqrt(np.mean(away[used] ** 2))),
+        int(used.sum()), float(np.sqrt(np.mean(away[used] ** 2))),
         float(away[worst]), (int(again.stamp_ns[worst]) - run.start_ns) * 1e-9,
-        float(np.mean(limited[used])), float(np.mean(np.asarray(recorded) > 0)))
+        float(np.mean(limited[used])), float(np.mean(np.asarray(recorded) > 0)),
+        (again.stamp_ns - run.start_ns) * 1e-9, again.recorded_pa, again.replayed_pa)

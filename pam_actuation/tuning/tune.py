@@ -71,6 +71,12 @@ class TuneResult:
         Which initial rules were chosen, '' for a controller without rules.
     left_out : int
         Pairs of rig and experiment left out because the rig cannot reach it.
+    axes : tuple of space.Axis
+        What was searched.
+    start : object
+        The controller from before.
+    problem, check : Problem
+        The closed loops of the search and of the held-out check.
 
     """
 
@@ -89,6 +95,9 @@ class TuneResult:
     rules: str = ''
     left_out: int = 0
     axes: tuple = field(default=(), repr=False)
+    start: object = field(default=None, repr=False)
+    problem: object = field(default=None, repr=False)
+    check: object = field(default=None, repr=False)
 
     def to_yaml(self):
         """Return the tuned controller as YAML text for ``load_controller``."""
@@ -264,4 +273,4 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     return TuneResult(
         tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
         rollouts, rollouts * mean_s, time.perf_counter() - began, found.reason, rules, left_out,
-        axes)
+        axes, controller, problem, check)
