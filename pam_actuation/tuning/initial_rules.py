@@ -93,6 +93,5 @@ def _learn(problem, task):
 def _cost_from(problem, task):
     """Return the cost [mm] on one loop of settings that start from given rules."""
     rules, settings, i = task
-    controller = rebuild(problem.controller, settings)
-    controller.rules.assign(rules)
+    controller = rebuild(problem.controller, settings, rules)
     return Problem([problem.loops[i]], controller).cost_mm({})

@@ -18,6 +18,7 @@ import numpy as np
 from pam_actuation.control.lqi import LqiController
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
+from pam_actuation.control.sofc.settings import SCALING
 from pam_actuation.tuning.cost import LOST_MM, tracking_cost_mm
 from pam_sim.errors import InputError
 
@@ -64,16 +65,21 @@ def cost_of(problem, settings):
     return problem.cost_mm(settings)
 
 
-def rebuild(controller, settings):
-    """Return a fresh controller of the same kind, rig and rules with other settings."""
+def rebuild(controller, settings, rules=None):
+    """
+    Return a fresh controller of the same kind and rig with other settings.
+
+    It starts from ``rules``, by default from those of ``controller`` where the settings leave
+    them their meaning.
+    """
     merged = {**controller.settings, **settings}
     if controller.kind == 'pid':
         return PidController(controller.static_inverse, merged, controller.rig_name)
     if controller.kind == 'lqi':
         return LqiController(controller.model, merged, controller.rig_name)
+    if rules is None and all(merged[name] == controller.settings[name] for name in SCALING):
+        rules = controller.rules
     fresh = SelfOrganizingFuzzyController(
-        controller.static_inverse, merged, rig_name=controller.rig_name)
-    if fresh.rules.scaling == controller.rules.scaling:
-        fresh.rules.assign(controller.rules)
+        controller.static_inverse, merged, rules, controller.rig_name)
     fresh.freeze_learning = controller.freeze_learning
     return fresh

@@ -261,7 +261,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
         tuned, rules, extra = rebuild(controller, after), '', 0
         if learn_rules and controller.rules is not None:
             (rules, table, cost_after), extra = initial_rules(workers, problem, after)
-            tuned.rules.assign(table)
+            tuned = rebuild(controller, after, table)
         held_after = workers.map(cost_of, Problem(test, tuned), [{}])[0]
     improved = held_after < held_before
     if not improved:

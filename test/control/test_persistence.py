@@ -57,7 +57,7 @@ def test_a_changed_number_is_found(learned, tmp_path):
 
 @pytest.mark.parametrize('content, words', [
     ('', 'no JSON'), ('{"schema": 1', 'no JSON'), ('{"schema": 99}', 'schema'),
-    ('[1, 2]', 'schema'), ('{"schema": 1, "feedback": []}', 'lacks')])
+    ('[1, 2]', 'schema'), ('{"schema": 2, "feedback": []}', 'lacks')])
 def test_truncated_or_foreign_files_are_refused(content, words, tmp_path):
     path = tmp_path / 'rules.json'
     path.write_text(content)

@@ -80,11 +80,17 @@ def test_tabulated_index_is_antisymmetric_and_reads_the_published_entries():
 def test_credit_goes_to_the_rules_active_the_delay_ago():
     ring = np.zeros((credit.ring_rows(5, 0), credit.ENTRY_SIZE))
     for tick in range(23):
-        credit.push(ring, tick, tick % 6, 0.1, 0, 0.0, 1.0, tick % 9, 0.2, 1.0, 1e5 + tick)
+        row = credit.row_of(ring, tick, 0)
+        credit.push_feedback(ring, row, tick % 6, 0.1, 0, 0.0, 1.0)
+        credit.push_feedforward(ring, row, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
+        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 1.0, 1e5 + tick)
         if tick >= 5:
             row = credit.row_of(ring, tick, 5)
             assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6
             assert ring[row, credit.ENTRY_KNOT] == (tick - 5) % 9
+            assert ring[row, credit.ENTRY_MOTION_KNOT] == (tick - 5) % 3
+            assert ring[row, credit.ENTRY_RATE_KNOT] == (tick - 5) % 4
+            assert ring[row, credit.ENTRY_MOTION_PASS] == 0.25
             assert ring[row, credit.ENTRY_OUTPUT] == 1e5 + tick - 5
 
 

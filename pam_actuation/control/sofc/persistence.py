@@ -29,9 +29,9 @@ from pam_actuation.control.files import write_atomically
 from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_sim.errors import InputError
 
-SCHEMA = 1
-_ARRAYS = ('feedback', 'feedforward', 'feedback_initial', 'feedforward_initial',
-           'feedback_fired', 'feedforward_fired')
+SCHEMA = 2
+_ARRAYS = tuple(
+    name + suffix for suffix in ('', '_initial', '_fired') for name in RuleBase.NAMES)
 
 
 def _digest(content):
@@ -44,8 +44,7 @@ def rules_to_mapping(rules):
     """Return a rule base as a mapping of plain numbers and lists, checksum included."""
     content = {
         'schema': SCHEMA,
-        'shape': {'feedback': list(rules.feedback.shape),
-                  'feedforward': list(rules.feedforward.shape)},
+        'shape': {name: list(getattr(rules, name).shape) for name in RuleBase.NAMES},
         'scaling': dict(rules.scaling)}
     content.update({name: getattr(rules, name).tolist() for name in _ARRAYS})
     return {**content, 'sha256': _digest(content)}
@@ -92,12 +91,12 @@ def rules_from_mapping(mapping, where, expected=None):
                 f'{name} has shape {list(arrays[name].shape)}, the file says {shape}', where)
         if not np.all(np.isfinite(arrays[name])):
             raise InputError(f'{name} holds values that are not finite', where)
-    limit_pa = mapping['scaling'].get('feedforward_limit_pa', np.inf)
-    for name, limit in (('feedback', 1.0), ('feedforward', limit_pa)):
-        worst = float(np.max(np.abs(arrays[name])))
-        if worst > limit:
-            raise InputError(f'{name} holds {worst:g}, allowed is +-{limit:g}', where)
     rules = RuleBase(scaling=dict(mapping['scaling']), **arrays)
+    for table in rules.tables():
+        worst = float(np.max(np.abs(table.values)))
+        if worst > table.limit:
+            raise InputError(
+                f'{table.name} holds {worst:g}, allowed is +-{table.limit:g}', where)
     if expected is not None:
         check_fit(rules, expected, where)
     return rules
@@ -105,7 +104,7 @@ def rules_from_mapping(mapping, where, expected=None):
 
 def check_fit(rules, expected, where):
     """Raise InputError unless two rule bases agree in shapes and scaling."""
-    for name in ('feedback', 'feedforward'):
+    for name in RuleBase.NAMES:
         mine, other = getattr(rules, name).shape, getattr(expected, name).shape
         if mine != other:
             raise InputError(
