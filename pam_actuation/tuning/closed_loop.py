@@ -240,6 +240,7 @@ class ClosedLoop:
         rollout = getattr(module, f'{controller.kind}_rollout')
         rollout(
             (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver(),
-            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
-            self._quantum, self._disturbance, mask, controller.compiled_arguments(), log)
+            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._noise, self._quantum, self._disturbance, mask,
+            controller.compiled_arguments(), log)
         return log

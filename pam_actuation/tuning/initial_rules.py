@@ -15,8 +15,9 @@
 """
 The rules a tuned controller begins with: learned on the model, not drawn by hand.
 
-On every rig the controller tracks the experiments one after the other and keeps
-what it learns. Three tables are then compared by what the tuned settings cost
+On every rig the controller tracks the experiments one after the other, the last
+one first, and keeps what it learns: list slow ones first, they then refine what
+fast ones taught roughly. Three tables are then compared by what the tuned settings cost
 when they start from them: the one from before, the one of the first (nominal)
 rig, and the mean over all rigs.
 """
@@ -24,7 +25,7 @@ rig, and the mean over all rigs.
 import numpy as np
 from pam_actuation.tuning.problem import Problem, rebuild
 
-_PASSES = 2                     # times a rig's experiments are tracked
+_PASSES = 3                     # times a rig's experiments are tracked
 
 
 def initial_rules(workers, problem, settings):
@@ -85,7 +86,7 @@ def _learn(problem, task):
     group, settings = task
     controller = rebuild(problem.controller, settings)
     for _ in range(_PASSES):
-        for i in group:
+        for i in reversed(group):
             problem.loops[i].run_raw(controller)
     return controller.rules
 

@@ -43,7 +43,7 @@ SOFC_AXES = (
     Axis('integral_pa_per_m_s', 1e6, 4e7),
     Axis('derivative_pa_s_per_m', 5e3, 5e5),
     Axis('change_filter_s', 0.005, 0.06),
-    Axis('direction_blend_m_per_s', 2e-4, 1e-2),
+    Axis('direction_blend_m', 2e-4, 5e-3),
     Axis('index_tau_s', 0.01, 0.3),
     Axis('feedback_gain_pa', 5e2, 2e4),
     Axis('reference_knots', 13, 61, log=False, whole=True),
