@@ -107,7 +107,9 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(experiment, rig, controller, '', {}, folder)
     if controller is not None:
-        plan.controller_node = f'{controller.kind}_controller'
+        # The node of fixed gains runs every controller without rules.
+        plan.controller_node = (
+            'sofc_controller' if controller.kind == 'sofc' else 'pid_controller')
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
     if realtime:
         for parameters in plan.parameters.values():

@@ -27,7 +27,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pam_actuation.control import compiled_entry, pid
+from pam_actuation.control import compiled_entry, lqi, pid
 from pam_actuation.control.sofc import step as sofc_step_module
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.for_rig import driver_config
@@ -41,11 +41,11 @@ from pam_sim.rollout.generate import kernel_hash, load_cached_module
 
 @functools.cache
 def compiled_rollouts():
-    """Return the module with ``sofc_rollout`` and ``pid_rollout``, compiled for this kernel."""
+    """Return the module with a rollout per kind of controller, compiled for this kernel."""
     source = (Path(__file__).parent / 'rollout_template.py').read_text(encoding='utf-8')
     key = hashlib.sha256(source.encode())
     key.update(kernel_hash().encode())
-    for names in (sofc_step_module.SOURCES, pid.SOURCES):
+    for names in (sofc_step_module.SOURCES, pid.SOURCES, lqi.SOURCES):
         key.update(str(compiled_entry.source_key(*names)).encode())
     for module in (hsv_kernel, ppr, loop_parts):
         key.update(Path(module.__file__).read_bytes())
@@ -129,6 +129,8 @@ class ClosedLoop:
 
     def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
                  external_force_n=None, driver=None, supply_pa=None):
+        self._arguments = (
+            rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa)
         if experiment.domain != self.DOMAIN:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -154,6 +156,10 @@ class ClosedLoop:
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, self._driver.every, latency)
 
+    def __reduce__(self):
+        """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
+        return ClosedLoop, self._arguments
+
     @property
     def reference_m(self):
         """Wanted contraction [m] at every tick."""
@@ -171,7 +177,7 @@ class ClosedLoop:
 
         Parameters
         ----------
-        controller : SelfOrganizingFuzzyController or PidController
+        controller : SelfOrganizingFuzzyController, PidController or LqiController
             Starts as after ``pause``.
         learn : bool or callable
             Whether the rules may change, possibly as a function of time [s].
@@ -211,7 +217,7 @@ class ClosedLoop:
         from pam_sim.rollout.kernel import look
         look(state, self._par, plant_inp, plant_out)
         log = np.empty((self.ticks, module.LOG_SIZE))
-        rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
+        rollout = getattr(module, f'{controller.kind}_rollout')
         rollout(
             (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),

@@ -59,6 +59,7 @@ class ForceLoop(ClosedLoop):
             raise InputError(
                 f'load `{rig.load}` of {rig.name} moves freely; a force can be tracked on a load '
                 'whose contraction is prescribed', 'rig')
+        self._made_of = (rig, experiment, contraction_m, others)
         super().__init__(rig, experiment, **others)
         if contraction_m is None:
             contraction_m = rig.parameters.get('contraction_m', 0.0)
@@ -73,6 +74,10 @@ class ForceLoop(ClosedLoop):
             raise InputError(f'leaves 0 to {stroke_m:g} m, the stroke of {rig.muscle.name}',
                              'contraction_m')
         self._state, self._par = rig.pack(initial_contraction_m=float(self._way_m[0]))
+
+    def __reduce__(self):
+        """Pickle what it is made of."""
+        return _made_of, self._made_of
 
     def run(self, controller, learn=True):
         """
@@ -124,6 +129,10 @@ class ForceLoop(ClosedLoop):
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
             controller.law.input_array, log)
         return log
+
+
+def _made_of(rig, experiment, contraction_m, others):
+    return ForceLoop(rig, experiment, contraction_m, **others)
 
 
 def check_controller(controller, tracked, rate_hz):

@@ -14,13 +14,13 @@
 
 """What the compiled closed loops share: reading a sensor, running a driver law."""
 
-from numba import njit
 import numpy as np
 from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
 from pam_actuation.drivers.ppr import ppr_step
+from pam_sim.compiled import compiled
 
 
-@njit(error_model='numpy', nogil=True)
+@compiled
 def read(value, step_size):
     """Quantise a reading, 0 = no quantisation."""
     if step_size > 0.0:
@@ -28,7 +28,7 @@ def read(value, step_size):
     return value
 
 
-@njit(error_model='numpy', nogil=True)
+@compiled
 def look_up(values, place):
     """Return values at a fractional place, linear in between, the last one beyond the end."""
     whole = min(int(place), values.shape[0] - 2)
@@ -36,7 +36,7 @@ def look_up(values, place):
     return (1.0 - part) * values[whole] + part * values[whole + 1]
 
 
-@njit(error_model='numpy', nogil=True)
+@compiled
 def drive(driver, hsv, command_pa, measured_pa):
     """
     Run a driver law once and return its two valve signals.
