@@ -74,6 +74,35 @@ def linear_feedback_table():
     return np.stack([surface, surface])
 
 
+@dataclass(frozen=True)
+class Antecedent:
+    """One input of a table of rules: ``words`` for sets with names, else ``knots`` in ``unit``."""
+
+    name: str
+    unit: str
+    knots: np.ndarray
+    words: tuple = ()
+
+
+@dataclass(frozen=True)
+class RuleTable:
+    """
+    One table of a rule base, self-describing.
+
+    ``values``, ``initial`` and ``fired`` are the live arrays of the rule base, one axis per
+    antecedent; ``scale`` turns a value into ``unit``, ``limit`` bounds its magnitude.
+    """
+
+    name: str
+    antecedents: tuple
+    values: np.ndarray
+    initial: np.ndarray
+    fired: np.ndarray
+    limit: float
+    scale: float
+    unit: str
+
+
 @dataclass
 class RuleBase:
     """
@@ -93,6 +122,8 @@ class RuleBase:
 
     """
 
+    NAMES = ('feedback', 'feedforward')
+
     feedback: np.ndarray
     feedforward: np.ndarray
     scaling: dict = field(default_factory=dict)
@@ -110,6 +141,27 @@ class RuleBase:
                 given = getattr(self, name + suffix)
                 given = default if given is None else np.ascontiguousarray(given, dtype=float)
                 setattr(self, name + suffix, given)
+
+    def tables(self):
+        """Return every table of rules with its antecedents, as ``RuleTable``."""
+        scaling = self.scaling
+        direction = Antecedent('direction', '', np.arange(2.0), DIRECTIONS)
+        grid = np.linspace(-1.0, 1.0, SET_COUNT)
+        error = Antecedent(
+            'error', 'm', grid * scaling.get('error_universe_m', 1.0), SET_WORDS)
+        change = Antecedent(
+            'change of error', 'm/s', grid * scaling.get('change_universe_m_per_s', 1.0),
+            SET_WORDS)
+        limit_pa = scaling.get('feedforward_limit_pa', np.inf)
+        span = (scaling.get('reference_lower_m', 0.0), scaling.get('reference_upper_m', 1.0))
+        described = (
+            ('feedback', (direction, error, change), 1.0, scaling.get('feedback_gain_pa', 1.0)),
+            ('feedforward', (direction, Antecedent(
+                'reference', 'm', np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0))
+        return tuple(
+            RuleTable(name, antecedents, getattr(self, name), getattr(self, name + '_initial'),
+                      getattr(self, name + '_fired'), limit, scale, 'Pa')
+            for name, antecedents, limit, scale in described)
 
     def copy(self):
         """Return an independent copy."""
