@@ -132,14 +132,11 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    inp = controller[10]
+    inp = controller[8]
     for tick in range(log.shape[0]):
         row = log[tick]
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
-        command_pa = sofc_step(
-            controller[0], controller[1], controller[2], controller[3], controller[4],
-            controller[5], controller[6], controller[7], controller[8], controller[9], inp,
-            controller[11])
+        command_pa = sofc_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
                  latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
 

@@ -80,11 +80,17 @@ def test_tabulated_index_is_antisymmetric_and_reads_the_published_entries():
 def test_credit_goes_to_the_rules_active_the_delay_ago():
     ring = np.zeros((credit.ring_rows(5, 0), credit.ENTRY_SIZE))
     for tick in range(23):
-        credit.push(ring, tick, tick % 6, 0.1, 0, 0.0, 1.0, tick % 9, 0.2, 1.0, 1e5 + tick)
+        row = credit.row_of(ring, tick, 0)
+        credit.push_feedback(ring, row, tick % 6, 0.1, 0, 0.0, 1.0)
+        credit.push_feedforward(ring, row, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
+        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 1.0, 1e5 + tick)
         if tick >= 5:
             row = credit.row_of(ring, tick, 5)
             assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6
             assert ring[row, credit.ENTRY_KNOT] == (tick - 5) % 9
+            assert ring[row, credit.ENTRY_MOTION_KNOT] == (tick - 5) % 3
+            assert ring[row, credit.ENTRY_RATE_KNOT] == (tick - 5) % 4
+            assert ring[row, credit.ENTRY_MOTION_PASS] == 0.25
             assert ring[row, credit.ENTRY_OUTPUT] == 1e5 + tick - 5
 
 
@@ -200,15 +206,6 @@ def test_exchange_of_rules_makes_no_step_in_the_command():
     after = controller.step(0.0098, 0.01, 0.0, 0.01, 0.0, learn=False)
     assert abs(after - before) < 500.0
     assert controller.rules_replaced == 1
-
-
-def test_rules_read_as_sentences():
-    controller = sofc(QUIET)
-    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
-    feed(controller, 60, 5e-4)
-    text = ' '.join(controller.rules.sentences())
-    assert 'if contracting and the reference is near 10.0 mm then add +' in text
-    assert 'the error is small positive' in text
 
 
 def test_every_output_has_a_name():

@@ -23,7 +23,8 @@ from pam_actuation.control.sofc import layout
 from pam_actuation.control.sofc.credit import ENTRY_SIZE, ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
-from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
+from pam_actuation.control.sofc.rule_table import (
+    infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.settings import parameter_vector, SCALING, SETTINGS
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.errors import InputError
@@ -58,7 +59,8 @@ class SelfOrganizingFuzzyController:
 
     def __init__(self, static_inverse, settings=None, rules=None, rig_name='', where=None):
         self.settings = checked_settings(SETTINGS, settings or {}, where)
-        knots = self.settings['reference_knots'] = float(round(self.settings['reference_knots']))
+        for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
+            self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
             raise InputError(
                 'reference_upper_m must be larger than reference_lower_m',
@@ -72,26 +74,29 @@ class SelfOrganizingFuzzyController:
         scaling = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
         self.rules = RuleBase(
-            linear_feedback_table(), np.zeros((2, int(knots))), scaling=scaling)
+            linear_feedback_table(), np.zeros((2, int(self.settings['reference_knots']))),
+            scaling, np.zeros((int(self.settings['motion_position_knots']),
+                               int(self.settings['motion_rate_knots']))))
         if rules is not None:
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)
         self.freeze_learning = False
         self.rules_replaced = 0       # times the rules were exchanged from outside
         self.parameters = parameter_vector(self.settings)
-        self._ring = np.zeros((ring_rows(
-            int(self.parameters[layout.P_DELAY]), int(self.parameters[layout.P_SPREAD])),
-            ENTRY_SIZE))
+        rows = ring_rows(*(int(self.parameters[index]) for index in (
+            layout.P_DELAY, layout.P_SPREAD, layout.P_ANSWER)))
+        self._ring = np.zeros((rows, ENTRY_SIZE))
         self._state = np.zeros(layout.STATE_COUNT)
         self._inputs = np.zeros(INPUT_COUNT)
         self._outputs = np.zeros(layout.OUTPUT_COUNT)
         rules = self.rules
         self._arguments = (
-            self.parameters, self.static_inverse, rules.feedback, rules.feedforward,
-            rules.feedback_initial, rules.feedforward_initial, rules.feedback_fired,
-            rules.feedforward_fired, self._ring, self._state, self._inputs, self._outputs)
+            self.parameters, self.static_inverse, rules.arrays(), rules.arrays('_initial'),
+            rules.arrays('_fired'), tuple(array.copy() for array in rules.arrays()), self._ring,
+            self._state, self._inputs, self._outputs)
         # Compile, or load what was compiled before, now and not in the first real tick.
-        sofc_step(*(array.copy() for array in self._arguments))
+        sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)
+                    else array.copy() for array in self._arguments))
 
     @property
     def rate_hz(self):
@@ -192,15 +197,17 @@ class SelfOrganizingFuzzyController:
     def _keep_output(self, before_pa):
         self.rules_replaced += 1
         self._ring[:, :] = 0.0        # no credit for rules that are gone
-        self._state[layout.S_HISTORY] = 0.0
+        self._state[layout.S_HISTORY] = min(self._state[layout.S_HISTORY], 1.0)
+        self._state[layout.S_BEST] = 0.0          # the new rules are judged anew
+        for kept, values in zip(self._arguments[5], self.rules.arrays()):
+            kept[...] = values
         change = before_pa - self._rule_output_pa()
         limit = self.settings['integral_limit_pa']
         integral = self._state[layout.S_INTEGRAL] + change
         self._state[layout.S_INTEGRAL] = min(max(integral, -limit), limit)
 
     def _rule_output_pa(self):
-        """Return the contribution [Pa] of both rule bases where the last tick was."""
-        from pam_actuation.control.sofc.rule_table import infer_feedback, infer_feedforward
+        """Return the contribution [Pa] of all rule tables where the last tick was."""
         out = self._outputs
         share = out[layout.O_SHARE]
         return (
@@ -210,7 +217,11 @@ class SelfOrganizingFuzzyController:
                 int(out[layout.O_CHANGE_SET]), out[layout.O_CHANGE_DEGREE])
             + infer_feedforward(
                 self.rules.feedforward, share,
-                int(out[layout.O_KNOT]), out[layout.O_KNOT_DEGREE]))
+                int(out[layout.O_KNOT]), out[layout.O_KNOT_DEGREE])
+            + infer_motion(
+                self.rules.motion,
+                int(out[layout.O_MOTION_KNOT]), out[layout.O_MOTION_KNOT_DEGREE],
+                int(out[layout.O_RATE_KNOT]), out[layout.O_RATE_KNOT_DEGREE]))
 
     def to_yaml(self):
         """Return YAML text from which ``load_controller`` builds an identical controller."""

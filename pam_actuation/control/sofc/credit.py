@@ -31,27 +31,55 @@ ENTRY_CHANGE_DEGREE = 3
 ENTRY_SHARE = 4           # degree of 'contracting'
 ENTRY_KNOT = 5            # lower active knot of the reference
 ENTRY_KNOT_DEGREE = 6
-ENTRY_VALID = 7           # 1 = neither saturated nor disturbed when it was active
-ENTRY_OUTPUT = 8          # command [Pa] of that tick
-ENTRY_SIZE = 9
+ENTRY_MOTION_KNOT = 7     # the same of the motion rules: position, then rate
+ENTRY_MOTION_KNOT_DEGREE = 8
+ENTRY_RATE_KNOT = 9
+ENTRY_RATE_KNOT_DEGREE = 10
+ENTRY_PASS = 11           # part of a pass this tick was, for the feed-forward rules
+ENTRY_MOTION_PASS = 12    # the same for the motion rules
+ENTRY_CORRECTION = 13     # pressure that mends an index of 1 m there [Pa/m]
+ENTRY_VALID = 14          # 1 = neither saturated nor disturbed when it was active
+ENTRY_OUTPUT = 15         # command [Pa] of that tick
+ENTRY_SIZE = 16
 
 
-def ring_rows(delay, spread):
-    """Return the number of rows a ring buffer needs for a credit delay and spread [ticks]."""
-    return delay + spread + 1
+def ring_rows(delay, spread, answer=0):
+    """
+    Return the number of rows a ring buffer needs.
+
+    For a credit delay and its spread, and for the time a command takes to the valve's
+    answer, in ticks.
+    """
+    return max(delay + spread, answer) + 1
 
 
 @compiled
-def push(ring, tick, i, wi, j, wj, share, k, wk, valid, output_pa):
-    """Write the firing strengths of a tick over the oldest entry."""
-    row = tick % ring.shape[0]
+def push_feedback(ring, row, i, wi, j, wj, share):
+    """Write the firing strengths of the feedback rules over the oldest entry, ``row``."""
     ring[row, ENTRY_ERROR_SET] = i
     ring[row, ENTRY_ERROR_DEGREE] = wi
     ring[row, ENTRY_CHANGE_SET] = j
     ring[row, ENTRY_CHANGE_DEGREE] = wj
     ring[row, ENTRY_SHARE] = share
+
+
+@compiled
+def push_feedforward(ring, row, k, wk, m, wm, n, wn):
+    """Write the firing strengths of the feed-forward and the motion rules."""
     ring[row, ENTRY_KNOT] = k
     ring[row, ENTRY_KNOT_DEGREE] = wk
+    ring[row, ENTRY_MOTION_KNOT] = m
+    ring[row, ENTRY_MOTION_KNOT_DEGREE] = wm
+    ring[row, ENTRY_RATE_KNOT] = n
+    ring[row, ENTRY_RATE_KNOT_DEGREE] = wn
+
+
+@compiled
+def push_outcome(ring, row, a_pass, motion_pass, correction_pa_per_m, valid, output_pa):
+    """Write how far the reference passed the rules, what an error is worth, and the command."""
+    ring[row, ENTRY_PASS] = a_pass
+    ring[row, ENTRY_MOTION_PASS] = motion_pass
+    ring[row, ENTRY_CORRECTION] = correction_pa_per_m
     ring[row, ENTRY_VALID] = valid
     ring[row, ENTRY_OUTPUT] = output_pa
 

@@ -46,16 +46,33 @@ P_REFERENCE_UPPER = 27
 P_REFERENCE_KNOTS = 28
 P_MIN_PRESSURE_GAUGE = 29
 P_MAX_PRESSURE_GAUGE = 30
-P_SLEW = 31
-P_START_TIME = 32
-P_JUMP = 33
-P_JUMP_FREEZE = 34
-P_SLACK_FORCE = 35
-P_VALVE_GAP = 36
-P_PERIOD = 37
-P_DELAY = 38
-P_SPREAD = 39
-PARAMETER_COUNT = 40
+P_MOTION_LEARNING = 31
+P_PASS_TIME = 32
+P_CORRECTION = 33
+P_MOTION_POSITION_KNOTS = 34
+P_MOTION_RATE_KNOTS = 35
+P_MOTION_RATE_UPPER = 36
+P_MOTION_RATE_FINE = 37
+P_MEMBERSHIP_FORM = 38
+P_MEMBERSHIP_WIDTH = 39
+P_VALVE_LAG = 40
+P_RATE_FEEDFORWARD = 41
+P_ACCELERATION_FEEDFORWARD = 42
+P_ACCELERATION_FILTER = 43
+P_JUMP_TIME = 44
+P_GUARD_RATIO = 45
+P_GUARD_WINDOW = 46
+P_SLEW = 47
+P_START_TIME = 48
+P_JUMP = 49
+P_JUMP_FREEZE = 50
+P_SLACK_FORCE = 51
+P_VALVE_GAP = 52
+P_PERIOD = 53
+P_DELAY = 54
+P_SPREAD = 55
+P_ANSWER = 56
+PARAMETER_COUNT = 57
 
 # State carried from tick to tick.
 S_TICK = 0
@@ -69,42 +86,79 @@ S_REFERENCE = 7
 S_LEAD_REFERENCE = 8
 S_FREEZE_LEFT = 9
 S_HISTORY = 10
-STATE_COUNT = 11
+S_LEAD_RATE = 11
+S_ACCELERATION = 12
+S_QUASI_STATIC = 13
+S_JUMP = 14
+S_JUMP_LEFT = 15
+S_LEAD_JUMP = 16
+S_LEAD_JUMP_LEFT = 17
+S_PLACE = 18
+S_MOTION_PLACE = 19
+S_RATE_PLACE = 20
+S_MOVING = 21
+S_WINDOW_TICKS = 22
+S_WINDOW_SQUARES = 23
+S_WINDOW_TRAVEL = 24
+S_TURNS = 25
+S_BEST = 26
+S_BEST_SPEED = 27
+S_FORMER = 28
+S_BAD_WINDOWS = 29
+S_RATE_FACTOR = 30
+S_ROLLED_BACK = 31
+S_EXPECTED = 32
+STATE_COUNT = 33
 
 # Outputs of one tick; STATE_NAMES are their names on topic controller_state.
 O_COMMAND = 0
 O_ERROR = 1
 O_CHANGE = 2
 O_INVERSE = 3
-O_FEEDBACK = 4
-O_FEEDFORWARD = 5
-O_PROPORTIONAL = 6
-O_INTEGRAL = 7
-O_DERIVATIVE = 8
-O_UNLIMITED = 9
-O_SAT_LOW = 10
-O_SAT_HIGH = 11
-O_SAT_SLEW = 12
-O_SHARE = 13
-O_ERROR_SET = 14
-O_ERROR_DEGREE = 15
-O_CHANGE_SET = 16
-O_CHANGE_DEGREE = 17
-O_KNOT = 18
-O_KNOT_DEGREE = 19
-O_INDEX = 20
-O_REASON = 21
-O_CREDIT = 22
-O_FEEDBACK_NORM = 23
-O_FEEDFORWARD_NORM = 24
-O_OFFSET = 25
-OUTPUT_COUNT = 26
+O_DYNAMIC = 4
+O_FEEDBACK = 5
+O_FEEDFORWARD = 6
+O_MOTION = 7
+O_PROPORTIONAL = 8
+O_INTEGRAL = 9
+O_DERIVATIVE = 10
+O_UNLIMITED = 11
+O_SAT_LOW = 12
+O_SAT_HIGH = 13
+O_SAT_SLEW = 14
+O_SHARE = 15
+O_ERROR_SET = 16
+O_ERROR_DEGREE = 17
+O_CHANGE_SET = 18
+O_CHANGE_DEGREE = 19
+O_KNOT = 20
+O_KNOT_DEGREE = 21
+O_MOTION_KNOT = 22
+O_MOTION_KNOT_DEGREE = 23
+O_RATE_KNOT = 24
+O_RATE_KNOT_DEGREE = 25
+O_INDEX = 26
+O_REASON = 27
+O_CREDIT = 28
+O_FEEDBACK_NORM = 29
+O_FEEDFORWARD_NORM = 30
+O_MOTION_NORM = 31
+O_OFFSET = 32
+O_JUMP = 33
+O_WINDOW = 34
+O_BEST = 35
+O_RATE_FACTOR = 36
+O_ROLLED_BACK = 37
+OUTPUT_COUNT = 38
 
 STATE_NAMES = (
-    'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'feedback_rules_pa',
-    'feedforward_rules_pa', 'proportional_pa', 'integral_pa', 'derivative_pa',
-    'unlimited_command_pa', 'saturated_low', 'saturated_high', 'slew_limited',
-    'contracting_share', 'error_set', 'error_degree', 'change_set', 'change_degree',
-    'reference_knot', 'reference_knot_degree', 'performance_index_m', 'learning_reason',
-    'credited_tick_valid', 'feedback_rule_change_norm_pa', 'feedforward_rule_change_norm_pa',
-    'start_offset_m')
+    'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa',
+    'dynamic_feedforward_pa', 'feedback_rules_pa', 'feedforward_rules_pa', 'motion_rules_pa',
+    'proportional_pa', 'integral_pa', 'derivative_pa', 'unlimited_command_pa',
+    'saturated_low', 'saturated_high', 'slew_limited', 'contracting_share', 'error_set',
+    'error_degree', 'change_set', 'change_degree', 'reference_knot', 'reference_knot_degree',
+    'motion_knot', 'motion_knot_degree', 'motion_rate_knot', 'motion_rate_knot_degree',
+    'performance_index_m', 'learning_reason', 'credited_tick_valid',
+    'feedback_rule_change_norm_pa', 'feedforward_rule_change_norm_pa',
+    'motion_rule_change_norm_pa', 'start_offset_m', 'jump_to_go_m', 'window_rms_error_m',
+    'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back')

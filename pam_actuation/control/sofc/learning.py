@@ -21,6 +21,10 @@ memory as in fuzzy model reference learning control, Layne and Passino). With a
 partition of unity this is the gradient law ``theta' = gamma s xi``, hence the
 usual protections: bounds, a limit per tick, a dead zone, and a leak towards the
 initial rules on visited rules only.
+
+Feedback rules learn by time. Feed-forward and motion rules learn by passes: a
+tick counts by how far the reference moved over the knots, so that a rule mends
+the same share of the error whether the reference passes it fast or slowly.
 """
 
 from pam_sim.compiled import compiled
@@ -33,9 +37,11 @@ FROZEN_SATURATED = 4      # the command is, or was when the rules were active, a
 FROZEN_DEAD_ZONE = 5      # the error is within noise
 FROZEN_SLACK = 6          # the muscle is slack
 FROZEN_VALVE = 7          # the pressure does not follow: supply or valve
+FROZEN_ROLLED_BACK = 8    # learning had made it worse: the rules are those from before
 REASONS = (
     'learning', 'learning is off', 'starting', 'settling after a jump', 'command at a limit',
-    'error within the dead zone', 'muscle slack', 'pressure does not follow the command')
+    'error within the dead zone', 'muscle slack', 'pressure does not follow the command',
+    'rolled back, learning had made it worse')
 
 
 @compiled
@@ -86,5 +92,27 @@ def modify_feedforward(table, initial, share, k, wk, gain_pa, leak, step_limit_p
                        - leak * strength * (old - initial[d, k + a]))
                 new = _bounded(new, limit_pa)
                 table[d, k + a] = new
+                squares += (new - old) * (new - old)
+    return squares
+
+
+@compiled
+def modify_motion(table, initial, m, wm, n, wn, gain_pa, leak, step_limit_pa, limit_pa):
+    """
+    Change the motion rules that were active; return the squared norm [Pa^2].
+
+    As ``modify_feedforward``, over position knots m and rate knots n.
+    """
+    squares = 0.0
+    for a in range(2):
+        position = wm if a == 1 else 1.0 - wm
+        for b in range(2):
+            strength = position * (wn if b == 1 else 1.0 - wn)
+            if strength > 0.0:
+                old = table[m + a, n + b]
+                new = (old + _bounded(gain_pa * strength, step_limit_pa)
+                       - leak * strength * (old - initial[m + a, n + b]))
+                new = _bounded(new, limit_pa)
+                table[m + a, n + b] = new
                 squares += (new - old) * (new - old)
     return squares

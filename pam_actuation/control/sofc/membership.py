@@ -13,12 +13,15 @@
 # limitations under the License.
 
 """
-Triangular membership functions with 50 % overlap on an equidistant grid.
+Membership functions on an equidistant grid: triangular, or Gaussian and normalised.
 
 At any value at most two neighbouring sets are active and the degrees sum to 1
 (partition of unity), so a firing strength needs one index and one degree.
-Outside the universe the outermost set is fully active (saturation).
+Outside the universe the outermost set is fully active (saturation). Both forms
+cover the whole universe by construction.
 """
+
+import math
 
 import numpy as np
 from pam_sim.compiled import compiled
@@ -47,10 +50,44 @@ def locate(value, lower, upper, count):
     return index, place - index
 
 
-def memberships(value, lower=-1.0, upper=1.0, count=SET_COUNT):
+@compiled
+def gaussian_degree(degree, width):
+    """
+    Return the degree of the upper set when both active sets are Gaussian.
+
+    ``degree`` is the place between the peaks of two neighbouring sets, 0 to 1, ``width``
+    their standard deviation in distances of the peaks. The two are divided by their sum
+    (a logistic function of the place) and what is left of the other set at a peak is taken
+    off, so that the degrees are continuous over the whole universe.
+    """
+    steepness = 1.0 / (width * width)
+    least = 1.0 / (1.0 + math.exp(0.5 * steepness))
+    share = 1.0 / (1.0 + math.exp((0.5 - degree) * steepness))
+    return (share - least) / (1.0 - 2.0 * least)
+
+
+@compiled
+def locate_signed_logarithmic(value, fine, upper, count):
+    """
+    Return the lower active set and the degree of the upper one on a signed logarithmic grid.
+
+    The sets are triangles over ``asinh(value / fine)``: evenly spaced below ``fine``,
+    logarithmically above, from ``-upper`` to ``upper``.
+    """
+    return locate(math.asinh(value / fine) / math.asinh(upper / fine), -1.0, 1.0, count)
+
+
+def signed_logarithmic_knots(fine, upper, count):
+    """Return the values at which the sets of ``locate_signed_logarithmic`` have their peaks."""
+    return fine * np.sinh(np.linspace(-1.0, 1.0, count) * math.asinh(upper / fine))
+
+
+def memberships(value, lower=-1.0, upper=1.0, count=SET_COUNT, gaussian_width=None):
     """Return the degrees of all sets at a value, shape (count,), for plots and tests."""
     degrees = np.zeros(count)
     index, degree = locate(float(value), lower, upper, count)
+    if gaussian_width is not None:
+        degree = gaussian_degree(degree, gaussian_width)
     degrees[index] += 1.0 - degree
     degrees[index + 1] += degree
     return degrees

@@ -33,12 +33,13 @@ from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
 
-SCHEMA = 1
+SCHEMA = 2
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
 _SHAPES = {
     'feedback': (2, SET_COUNT, SET_COUNT),
-    'feedforward': (2, 'reference_knots')}
+    'feedforward': (2, 'reference_knots'),
+    'motion': ('motion_position_knots', 'motion_rate_knots')}
 _ARRAYS = tuple(
     name + suffix for suffix in ('', '_initial', '_fired') for name in RuleBase.NAMES)
 _KEYS = ('schema', 'shape', 'scaling', *_ARRAYS, 'sha256')

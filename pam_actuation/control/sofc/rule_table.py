@@ -13,14 +13,16 @@
 # limitations under the License.
 
 """
-The two rule bases of the controller and their inference.
+The three rule tables of the controller and their inference.
 
 Feedback rules: ``feedback[d, i, j]`` is the singleton in [-1, 1] of the rule
 "if moving in direction d and error is set i and change of error is set j".
 Feed-forward rules: ``feedforward[d, k]`` [Pa] is the singleton of "if the
 reference is near r_k and moves in direction d then add c_k". Directions: 0
 contracting, 1 extending; a muscle with hysteresis needs different pressures on
-the two branches. At small speed both are active in part.
+the two branches. At small speed both are active in part. Motion rules:
+``motion[m, n]`` [Pa] of "if the reference is near r_m and moves at about v_n then
+add c_mn"; the rates are dense about zero, where the muscle turns round.
 
 Inference is product and weighted mean; degrees sum to 1, so the mean needs no
 division (zero-order Sugeno form of the rule table of Procyk and Mamdani,
@@ -31,7 +33,8 @@ from dataclasses import dataclass, field
 import hashlib
 
 import numpy as np
-from pam_actuation.control.sofc.membership import SET_COUNT, SET_NAMES, SET_WORDS
+from pam_actuation.control.sofc.membership import (
+    SET_COUNT, SET_WORDS, signed_logarithmic_knots)
 from pam_sim.compiled import compiled
 
 CONTRACTING, EXTENDING = 0, 1
@@ -65,6 +68,13 @@ def infer_feedforward(table, share, k, wk):
     """Return the output of the feed-forward rules [Pa] at the active knots ``k, wk``."""
     return (share * ((1.0 - wk) * table[0, k] + wk * table[0, k + 1])
             + (1.0 - share) * ((1.0 - wk) * table[1, k] + wk * table[1, k + 1]))
+
+
+@compiled
+def infer_motion(table, m, wm, n, wn):
+    """Return the output of the motion rules [Pa] at position knots m and rate knots n."""
+    return ((1.0 - wm) * ((1.0 - wn) * table[m, n] + wn * table[m, n + 1])
+            + wm * ((1.0 - wn) * table[m + 1, n] + wn * table[m + 1, n + 1]))
 
 
 def linear_feedback_table():
@@ -114,7 +124,9 @@ class RuleBase:
         (2, 7, 7) singletons in [-1, 1].
     feedforward, feedforward_initial : numpy.ndarray
         (2, K) singletons [Pa].
-    feedback_fired, feedforward_fired : numpy.ndarray
+    motion, motion_initial : numpy.ndarray
+        (M, N) singletons [Pa]; none that matter by default.
+    feedback_fired, feedforward_fired, motion_fired : numpy.ndarray
         Sum of the firing strengths of each rule since the rules were loaded.
     scaling : dict of str -> float
         What the numbers mean: universes, gains, knots, sample time, rig identity. Rules
@@ -122,28 +134,36 @@ class RuleBase:
 
     """
 
-    NAMES = ('feedback', 'feedforward')
+    NAMES = ('feedback', 'feedforward', 'motion')
 
     feedback: np.ndarray
     feedforward: np.ndarray
     scaling: dict = field(default_factory=dict)
+    motion: np.ndarray = None
     feedback_initial: np.ndarray = None
     feedforward_initial: np.ndarray = None
+    motion_initial: np.ndarray = None
     feedback_fired: np.ndarray = None
     feedforward_fired: np.ndarray = None
+    motion_fired: np.ndarray = None
 
     def __post_init__(self):
-        self.feedback = np.ascontiguousarray(self.feedback, dtype=float)
-        self.feedforward = np.ascontiguousarray(self.feedforward, dtype=float)
-        for name in ('feedback', 'feedforward'):
-            value = getattr(self, name)
+        if self.motion is None:
+            self.motion = np.zeros((2, 2))
+        for name in self.NAMES:
+            value = np.ascontiguousarray(getattr(self, name), dtype=float)
+            setattr(self, name, value)
             for suffix, default in (('_initial', value.copy()), ('_fired', value * 0.0)):
                 given = getattr(self, name + suffix)
                 given = default if given is None else np.ascontiguousarray(given, dtype=float)
                 setattr(self, name + suffix, given)
 
     def tables(self):
-        """Return every table of rules with its antecedents, as ``RuleTable``."""
+        """
+        Return every table of rules with its antecedents, as ``RuleTable``.
+
+        Whoever lists, draws, saves or compares rules goes through these.
+        """
         scaling = self.scaling
         direction = Antecedent('direction', '', np.arange(2.0), DIRECTIONS)
         grid = np.linspace(-1.0, 1.0, SET_COUNT)
@@ -154,39 +174,48 @@ class RuleBase:
             SET_WORDS)
         limit_pa = scaling.get('feedforward_limit_pa', np.inf)
         span = (scaling.get('reference_lower_m', 0.0), scaling.get('reference_upper_m', 1.0))
+        rates = signed_logarithmic_knots(
+            scaling.get('motion_rate_fine_m_per_s', 1.0),
+            scaling.get('motion_rate_upper_m_per_s', 1.0), self.motion.shape[1])
         described = (
             ('feedback', (direction, error, change), 1.0, scaling.get('feedback_gain_pa', 1.0)),
             ('feedforward', (direction, Antecedent(
-                'reference', 'm', np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0))
+                'reference', 'm', np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0),
+            ('motion', (
+                Antecedent('reference', 'm', np.linspace(*span, self.motion.shape[0])),
+                Antecedent('rate of the reference', 'm/s', rates)), limit_pa, 1.0))
         return tuple(
             RuleTable(name, antecedents, getattr(self, name), getattr(self, name + '_initial'),
                       getattr(self, name + '_fired'), limit, scale, 'Pa')
             for name, antecedents, limit, scale in described)
 
+    def arrays(self, suffix=''):
+        """Return the arrays of all tables: values, or with '_initial', '_fired' those."""
+        return tuple(getattr(self, name + suffix) for name in self.NAMES)
+
     def copy(self):
         """Return an independent copy."""
-        return RuleBase(
-            self.feedback.copy(), self.feedforward.copy(), dict(self.scaling),
-            self.feedback_initial.copy(), self.feedforward_initial.copy(),
-            self.feedback_fired.copy(), self.feedforward_fired.copy())
+        return RuleBase(scaling=dict(self.scaling), **{
+            name + suffix: getattr(self, name + suffix).copy()
+            for name in self.NAMES for suffix in ('', '_initial', '_fired')})
 
     def assign(self, other):
         """Take over the numbers of another rule base of equal shape, in place."""
-        for name in ('feedback', 'feedforward'):
-            for suffix in ('', '_initial', '_fired'):
-                getattr(self, name + suffix)[...] = getattr(other, name + suffix)
+        for suffix in ('', '_initial', '_fired'):
+            for mine, theirs in zip(self.arrays(suffix), other.arrays(suffix)):
+                mine[...] = theirs
 
     def reset(self):
         """Return to the initial rules and forget how often they fired."""
-        self.feedback[...] = self.feedback_initial
-        self.feedforward[...] = self.feedforward_initial
-        self.feedback_fired[...] = 0.0
-        self.feedforward_fired[...] = 0.0
+        for values, initial, fired in zip(
+                self.arrays(), self.arrays('_initial'), self.arrays('_fired')):
+            values[...] = initial
+            fired[...] = 0.0
 
     def digest(self):
         """Return the sha256 of the rules as hexadecimal text."""
         total = hashlib.sha256()
-        for value in (self.feedback, self.feedforward):
+        for value in self.arrays():
             total.update(str(value.shape).encode())
             total.update(value.astype('<f8').tobytes())
         return total.hexdigest()
@@ -196,26 +225,6 @@ class RuleBase:
         return np.linspace(
             self.scaling['reference_lower_m'], self.scaling['reference_upper_m'],
             self.feedforward.shape[1])
-
-    def sentences(self, least_fired=1.0):
-        """Return the rules that fired as sentences, most active first."""
-        found = []
-        unit = self.scaling.get('feedback_gain_pa', 1.0) * 1e-3
-        for (d, i, j), fired in np.ndenumerate(self.feedback_fired):
-            if fired >= least_fired:
-                found.append((fired, (
-                    f'if {DIRECTIONS[d]} and the error is {SET_WORDS[i]} and its change is '
-                    f'{SET_WORDS[j]} then add {self.feedback[d, i, j] * unit:+.2f} kPa '
-                    f'({SET_NAMES[i]}, {SET_NAMES[j]}; was '
-                    f'{self.feedback_initial[d, i, j] * unit:+.2f} kPa)')))
-        knots = self.knots_m() if 'reference_lower_m' in self.scaling else None
-        for (d, k), fired in np.ndenumerate(self.feedforward_fired):
-            if fired >= least_fired and knots is not None:
-                found.append((fired, (
-                    f'if {DIRECTIONS[d]} and the reference is near {knots[k] * 1e3:.1f} mm then '
-                    f'add {self.feedforward[d, k] * 1e-3:+.2f} kPa (was '
-                    f'{self.feedforward_initial[d, k] * 1e-3:+.2f} kPa)')))
-        return [text for _, text in sorted(found, key=lambda item: -item[0])]
 
     def save(self, path):
         """Write the rules to a file atomically; see ``persistence.save_rules``."""

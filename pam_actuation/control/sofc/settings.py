@@ -44,11 +44,11 @@ SETTINGS = (
     Setting('dead_zone_m', 'm', 1e-5, 0.0, 0.01, 'no learning below this error'),
     Setting('credit_delay_s', 's', 0.09, 0.0, 1.0, 'how long ago the blamed rules were active'),
     Setting('credit_spread_s', 's', 0.0, 0.0, 0.2, 'half width of the credit kernel'),
-    Setting('learning_rate', '-', 1.2, 0.0, 10.0, 'common factor of all rule changes'),
+    Setting('learning_rate', '-', 1.0, 0.0, 10.0, 'common factor of all rule changes'),
     Setting('feedback_learning_per_m_s', '1/(m s)', 2e3, 0.0, 1e6,
             'change of a feedback rule per index and time'),
-    Setting('feedforward_learning_pa_per_m_s', 'Pa/(m s)', 2e7, 0.0, 1e9,
-            'change of a feed-forward rule per index and time'),
+    Setting('feedforward_learning', '-', 0.2, 0.0, 2.0,
+            'share of the index a feed-forward rule mends per pass of the reference'),
     Setting('feedback_step_limit', '-', 0.02, 0.0, 1.0, 'largest change per tick'),
     Setting('feedforward_step_limit_pa', 'Pa', 1e3, 0.0, 1e5, 'largest change per tick'),
     Setting('feedforward_limit_pa', 'Pa', 1.2e5, 0.0, 6e5, 'bound of a feed-forward rule'),
@@ -61,13 +61,42 @@ SETTINGS = (
     Setting('reference_knots', '-', 25.0, 3.0, 401.0, 'number of knots'),
     Setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
     Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    Setting('motion_learning', '-', 0.4, 0.0, 2.0,
+            'share of the index a motion rule mends per pass of the reference'),
+    Setting('pass_time_s', 's', 2.0, 0.05, 100.0,
+            'standing still for so long counts as one pass'),
+    Setting('correction_pa_per_m', 'Pa/m', 0.0, 0.0, 1e9,
+            'pressure that mends an index of 1 m; 0 = slope of the static inverse'),
+    Setting('motion_position_knots', '-', 16.0, 3.0, 201.0,
+            'reference positions of the motion rules, over the same range'),
+    Setting('motion_rate_knots', '-', 21.0, 3.0, 201.0, 'reference rates of the motion rules'),
+    Setting('motion_rate_upper_m_per_s', 'm/s', 0.12, 1e-3, 5.0, 'last rate of the motion rules'),
+    Setting('motion_rate_fine_m_per_s', 'm/s', 2e-3, 1e-5, 5.0,
+            'rates below are spaced evenly, those above logarithmically'),
+    Setting('membership_form', '-', 0.0, 0.0, 1.0,
+            'membership functions of error and change: 0 triangular, 1 Gaussian'),
+    Setting('membership_width', '-', 0.4, 0.2, 1.0,
+            'standard deviation of a Gaussian set, in distances of two sets'),
+    Setting('valve_lag_s', 's', 0.0, 0.0, 0.5,
+            'lag of the valve the feed-forward makes up for'),
+    Setting('rate_feedforward_pa_s_per_m', 'Pa s/m', 0.0, 0.0, 1e7,
+            'pressure per rate of the reference: damping over force per pressure'),
+    Setting('acceleration_feedforward_pa_s2_per_m', 'Pa s2/m', 0.0, 0.0, 1e7,
+            'pressure per acceleration of the reference: mass over force per pressure'),
+    Setting('acceleration_filter_s', 's', 0.01, 0.0, 0.5, 'low pass on that acceleration'),
+    Setting('jump_time_s', 's', 0.0, 0.0, 5.0,
+            'a jump of the reference is made a smooth move of this duration'),
+    Setting('guard_ratio', '-', 1.5, 0.0, 100.0,
+            'roll-back once the error exceeds its best by this factor; 0 = never'),
+    Setting('guard_window_s', 's', 2.0, 0.1, 1e3,
+            'shortest time over which errors are compared, whole to and fro'),
     Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
     Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
     Setting('jump_m', 'm', 1e-3, 1e-5, 0.1, 'reference jump that freezes learning'),
     Setting('jump_freeze_s', 's', 0.6, 0.0, 10.0, 'for how long, beyond the credit delay'),
     Setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
     Setting('valve_gap_pa', 'Pa', 4e4, 1e3, 1e6,
-            'command minus pressure, one credit delay later, that freezes learning and integral'),
+            'expected minus measured pressure that freezes learning and integral'),
 )
 
 NAMES = tuple(setting.name for setting in SETTINGS)
@@ -75,7 +104,9 @@ NAMES = tuple(setting.name for setting in SETTINGS)
 # What rules mean depends on these; a file of rules must agree in all of them.
 SCALING = (
     'rate_hz', 'error_universe_m', 'change_universe_m_per_s', 'feedback_gain_pa',
-    'reference_lower_m', 'reference_upper_m', 'reference_knots', 'feedforward_limit_pa')
+    'reference_lower_m', 'reference_upper_m', 'reference_knots', 'feedforward_limit_pa',
+    'motion_position_knots', 'motion_rate_knots', 'motion_rate_upper_m_per_s',
+    'motion_rate_fine_m_per_s')
 
 
 def parameter_vector(values):
@@ -87,6 +118,8 @@ def parameter_vector(values):
     vector[layout.P_PERIOD] = period_s
     vector[layout.P_DELAY] = round(values['credit_delay_s'] / period_s)
     vector[layout.P_SPREAD] = round(values['credit_spread_s'] / period_s)
+    # The preview covers the dead time; what the valve lags besides is filtered.
+    vector[layout.P_ANSWER] = round(values['lead_s'] / period_s)
     if vector[layout.P_SPREAD] > vector[layout.P_DELAY]:
         vector[layout.P_SPREAD] = vector[layout.P_DELAY]
     return vector

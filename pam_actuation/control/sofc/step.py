@@ -15,9 +15,10 @@
 """
 One tick of the self-organizing fuzzy controller, compiled, without allocation.
 
-Order of a tick: error and filtered change of error; fuzzification; both rule
-bases, static inverse, trim; limits with back-calculation; memory of the firing
-strengths; modification of the rules that were active one credit delay ago.
+Order of a tick: smooth jumps; error and filtered change of error; fuzzification;
+the rule tables, static inverse and dynamics, trim; limits with back-calculation;
+memory of the firing strengths; modification of the rules that were active one
+credit delay ago; roll-back.
 """
 
 import math
@@ -25,11 +26,12 @@ import math
 from numba import njit
 from pam_actuation.control import inputs as place
 from pam_actuation.control.compiled_entry import source_key
-from pam_actuation.control.sofc import credit, layout as at, learning
-from pam_actuation.control.sofc.membership import locate, SET_COUNT
+from pam_actuation.control.sofc import credit, dynamics, guard, layout as at, learning
+from pam_actuation.control.sofc.membership import (
+    gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
 from pam_actuation.control.sofc.performance_index import index_linear, index_table
 from pam_actuation.control.sofc.rule_table import (
-    contracting_share, infer_feedback, infer_feedforward)
+    contracting_share, infer_feedback, infer_feedforward, infer_motion)
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.compiled import compiled
 from pam_sim.units import P_ATM_PA
@@ -42,19 +44,18 @@ _LIFTED_M = 5e-4          # below this contraction the pressure at rest says not
 
 
 @compiled
-def _start(par, inverse, st, inp):
+def _start(par, inverse, values, kept, st, inp):
     """Begin so that the reference starts where the muscle is and the command where it is."""
     x = inp[place.IN_CONTRACTION]
+    st[:] = 0.0
     st[at.S_STARTED] = 1.0
+    st[at.S_RATE_FACTOR] = 1.0
     st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
     st[at.S_CONTRACTION] = x
-    st[at.S_RATE] = 0.0
-    st[at.S_INTEGRAL] = 0.0
     st[at.S_OUTPUT] = P_ATM_PA
     st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
     st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
-    st[at.S_FREEZE_LEFT] = 0.0
-    st[at.S_HISTORY] = 0.0
+    guard.keep(values, kept)
     pressure = inp[place.IN_PRESSURE]
     if math.isfinite(pressure):
         st[at.S_OUTPUT] = min(
@@ -66,7 +67,7 @@ def _start(par, inverse, st, inp):
 
 
 @compiled
-def _update_rate(par, st, inp):
+def _update_rate(par, st, inp, reference_rate):
     """Update and return the filtered change of error [m/s] from the contraction alone."""
     elapsed = inp[place.IN_ELAPSED]
     if not math.isfinite(elapsed):
@@ -75,7 +76,7 @@ def _update_rate(par, st, inp):
     if elapsed > _STALE_RATE_S:
         st[at.S_RATE] = 0.0
     elif elapsed > 0.0 and st[at.S_HISTORY] > 0.0:
-        raw = inp[place.IN_REFERENCE_RATE] - (x - st[at.S_CONTRACTION]) / elapsed
+        raw = reference_rate - (x - st[at.S_CONTRACTION]) / elapsed
         part = elapsed / (par[at.P_CHANGE_FILTER] + elapsed)
         st[at.S_RATE] += part * (raw - st[at.S_RATE])
     st[at.S_CONTRACTION] = x
@@ -83,26 +84,22 @@ def _update_rate(par, st, inp):
 
 
 @compiled
-def _jumped(par, st, inp):
-    """Tell whether a reference moved otherwise than its rate says since the former tick."""
-    period = par[at.P_PERIOD]
-    now = abs(inp[place.IN_REFERENCE] - st[at.S_REFERENCE]
-              - inp[place.IN_REFERENCE_RATE] * period)
-    lead = abs(inp[place.IN_LEAD_REFERENCE] - st[at.S_LEAD_REFERENCE]
-               - inp[place.IN_LEAD_RATE] * period)
-    st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
-    st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
-    return now > par[at.P_JUMP] or lead > par[at.P_JUMP]
-
-
-@compiled
 def _valve_lags(par, ring, st, inp):
-    """Tell whether the measured pressure is far from the command of one credit delay ago."""
-    delay = int(par[at.P_DELAY])
-    if st[at.S_HISTORY] < delay:
+    """
+    Tell whether the measured pressure is far from what the commands should have made of it.
+
+    Expected is the command of one preview ago behind the lag of the valve.
+    """
+    if st[at.S_HISTORY] < par[at.P_ANSWER]:
+        st[at.S_EXPECTED] = inp[place.IN_PRESSURE]
         return False
-    then = credit.row_of(ring, int(st[at.S_TICK]), delay)
-    gap = abs(ring[then, credit.ENTRY_OUTPUT] - inp[place.IN_PRESSURE])
+    then = credit.row_of(ring, int(st[at.S_TICK]), int(par[at.P_ANSWER]))
+    arrived = ring[then, credit.ENTRY_OUTPUT]
+    if not math.isfinite(st[at.S_EXPECTED]):
+        st[at.S_EXPECTED] = arrived
+    part = par[at.P_PERIOD] / (par[at.P_VALVE_LAG] + par[at.P_PERIOD])
+    st[at.S_EXPECTED] += part * (arrived - st[at.S_EXPECTED])
+    gap = abs(st[at.S_EXPECTED] - inp[place.IN_PRESSURE])
     return gap > par[at.P_VALVE_GAP]          # False for NaN: pressure is optional
 
 
@@ -115,6 +112,8 @@ def _reason(par, ring, st, inp, error, limited, lags):
     if inp[place.IN_LEARN] < 0.5:
         return learning.FROZEN_OFF
     if st[at.S_HISTORY] < delay + spread or abs(st[at.S_OFFSET]) > _START_BAND_M:
+        if st[at.S_ROLLED_BACK] > 0.0 and st[at.S_HISTORY] < delay + spread:
+            return learning.FROZEN_ROLLED_BACK
         return learning.FROZEN_START
     if lags:
         return learning.FROZEN_VALVE
@@ -132,15 +131,17 @@ def _reason(par, ring, st, inp, error, limited, lags):
 
 
 @compiled
-def _learn(par, fb, ff, fb0, ff0, ring, st, index):
+def _learn(par, values, initial, ring, st, index):
     """Modify the rules active one credit delay ago; return the squared norms of the change."""
     tick = int(st[at.S_TICK])
     delay = int(par[at.P_DELAY])
     spread = int(par[at.P_SPREAD])
-    dose = par[at.P_LEARNING_RATE] * index * par[at.P_PERIOD]
+    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR]
+    dose = rate * index * par[at.P_PERIOD]
     leak = abs(index) * par[at.P_PERIOD]
     fb_squares = 0.0
     ff_squares = 0.0
+    motion_squares = 0.0
     for offset in range(-spread, spread + 1):
         row = credit.row_of(ring, tick, delay + offset)
         if ring[row, credit.ENTRY_VALID] < 0.5:
@@ -148,48 +149,87 @@ def _learn(par, fb, ff, fb0, ff0, ring, st, index):
         weight = credit.kernel_weight(offset, spread)
         share = ring[row, credit.ENTRY_SHARE]
         fb_squares += learning.modify_feedback(
-            fb, fb0, share,
+            values[0], initial[0], share,
             int(ring[row, credit.ENTRY_ERROR_SET]), ring[row, credit.ENTRY_ERROR_DEGREE],
             int(ring[row, credit.ENTRY_CHANGE_SET]), ring[row, credit.ENTRY_CHANGE_DEGREE],
             weight * dose * par[at.P_FEEDBACK_LEARNING],
             weight * leak * par[at.P_FEEDBACK_LEAK],
             weight * par[at.P_FEEDBACK_STEP_LIMIT])
+        # What the index asks for in pressure, for one pass.
+        wanted = weight * rate * index * ring[row, credit.ENTRY_CORRECTION]
         ff_squares += learning.modify_feedforward(
-            ff, ff0, share,
+            values[1], initial[1], share,
             int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
-            weight * dose * par[at.P_FEEDFORWARD_LEARNING],
+            wanted * ring[row, credit.ENTRY_PASS] * par[at.P_FEEDFORWARD_LEARNING],
             weight * leak * par[at.P_FEEDFORWARD_LEAK],
             weight * par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
-    return fb_squares, ff_squares
+        motion_squares += learning.modify_motion(
+            values[2], initial[2],
+            int(ring[row, credit.ENTRY_MOTION_KNOT]), ring[row, credit.ENTRY_MOTION_KNOT_DEGREE],
+            int(ring[row, credit.ENTRY_RATE_KNOT]), ring[row, credit.ENTRY_RATE_KNOT_DEGREE],
+            wanted * ring[row, credit.ENTRY_MOTION_PASS] * par[at.P_MOTION_LEARNING],
+            weight * leak * par[at.P_FEEDFORWARD_LEAK],
+            weight * par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+    return fb_squares, ff_squares, motion_squares
 
 
 @compiled
-def _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk):
+def _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn):
     """Add the firing strengths of this tick to the counts of the rules."""
     for d in range(2):
         direction = share if d == 0 else 1.0 - share
-        fb_fired[d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
-        fb_fired[d, i, j + 1] += direction * (1.0 - wi) * wj
-        fb_fired[d, i + 1, j] += direction * wi * (1.0 - wj)
-        fb_fired[d, i + 1, j + 1] += direction * wi * wj
-        ff_fired[d, k] += direction * (1.0 - wk)
-        ff_fired[d, k + 1] += direction * wk
+        fired[0][d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
+        fired[0][d, i, j + 1] += direction * (1.0 - wi) * wj
+        fired[0][d, i + 1, j] += direction * wi * (1.0 - wj)
+        fired[0][d, i + 1, j + 1] += direction * wi * wj
+        fired[1][d, k] += direction * (1.0 - wk)
+        fired[1][d, k + 1] += direction * wk
+    fired[2][m, n] += (1.0 - wm) * (1.0 - wn)
+    fired[2][m, n + 1] += (1.0 - wm) * wn
+    fired[2][m + 1, n] += wm * (1.0 - wn)
+    fired[2][m + 1, n + 1] += wm * wn
 
 
 @compiled
-def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
+def _passes(par, st, knot_place, motion_place, rate_place):
+    """
+    Return which part of a pass over the feed-forward and the motion rules this tick was.
+
+    A pass is the way from one knot to the next; standing still for ``pass_time_s`` also
+    counts as one.
+    """
+    still = par[at.P_PERIOD] / par[at.P_PASS_TIME]
+    a_pass = still
+    motion_pass = still
+    if st[at.S_HISTORY] > 0.0:
+        by_position = motion_place - st[at.S_MOTION_PLACE]
+        by_rate = rate_place - st[at.S_RATE_PLACE]
+        a_pass += abs(knot_place - st[at.S_PLACE])
+        motion_pass += math.sqrt(by_position * by_position + by_rate * by_rate)
+    st[at.S_PLACE] = knot_place
+    st[at.S_MOTION_PLACE] = motion_place
+    st[at.S_RATE_PLACE] = rate_place
+    return min(a_pass, 1.0), min(motion_pass, 1.0)
+
+
+@compiled
+def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     """Run one tick; see ``sofc_step``."""
     period = par[at.P_PERIOD]
     if st[at.S_STARTED] < 0.5:
-        _start(par, inverse, st, inp)
-    change = _update_rate(par, st, inp)
-    jumped = _jumped(par, st, inp)
+        _start(par, inverse, values, kept, st, inp)
+    jump, lead_jump = dynamics.jumps(par, st, inp)
+    to_go, extra_rate = dynamics.smooth_jump(par, st, jump, at.S_JUMP, at.S_JUMP_LEFT)
+    lead_to_go, lead_extra_rate = dynamics.smooth_jump(
+        par, st, lead_jump, at.S_LEAD_JUMP, at.S_LEAD_JUMP_LEFT)
+    change = _update_rate(par, st, inp, inp[place.IN_REFERENCE_RATE] + extra_rate)
     lags = _valve_lags(par, ring, st, inp)
-    if jumped or lags:
+    if jump != 0.0 or lead_jump != 0.0 or lags:
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
     offset = st[at.S_OFFSET]
-    error = inp[place.IN_REFERENCE] - offset - inp[place.IN_CONTRACTION]
-    lead = inp[place.IN_LEAD_REFERENCE] - offset
+    error = inp[place.IN_REFERENCE] - to_go - offset - inp[place.IN_CONTRACTION]
+    lead = inp[place.IN_LEAD_REFERENCE] - lead_to_go - offset
+    lead_rate = inp[place.IN_LEAD_RATE] + lead_extra_rate
     st[at.S_OFFSET] = 0.0
     if abs(offset) > _OFFSET_FLOOR_M:
         st[at.S_OFFSET] = offset * (par[at.P_START_TIME] / (par[at.P_START_TIME] + period))
@@ -199,17 +239,30 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
     change_scaled = change / par[at.P_CHANGE_UNIVERSE]
     i, wi = locate(error_scaled, -1.0, 1.0, SET_COUNT)
     j, wj = locate(change_scaled, -1.0, 1.0, SET_COUNT)
-    k, wk = locate(lead, par[at.P_REFERENCE_LOWER], par[at.P_REFERENCE_UPPER], ff.shape[1])
-    share = contracting_share(inp[place.IN_LEAD_RATE], par[at.P_DIRECTION_BLEND])
+    if par[at.P_MEMBERSHIP_FORM] > 0.5:
+        wi = gaussian_degree(wi, par[at.P_MEMBERSHIP_WIDTH])
+        wj = gaussian_degree(wj, par[at.P_MEMBERSHIP_WIDTH])
+    lower = par[at.P_REFERENCE_LOWER]
+    upper = par[at.P_REFERENCE_UPPER]
+    k, wk = locate(lead, lower, upper, values[1].shape[1])
+    m, wm = locate(lead, lower, upper, values[2].shape[0])
+    n, wn = locate_signed_logarithmic(
+        lead_rate, par[at.P_MOTION_RATE_FINE], par[at.P_MOTION_RATE_UPPER], values[2].shape[1])
+    share = contracting_share(lead_rate, par[at.P_DIRECTION_BLEND])
+    a_pass, motion_pass = _passes(par, st, k + wk, m + wm, n + wn)
 
     # Inference and trim.
     base = inverse_pressure_pa(inverse, lead)
-    feedback = par[at.P_FEEDBACK_GAIN] * infer_feedback(fb, share, i, wi, j, wj)
-    feedforward = infer_feedforward(ff, share, k, wk)
+    dynamic = dynamics.dynamic_pressure_pa(
+        par, st, base, lead_rate, st[at.S_HISTORY] < 0.5 or lead_jump != 0.0)
+    feedback = par[at.P_FEEDBACK_GAIN] * infer_feedback(values[0], share, i, wi, j, wj)
+    feedforward = infer_feedforward(values[1], share, k, wk)
+    motion = infer_motion(values[2], m, wm, n, wn)
     proportional = par[at.P_PROPORTIONAL] * error
     derivative = par[at.P_DERIVATIVE] * change
     integral = st[at.S_INTEGRAL]
-    wanted = base + feedback + feedforward + proportional + integral + derivative
+    wanted = (base + dynamic + feedback + feedforward + motion
+              + proportional + integral + derivative)
 
     # The limits of the actuator, then of its speed.
     lowest = P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]
@@ -234,8 +287,14 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
 
     # Credit memory and rule modification.
     undisturbed = st[at.S_FREEZE_LEFT] <= 0.0 and abs(offset) <= _START_BAND_M
-    credit.push(ring, int(st[at.S_TICK]), i, wi, j, wj, share, k, wk,
-                0.0 if limited or not undisturbed else 1.0, command)
+    row = credit.row_of(ring, int(st[at.S_TICK]), 0)
+    credit.push_feedback(ring, row, i, wi, j, wj, share)
+    credit.push_feedforward(ring, row, k, wk, m, wm, n, wn)
+    correction = par[at.P_CORRECTION]
+    if not correction > 0.0:
+        correction = dynamics.slope_pa_per_m(inverse, lead)
+    credit.push_outcome(ring, row, a_pass, motion_pass, correction,
+                        0.0 if limited or not undisturbed else 1.0, command)
     if par[at.P_INDEX_FORM] < 0.5:
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
     else:
@@ -243,16 +302,19 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
     reason = _reason(par, ring, st, inp, error, limited, lags)
     fb_squares = 0.0
     ff_squares = 0.0
+    motion_squares = 0.0
     if reason == learning.LEARNING:
-        fb_squares, ff_squares = _learn(par, fb, ff, fb0, ff0, ring, st, index)
-    _count(fb_fired, ff_fired, share, i, wi, j, wj, k, wk)
+        fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st, index)
+    _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
     out[at.O_COMMAND] = command
     out[at.O_ERROR] = error
     out[at.O_CHANGE] = change
     out[at.O_INVERSE] = base
+    out[at.O_DYNAMIC] = dynamic
     out[at.O_FEEDBACK] = feedback
     out[at.O_FEEDFORWARD] = feedforward
+    out[at.O_MOTION] = motion
     out[at.O_PROPORTIONAL] = proportional
     out[at.O_INTEGRAL] = integral
     out[at.O_DERIVATIVE] = derivative
@@ -267,22 +329,58 @@ def _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out
     out[at.O_CHANGE_DEGREE] = wj
     out[at.O_KNOT] = k
     out[at.O_KNOT_DEGREE] = wk
+    out[at.O_MOTION_KNOT] = m
+    out[at.O_MOTION_KNOT_DEGREE] = wm
+    out[at.O_RATE_KNOT] = n
+    out[at.O_RATE_KNOT_DEGREE] = wn
     out[at.O_INDEX] = index
     out[at.O_REASON] = reason
     out[at.O_CREDIT] = 1.0 if reason == learning.LEARNING else 0.0
     out[at.O_FEEDBACK_NORM] = par[at.P_FEEDBACK_GAIN] * math.sqrt(fb_squares)
     out[at.O_FEEDFORWARD_NORM] = math.sqrt(ff_squares)
+    out[at.O_MOTION_NORM] = math.sqrt(motion_squares)
     out[at.O_OFFSET] = offset
+    out[at.O_JUMP] = to_go
     st[at.S_TICK] += 1.0
     st[at.S_HISTORY] += 1.0
     st[at.S_FREEZE_LEFT] = max(0.0, st[at.S_FREEZE_LEFT] - period)
+    _guard(par, values, kept, st, inp, error, reason, out)
     return command
+
+
+@compiled
+def _guard(par, values, kept, st, inp, error, reason, out):
+    """Watch over learning; a roll-back makes no step in the command."""
+    off = reason == learning.FROZEN_OFF or reason == learning.FROZEN_VALVE
+    if off or reason == learning.FROZEN_START or reason == learning.FROZEN_JUMP:
+        guard.restart_window(st)      # such errors tell nothing about the rules
+    elif par[at.P_GUARD_RATIO] > 0.0 and guard.watch(
+            par, st, error, inp[place.IN_REFERENCE_RATE], values, kept):
+        share = out[at.O_SHARE]
+        restored = (
+            par[at.P_FEEDBACK_GAIN] * infer_feedback(
+                values[0], share, int(out[at.O_ERROR_SET]), out[at.O_ERROR_DEGREE],
+                int(out[at.O_CHANGE_SET]), out[at.O_CHANGE_DEGREE])
+            + infer_feedforward(
+                values[1], share, int(out[at.O_KNOT]), out[at.O_KNOT_DEGREE])
+            + infer_motion(
+                values[2], int(out[at.O_MOTION_KNOT]), out[at.O_MOTION_KNOT_DEGREE],
+                int(out[at.O_RATE_KNOT]), out[at.O_RATE_KNOT_DEGREE]))
+        before = out[at.O_FEEDBACK] + out[at.O_FEEDFORWARD] + out[at.O_MOTION]
+        limit = par[at.P_INTEGRAL_LIMIT]
+        st[at.S_INTEGRAL] = min(
+            max(st[at.S_INTEGRAL] + before - restored, -limit), limit)
+        st[at.S_HISTORY] = 1.0        # no credit for rules that are gone
+    out[at.O_WINDOW] = st[at.S_FORMER]
+    out[at.O_BEST] = st[at.S_BEST]
+    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR]
+    out[at.O_ROLLED_BACK] = st[at.S_ROLLED_BACK]
 
 
 def _entry(key):
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @njit(cache=True, error_model='numpy', nogil=True)
-    def sofc_step(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out):
+    def sofc_step(par, inverse, values, initial, fired, kept, ring, st, inp, out):
         """
         Run one tick; return the pressure command [absolute Pa].
 
@@ -290,8 +388,9 @@ def _entry(key):
         ----------
         par, inverse : float64[:]
             Parameter vector (``settings.parameter_vector``) and static inverse table.
-        fb, ff, fb0, ff0, fb_fired, ff_fired : float64[:, :, :] and float64[:, :]
-            Feedback and feed-forward rules, their initial values, their firing counts.
+        values, initial, fired, kept : tuple of arrays
+            Feedback, feed-forward and motion rules; their initial values, their firing counts,
+            the last good ones.
         ring : float64[:, :]
             Credit memory (``credit.ring_rows`` rows).
         st, inp, out : float64[:]
@@ -300,7 +399,7 @@ def _entry(key):
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _tick(par, inverse, fb, ff, fb0, ff0, fb_fired, ff_fired, ring, st, inp, out)
+        return _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out)
 
     return sofc_step
 
@@ -308,5 +407,5 @@ def _entry(key):
 SOURCES = (
     'inputs.py', 'static_inverse.py', 'sofc/layout.py', 'sofc/membership.py',
     'sofc/rule_table.py', 'sofc/performance_index.py', 'sofc/credit.py', 'sofc/learning.py',
-    'sofc/step.py')
+    'sofc/dynamics.py', 'sofc/guard.py', 'sofc/step.py')
 sofc_step = _entry(source_key(*SOURCES))

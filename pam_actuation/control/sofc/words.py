@@ -36,6 +36,7 @@ import math
 import numpy as np
 
 NOTHING_KPA, LITTLE_KPA, MUCH_KPA = 0.05, 2.0, 10.0
+_ACTS_PA = 1.0            # a rule whose output is smaller does nothing
 DIRECTION = 'direction'
 # SI unit -> factor and unit for people.
 SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'm/s': (1e3, 'mm/s'),
@@ -140,15 +141,17 @@ def ranked(rules):
     """
     Return the rules that act, as SpokenRule, the most important first.
 
-    Importance is firing times size. Where no rule has fired at all, every rule that is not
-    zero is returned, the largest first.
+    Importance is firing times size. Where no rule has fired at all, every rule that adds
+    something is returned, the largest first.
     """
     tables = rules.tables()
     rate_hz = rules.scaling.get('rate_hz', 1.0)
     idle = not any(table.fired.any() for table in tables)
     found = []
     for table in tables:
-        acting = table.values != 0.0 if idle else (table.values != 0.0) & (table.fired > 0.0)
+        acting = np.abs(table.values) * table.scale >= _ACTS_PA
+        if not idle:
+            acting &= table.fired > 0.0
         for place in map(tuple, np.argwhere(acting).tolist()):
             found.append(SpokenRule(
                 table.name, place, float(table.values[place]) * table.scale,
