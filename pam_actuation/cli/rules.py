@@ -58,15 +58,15 @@ def run(args):
     payload = {'title': found.title, 'kind': found.kind, **view.to_dict()}
     payload['rules'] = payload['rules'][:args.top]
     payload['remarks'] = [*found.remarks, *payload['remarks']]
+    if args.save is not None:
+        found.rules.save(args.save)
+        payload['saved'] = args.save
+        shown += f'\n\nrule file: {args.save}'
     if args.html is not None:
         from pam_actuation.report.page import write_text
         from pam_actuation.rules.page import page
         payload['page'] = str(write_text(args.html, page(found, view, args.top)))
         shown += f'\n\npage: {payload["page"]}'
-    if args.save is not None:
-        found.rules.save(args.save)
-        payload['saved'] = args.save
-        shown += f'\n\nrule file: {args.save}'
     emit(args, payload, shown)
     return EXIT_DONE
 

@@ -146,8 +146,8 @@ def heat_map_chart(maps, titles, title):
             if one.values.size <= MOST_NUMBERS:
                 for (i, j), value in np.ndenumerate(one.values):
                     dark = abs(value) > 0.75 * limit
-                    axes.text(j + 0.5, i + 0.5, f'{round(value, 1) + 0.0:.1f}', ha='center', va='center',
-                              fontsize=7.0, color='white' if dark else INK)
+                    axes.text(j + 0.5, i + 0.5, f'{round(value, 1) + 0.0:.1f}', fontsize=7.0,
+                              ha='center', va='center', color='white' if dark else INK)
         figure.colorbar(image, ax=list(row), label=titles[2], fraction=0.05, pad=0.02)
     return _svg(draw, title, (5.0 * len(maps), 4.6))
 

@@ -14,9 +14,9 @@
 
 """Rules in words: conditions, sizes, order."""
 
+import numpy as np
 from pam_actuation.control.sofc.rule_table import Antecedent, RuleTable
 from pam_actuation.control.sofc.words import number, ranked, sentence
-import numpy as np
 import pytest
 from rule_bases import fresh, taught
 
