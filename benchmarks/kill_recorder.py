@@ -116,9 +116,8 @@ def kill_processes(folder, count, rng, parallel=4, shortest_s=0.0, longest_s=4.0
     Yields
     ------
     dict
-        ``bag``, ``diary`` of what was sent, ``killed_ns``, the time of the kill,
-        ``started_ns``, that of the first message (None if it was killed before), and
-        ``from_zero``: whether message 0 was sent to this recorder.
+        ``bag``, ``diary`` of what was sent, ``killed_ns``, the time of the kill, and
+        ``started_ns``, that of the first message (None if it was killed before).
 
     """
     # Children of a small server: a process with threads does not fork safely.
@@ -141,7 +140,7 @@ def kill_processes(folder, count, rng, parallel=4, shortest_s=0.0, longest_s=4.0
             killed_ns = time.time_ns()
             os.kill(process.pid, signal.SIGKILL)
             process.join()
-            yield {'bag': bag, 'killed_ns': killed_ns, 'from_zero': True,
+            yield {'bag': bag, 'killed_ns': killed_ns,
                    'diary': Path(f'{bag}.diary'),
                    'started_ns': started_ns or _told(heard, 0.0)}
 
@@ -155,49 +154,75 @@ def _told(heard, wait_s):
 
 
 def kill_nodes(folder, count, rng, longest_s=4.0):
-    """Kill ``count`` recorder nodes that hear a publisher; yield as ``kill_processes``."""
+    """
+    Kill ``count`` recorder nodes that hear a publisher; yield as ``kill_processes``.
+
+    Each has a publisher of its own: one that was connected to killed recorders before keeps
+    them for 20 s and may need seconds for the next one, which is no matter of recording.
+    """
     from pam_actuation.rigging.domain import DomainLock
     from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
     domain = DomainLock()
     environment = node_environment(domain.domain_id, folder)
-    diary = folder / 'published.diary'
-    publisher = subprocess.Popen(
-        [sys.executable, __file__, '--publish', str(diary)], env=environment,
-        start_new_session=True)
     try:
         for k in range(count):
-            bag = folder / f'node_{k}'
+            bag, diary = folder / f'node_{k}', folder / f'node_{k}.diary'
+            publisher = subprocess.Popen(
+                [sys.executable, __file__, '--publish', str(diary)], env=environment,
+                stdin=subprocess.PIPE, text=True, start_new_session=True)
             node = NodeProcess(
                 'experiment_recorder', '/muscle',
                 {'output': str(bag), 'await_topics': list(NODE_RATES_HZ)}, environment, folder)
-            deadline = time.monotonic() + 60.0
-            while not (bag.is_dir() and 'ready' in node.log_file.read_text()):
-                if not node.running or time.monotonic() > deadline:
-                    raise RuntimeError(node.how_it_ended())
-                time.sleep(0.02)
-            started_ns = time.time_ns()
-            time.sleep(rng.uniform(0.05, longest_s))
-            killed_ns = time.time_ns()
-            node.send_signal(signal.SIGKILL)
-            node.wait(10.0)
-            end_all([node])
-            yield {'bag': bag, 'killed_ns': killed_ns, 'from_zero': False,
-                   'diary': diary, 'started_ns': started_ns}
+            try:
+                _wait_for_log(node, publisher)
+                publisher.stdin.write('go\n')
+                publisher.stdin.flush()
+                _wait_for_diary(diary, publisher)
+                started_ns = time.time_ns()
+                time.sleep(rng.uniform(0.05, longest_s))
+                killed_ns = time.time_ns()
+                node.send_signal(signal.SIGKILL)
+                node.wait(10.0)
+            finally:
+                end_all([node])
+                publisher.terminate()
+                publisher.wait(10.0)
+            yield {'bag': bag, 'killed_ns': killed_ns, 'diary': diary, 'started_ns': started_ns}
     finally:
-        publisher.terminate()
-        publisher.wait(10.0)
         domain.release()
 
 
+def _wait_for_log(node, publisher):
+    """Wait until the node says that it is ready."""
+    deadline = time.monotonic() + 60.0
+    while 'ready' not in node.log_file.read_text():
+        if not node.running or publisher.poll() is not None or time.monotonic() > deadline:
+            raise RuntimeError(f'recorder or publisher did not start: {node.how_it_ended()}')
+        time.sleep(0.02)
+
+
+def _wait_for_diary(diary, publisher):
+    """Wait until the first messages were sent."""
+    deadline = time.monotonic() + 60.0
+    while not diary.exists():
+        if publisher.poll() is not None or time.monotonic() > deadline:
+            raise RuntimeError('the publisher was not connected to the recorder')
+        time.sleep(0.005)
+
+
 def publish(path):
-    """Publish numbered messages until stopped, with a diary (a process of its own)."""
+    """Publish numbered messages to the recorder until stopped (a process of its own)."""
     from pam_actuation.nodes.conversions import MESSAGE_TYPES
-    from pam_actuation.nodes.qos import PUBLISHER
+    from pam_actuation.nodes.endpoints import CountedPublisher, wait_until_matched
     import rclpy
-    rclpy.init()
+    from rclpy.signals import SignalHandlerOptions
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)      # SIGTERM ends it at once
     node = rclpy.create_node('numbers', namespace='/muscle')
-    publishers = {topic: node.create_publisher(MESSAGE_TYPES[topic], topic, PUBLISHER)
+    publishers = {topic: CountedPublisher(node, MESSAGE_TYPES[topic], topic)
                   for topic in NODE_RATES_HZ}
+    wait_until_matched(
+        list(publishers.values()), '/muscle/experiment_recorder', 60.0, lambda: not rclpy.ok())
+    sys.stdin.readline()                    # the recorder is ready
     sent = dict.fromkeys(NODE_RATES_HZ, 0)
     diary = Diary(path)
     began = time.monotonic()
@@ -239,16 +264,10 @@ def examine(case, rates=None):
     for topic in rates or RATES_HZ:
         data = content.topics.get(f'/muscle/{topic}')
         payloads = list(data.payloads) if data else []
-        first = 0
-        if payloads and not case['from_zero']:
-            first = next((n for n in range(10**6) if numbered(topic, n) == payloads[0]), 0)
-        expected = [numbered(topic, first + i) for i in range(len(payloads))]
+        expected = [numbered(topic, number) for number in range(len(payloads))]
         if payloads != expected:
             problems.append(f'{topic}: a message is altered or missing inside')
-        if payloads or case['from_zero']:
-            sent_ns = Diary.sent_ns(case['diary'], topic, first + len(payloads))
-        else:
-            sent_ns = case['started_ns']
+        sent_ns = Diary.sent_ns(case['diary'], topic, len(payloads))
         if sent_ns is not None:
             missing_s = max(missing_s, (case['killed_ns'] - sent_ns) * 1e-9)
     if missing_s > ALLOWED_S:

@@ -33,6 +33,8 @@ METADATA_VERSION = 9
 STORAGE_IDENTIFIER = 'mcap'
 ROS_DISTRO = 'jazzy'
 METADATA_FILE = 'metadata.yaml'
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)     # in C: ten times as fast
+_DEEPEST = 50
 METADATA_ROOT = 'rosbag2_bagfile_information'
 NO_START_TIME_NS = 2**63 - 1           # what rosbag2 writes for a bag without messages
 _INFINITE = {'sec': 9_223_372_036, 'nsec': 854_775_807}
@@ -103,6 +105,22 @@ def to_yaml(data):
     return yaml.dump(
         data, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False,
         allow_unicode=True, width=2**31)
+
+
+def from_yaml(text):
+    """Return the content of YAML text of any origin; ValueError for what is none."""
+    try:
+        depth = 0
+        # The compiled reader would overflow its stack on nesting without end.
+        for event in yaml.parse(text, _LOADER):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST:
+                raise ValueError(f'nested more than {_DEEPEST} times')
+        return yaml.load(text, _LOADER)
+    # Numbers that do not exist are no errors of the YAML library.
+    except (yaml.YAMLError, OverflowError) as error:
+        raise ValueError(f'not YAML: {error}') from None
 
 
 @dataclass(frozen=True)

@@ -73,8 +73,7 @@ class Walk:
             elif opcode in _TAKEN:
                 yield from self._single(opcode, data[begin:end])
             elif opcode == Opcode.ATTACHMENT:
-                self.bytes += length        # nothing of ours has them: the former file is kept
-                self.inside = True
+                self.lose(data[begin:end])  # nothing of ours has them: the former file is kept
             position = end
 
     def _lost_from(self, position):
@@ -115,6 +114,10 @@ class Walk:
                 return
         except struct.error:
             pass
+        self.lose(content)
+
+    def lose(self, content):
+        """Count a record inside the file that cannot be taken over."""
         self.bytes += len(content)
         self.inside = True
 

@@ -192,9 +192,11 @@ class McapWriter:
         return True
 
     def copy_record(self, opcode, content):
-        """Append a schema or channel of another file, outside of chunks, unless it is damaged."""
-        if self.note(opcode, content):
+        """Append a schema or channel of another file; return False for one that is damaged."""
+        readable = self.note(opcode, content)
+        if readable:
             self._append(RECORD.pack(opcode, len(content)) + content)
+        return readable
 
     def _write_chunk(self, content, index):
         chunk = RECORD.pack(Opcode.CHUNK, len(content)) + content

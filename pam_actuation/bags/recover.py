@@ -38,7 +38,6 @@ from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
 from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
 from pam_sim.errors import InputError
-import yaml
 
 RECOVERY_RECORD = 'pam_recovery'
 DAMAGED_SUFFIX = '.damaged'
@@ -147,8 +146,8 @@ def _announced(path):
     """Return the number of messages metadata.yaml announces, None if it cannot be read."""
     try:
         text = (path / layout.METADATA_FILE).read_text(encoding='utf-8')
-        return yaml.safe_load(text)[layout.METADATA_ROOT]['message_count']
-    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+        return layout.from_yaml(text)[layout.METADATA_ROOT]['message_count']
+    except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
@@ -180,9 +179,9 @@ class _Contents:
 
 def _profiles(channel):
     try:
-        profiles = yaml.safe_load(channel.metadata.get('offered_qos_profiles', '') or '[]')
+        profiles = layout.from_yaml(channel.metadata.get('offered_qos_profiles', '') or '[]')
         return tuple(dict(profile) for profile in profiles)
-    except (yaml.YAMLError, TypeError, ValueError):
+    except (TypeError, ValueError):
         return ()
 
 
@@ -237,13 +236,15 @@ def _copy(data, writer):
         if opcode == Opcode.CHUNK:
             writer.copy_chunk(content, records)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            writer.copy_record(opcode, content)
+            if not writer.copy_record(opcode, content):
+                walk.lose(content)
         elif opcode == Opcode.MESSAGE:
             writer.add_message(*mcap_salvage.message(content))
         elif opcode == Opcode.METADATA:
             try:
                 record = Metadata.read(ReadDataStream(io.BytesIO(content)))
             except (McapError, ValueError, struct.error):
+                walk.lose(content)
                 continue
             named[record.name] = record.metadata
             if record.name != ROSBAG2_RECORD:

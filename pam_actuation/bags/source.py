@@ -31,10 +31,7 @@ from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
-import yaml
 
-# The compiled reader where it is there: metadata of many topics is long.
-_YAML_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _LONGEST_REASON = 300
 _RECOVER = 'or read that beginning with the option recover'
 
@@ -163,15 +160,14 @@ def _directory_facts(path):
     if not file.is_file():
         return None
     try:
-        facts = yaml.load(file.read_text(encoding='utf-8'), _YAML_LOADER)[layout.METADATA_ROOT]
+        facts = layout.from_yaml(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
         names = facts['relative_file_paths']
         if isinstance(names, list) and names and all(map(_is_file_name, names)):
             return facts
         problem = 'relative_file_paths is not a list of file names'
     except (KeyError, TypeError):
         problem = f'it has no {layout.METADATA_ROOT} with relative_file_paths'
-    # Dates and numbers that do not exist are plain ValueErrors of the YAML library.
-    except (yaml.YAMLError, ValueError, OverflowError, RecursionError):
+    except ValueError:
         problem = 'it is not YAML'
     raise InputError(
         f'not the metadata of a rosbag2 bag: {problem}; remove the file to read the data files '

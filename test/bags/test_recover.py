@@ -139,6 +139,29 @@ def test_a_damaged_chunk_is_left_out_and_the_former_file_kept(tmp_path, whole):
         assert topic.payloads[-1] == original.topics[name].payloads[-1]
 
 
+def test_an_unreadable_description_is_lost_not_forgotten(tmp_path, whole):
+    data, original = whole
+    name = b'pam_experiment'
+    length_of_map = data.index(name) + len(name)
+    spoiled = data[:length_of_map] + b'\xff' * 4 + data[length_of_map + 4:]
+    bag = broken(tmp_path, spoiled)
+    done = recover_bag(bag)
+    assert done.changed and done.files[0].unreadable_bytes > 100
+    assert (bag / done.files[0].kept).read_bytes() == spoiled
+    found = read_bag(bag)
+    assert_is_beginning(found, original)
+    assert done.messages == sum(original.counts.values())
+
+
+@pytest.mark.parametrize('text', ('[' * 100_000, 'a: ' * 3000, 'n: 1e999999999', '- 2024-99-99'))
+def test_a_description_that_is_none_is_made_anew(tmp_path, whole, text):
+    data, original = whole
+    bag = broken(tmp_path, data)
+    (bag / 'metadata.yaml').write_text(text)
+    assert recover_bag(bag).changed
+    assert read_bag(bag).counts == original.counts
+
+
 def test_zeros_behind_the_last_chunk_are_an_end_not_damage(tmp_path, whole):
     data, original = whole
     bag = broken(tmp_path, data)
