@@ -113,6 +113,8 @@ class ClosedLoop:
         scheduling of the live nodes).
     external_force_n : callable or None
         Force [N] against contraction as a function of time [s].
+    supply_pa : callable or None
+        Supply pressure [absolute Pa] as a function of time [s]; that of the rig by default.
     driver : DriverConfig, optional
         What the valve driver knows; by default the data sheet of ``rig``. Give that of the
         nominal rig where ``rig`` differs from what its model file says.
@@ -125,7 +127,7 @@ class ClosedLoop:
     """
 
     def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
-                 external_force_n=None, driver=None):
+                 external_force_n=None, driver=None, supply_pa=None):
         if experiment.domain != 'contraction':
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
@@ -154,9 +156,11 @@ class ClosedLoop:
         self._noise = np.random.default_rng(seed).standard_normal((self.ticks, 3)) * sigma
         self._quantum = np.array([float(sensors.get(name, 0.0)) for name in (
             'pressure_step_pa', 'contraction_step_m', 'force_step_n')])
-        self._external = np.zeros(self.ticks)
-        if external_force_n is not None:
-            self._external[:] = [external_force_n(k * period_s) for k in range(self.ticks)]
+        self._disturbance = np.zeros((self.ticks, 2))
+        self._disturbance[:, 1] = rig.parameters['supply_pa']
+        for column, course in enumerate((external_force_n, supply_pa)):
+            if course is not None:
+                self._disturbance[:, column] = [course(k * period_s) for k in range(self.ticks)]
         driver = driver if driver is not None else driver_config(rig)
         self._hsv_config = driver.hsv
         self._ppr_config = replace(driver.ppr, period_s=period_s)
@@ -229,7 +233,7 @@ class ClosedLoop:
         log = np.empty((self.ticks, module.LOG_SIZE))
         rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
         rollout(
-            (state, self._par, plant_inp, plant_out), self.hsv, self._driver(), self._timing,
+            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver(), self._timing,
             controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
-            self._quantum, self._external, mask, controller.compiled_arguments(), log)
+            self._quantum, self._disturbance, mask, controller.compiled_arguments(), log)
         return log

@@ -76,7 +76,7 @@ def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, i
 
 @njit(error_model='numpy', nogil=True)
 def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
-             external_n, plant_state, plant_par, plant_inp, plant_out, row):
+             disturbance, plant_state, plant_par, plant_inp, plant_out, row):
     """Run the driver law where it is due and the physics of one controller period."""
     driver_state, driver_par, driver_out = driver
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
@@ -89,7 +89,8 @@ def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, la
         else:
             ppr_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
             signal_0, signal_1 = driver_out[0], 0.0
-    plant_inp[layout.INP_EXTERNAL_FORCE] = external_n[tick]
+    plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
+    plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
     for j in range(steps):
         if j == latency_steps:
             plant_inp[layout.INP_SIGNAL_0] = signal_0
@@ -101,7 +102,7 @@ def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, la
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
-def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                  learn, controller, log):
     """
     Track a reference with the self-organizing controller; its rules change in place.
@@ -120,9 +121,9 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
         Preview in ticks.
     reference : tuple
         Position [m] and rate [m/s] per tick, longer than ``log`` by the preview.
-    noise, quantum, external_n, learn : float64 arrays
-        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force
-        (N) [N]; 1 where the rules may change (N).
+    noise, quantum, disturbance, learn : float64 arrays
+        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force [N]
+        and supply pressure [Pa] (N, 2); 1 where the rules may change (N).
     controller : tuple
         Arguments of ``sofc_step``.
     log : float64[:, :]
@@ -138,11 +139,11 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
         command_pa = sofc_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
-def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, external_n,
+def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                 learn, controller, log):
     """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
     plant_state, plant_par, plant_inp, plant_out = plant
@@ -154,4 +155,4 @@ def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
         command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, external_n, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)

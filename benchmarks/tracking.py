@@ -1,0 +1,267 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How well controllers track on the realistic rig, both valves, noise on, seeds fixed.
+
+Run ``python benchmarks/tracking.py`` for everything, or ``--part sine,step`` and
+``--valve ppr`` and ``--controller sofc`` for a part of it. Offline, in compiled closed
+loop; every error is that of the muscle (reference less true contraction, no sensor noise).
+
+sine    +-10 mm about 14 mm, root mean square and largest error of the last of 20 cycles,
+        rules untaught at the start; and what of it repeats from cycle to cycle
+step    10 mm up and down: error at the end of the hold, overshoot, time until the error
+        stays within 0.1 mm, overshoot and time from the step of the wanted value
+gait    knee flexion, ten strides at 0.8 Hz after ten at 0.5 Hz
+rigs    random rigs a data sheet does not tell of, +-6 mm about 12 mm, all starting from the
+        rules taught on the nominal rig, beside the same rules frozen
+change  1 kg more and 15 % less supply in the middle of a run at 0.5 Hz
+"""
+
+import argparse
+from dataclasses import dataclass
+from typing import Callable
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_sim import load_rig
+from pam_sim.units import GRAVITY_M_PER_S2
+
+RIG = 'dmsp_5_300_realistic'
+FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
+CYCLES = 20
+SEED = 3
+TEACHING = ((0.1, 3), (1.0, 30), (0.25, 8), (0.5, 20))      # frequency and cycles, in order
+SETTLED_M = 1e-4
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A row of the tables: a name and how to build it for a rig; ``learns``: it has rules."""
+
+    name: str
+    build: Callable
+    learns: bool = False
+
+
+CONTROLLERS = (
+    Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
+    Controller('PID + inverse, as shipped', lambda rig: load_controller('pid', rig)),
+    Controller('PID, as shipped', lambda rig: load_controller('pid_plain', rig)),
+)
+
+
+def sine(frequency_hz, cycles=CYCLES, center_m=0.014, amplitude_m=0.010):
+    """Return the experiment: up to the lowest point, wait, then the sine."""
+    return load_experiment(f"""
+name: sine
+segments:
+  - rest: {{duration_s: 1.0}}
+  - ramp: {{to_m: {center_m - amplitude_m}, duration_s: 2.0}}
+  - hold: {{duration_s: 2.0}}
+  - sine: {{center_m: {center_m}, amplitude_m: {amplitude_m}, frequency_hz: {frequency_hz},
+           cycles: {cycles}}}
+""")
+
+
+def cycles_m(result):
+    """Return the errors [m] of a run as one row per cycle."""
+    start_s, period_s, count = result.cycle_s
+    ticks = round(period_s / (result.time_s[1] - result.time_s[0]))
+    start = round(start_s / (result.time_s[1] - result.time_s[0]))
+    return result.error_m[start:start + count * ticks].reshape(count, ticks)
+
+
+def rms_mm(error_m):
+    """Return the root mean square of errors, mm."""
+    return 1e3 * float(np.sqrt(np.mean(np.square(error_m))))
+
+
+def taught(controller, rig, center_m, amplitude_m):
+    """Let a controller with rules learn sines on a rig; return it."""
+    for frequency_hz, cycles in TEACHING:
+        ClosedLoop(rig, sine(frequency_hz, cycles, center_m, amplitude_m),
+                   seed=SEED + 1).run(controller)
+    return controller
+
+
+def show_sines(valve, controllers):
+    """Print error per frequency and controller."""
+    rig = load_rig(RIG, valve=valve)
+    loops = [ClosedLoop(rig, sine(f), seed=SEED) for f in FREQUENCIES_HZ]
+    print(f'\n### Sine, {valve}: RMSE (largest error; part that repeats) of cycle {CYCLES} [mm]\n')
+    print('| controller | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
+    print('|---|' + '---|' * len(FREQUENCIES_HZ))
+    for one in controllers:
+        cells = []
+        for loop in loops:
+            errors = cycles_m(loop.run(one.build(rig)))
+            cells.append(f'{rms_mm(errors[-1]):.3f} ({1e3 * np.abs(errors[-1]).max():.2f}; '
+                         f'{rms_mm(errors[-4:].mean(axis=0)):.3f})')
+        print(f'| {one.name} | ' + ' | '.join(cells) + ' |', flush=True)
+
+
+def step_figures(result, start_s, end_s, size_m):
+    """Return (error at the end mm, overshoot %, settling s) of one step of a run."""
+    inside = (result.time_s >= start_s) & (result.time_s < end_s)
+    error_m = result.error_m[inside] * np.sign(size_m)
+    time_s = result.time_s[inside] - start_s
+    outside = np.flatnonzero(np.abs(error_m) > SETTLED_M)
+    settled_s = time_s[outside[-1]] if outside.size else 0.0
+    return (1e3 * abs(float(error_m[-200:].mean())),
+            100.0 * max(0.0, -float(error_m.min())) / abs(size_m), settled_s)
+
+
+def show_steps(valve, controllers):
+    """Print what a step of 10 mm up and one down do."""
+    rig = load_rig(RIG, valve=valve)
+    loop = ClosedLoop(rig, load_experiment('step_10mm'), seed=SEED)
+    print(f'\n### Step of 10 mm, {valve}\n')
+    print('| controller | up: end [mm] | overshoot [%] | settled [s] '
+          '| down: end [mm] | overshoot [%] | settled [s] |')
+    print('|---|' + '---|' * 6)
+    for one in controllers:
+        controller = one.build(rig)
+        if one.learns:
+            taught(controller, rig, 0.014, 0.010)
+        result = loop.run(controller)
+        cells = [f'{figure:.3f}' for start_s, size_m in ((5.0, 0.01), (10.0, -0.01))
+                 for figure in step_figures(result, start_s, start_s + 5.0, size_m)]
+        print(f'| {one.name} | ' + ' | '.join(cells) + ' |', flush=True)
+
+
+def show_gait(valve, controllers):
+    """Print the error of the tenth stride of a knee at 0.8 Hz."""
+    rig = load_rig(RIG, valve=valve)
+    experiment = load_experiment('knee_gait')
+    loop = ClosedLoop(rig, experiment, seed=SEED)
+    stroke_m = np.ptp(loop.reference_m[round(6.0 * loop.rate_hz):])
+    end = round((experiment.duration_s - 0.5) * loop.rate_hz)
+    stride = round(loop.rate_hz / 0.8)
+    print(f'\n### Knee gait at 0.8 Hz, {valve}: stroke {stroke_m * 1e3:.1f} mm\n')
+    print('| controller | first stride [mm] | tenth stride [mm] | of the stroke [%] |')
+    print('|---|---|---|---|')
+    for one in controllers:
+        error_m = loop.run(one.build(rig)).error_m
+        last = rms_mm(error_m[end - stride:end])
+        first = rms_mm(error_m[end - 10 * stride:end - 9 * stride])
+        print(f'| {one.name} | {first:.3f} | {last:.3f} | {0.1 * last / stroke_m:.2f} |',
+              flush=True)
+
+
+def random_rig(valve, random):
+    """Return the realistic rig with what a data sheet does not tell drawn anew."""
+    rig = load_rig(RIG, valve=valve)
+    nominal = rig.parameters
+    friction, speed = 2.0 ** random.uniform(-1.0, 1.0), random.uniform(0.7, 1.3)
+    changed = {
+        'T_m': nominal['T_m'] / speed, 'C': nominal['C'] * speed,
+        'supply_pa': nominal['supply_pa'] * random.uniform(0.9, 1.0),
+        'mass_kg': random.uniform(4.0, 5.5), 'force_map_gain': random.uniform(0.85, 1.15)}
+    delay_s = random.uniform(0.020, 0.045)
+    effects = []
+    for setting in rig.effects:
+        parameters = dict(setting.parameters)
+        if setting.name == 'hysteresis':
+            parameters['force_n'] *= friction
+            parameters['force_per_pa'] *= friction
+        elif setting.name == 'valve_dead_time':
+            parameters['delay_s'] = delay_s
+        effects.append({'name': setting.name, 'parameters': parameters})
+    return rig.with_(parameters=changed, effects=effects)
+
+
+def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
+    """Print how the same taught rules fare on rigs they were not taught on."""
+    nominal = load_rig(RIG, valve=valve)
+    driver = driver_config(nominal)
+    experiment = sine(frequency_hz, CYCLES, 0.012, 0.006)
+    print(f'\n### {count} random rigs, {valve}: RMSE of cycle {CYCLES} at {frequency_hz:g} Hz, '
+          '+-6 mm about 12 mm\n')
+    print('| controller | nominal [mm] | median | worst | median/nominal | worst/nominal '
+          '| worst ratio to frozen rules | highest pressure [kPa] |')
+    print('|---|' + '---|' * 7)
+    for one in controllers:
+        if not one.learns:
+            continue
+        teacher = taught(one.build(nominal), nominal, 0.012, 0.006)
+        figures = []
+        random = np.random.default_rng(SEED)
+        for k in range(count + 1):
+            rig = nominal if k == 0 else random_rig(valve, random)
+            loop = ClosedLoop(rig, experiment, seed=SEED + k, driver=driver)
+            ends = []
+            for learn in (True, False):
+                controller = one.build(nominal)
+                controller.rules.assign(teacher.rules)
+                result = loop.run(controller, learn)
+                ends.append(rms_mm(cycles_m(result)[-1]))
+            figures.append((*ends, 1e-3 * (result.pressure_pa.max() - 101_325.0)))
+        table = np.array(figures)
+        learned, frozen = table[1:, 0], table[1:, 1]
+        print(f'| {one.name} | {table[0, 0]:.3f} | {np.median(learned):.3f} | {learned.max():.3f} '
+              f'| {np.median(learned) / table[0, 0]:.2f} | {learned.max() / table[0, 0]:.2f} '
+              f'| {np.max(learned / frozen):.2f} | {table[:, 2].max():.0f} |', flush=True)
+
+
+def show_changes(valve, controllers):
+    """Print the cycles after a change in the middle of the run."""
+    rig = load_rig(RIG, valve=valve)
+    supply_pa = rig.parameters['supply_pa']
+    frequency_hz, cycles, change = 0.5, 30, 20
+    begins_s = 5.0 + change / frequency_hz
+    cases = {
+        '1 kg more': {
+            'external_force_n': lambda t: GRAVITY_M_PER_S2 if t >= begins_s else 0.0},
+        'supply -15 %': {
+            'supply_pa': lambda t: supply_pa * (0.85 if t >= begins_s else 1.0)}}
+    print(f'\n### Change in cycle {change + 1} at {frequency_hz:g} Hz, +-6 mm about 12 mm, '
+          f'{valve}: RMSE per cycle [mm]\n')
+    print('| controller | change | cycle before | 1 after | 2 | 3 | 4 | 5 | 6 | 10 |')
+    print('|---|' + '---|' * 9)
+    for one in controllers:
+        for name, course in cases.items():
+            loop = ClosedLoop(
+                rig, sine(frequency_hz, cycles, 0.012, 0.006), seed=SEED, **course)
+            error = 1e3 * loop.run(one.build(rig)).cycle_rmse_m()
+            cells = [f'{error[change + k]:.3f}' for k in (-1, 0, 1, 2, 3, 4, 5, 9)]
+            print(f'| {one.name} | {name} | ' + ' | '.join(cells) + ' |', flush=True)
+
+
+PARTS = ('sine', 'step', 'gait', 'rigs', 'change')
+
+
+def main():
+    """Print the tables as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--part', default=','.join(PARTS), help='tables, by commas')
+    parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
+    parser.add_argument('--controller', default='', help='only those whose name has this in it')
+    parser.add_argument('--rigs', type=int, default=200, help='number of random rigs')
+    args = parser.parse_args()
+    chosen = [one for one in CONTROLLERS if args.controller.lower() in one.name.lower()]
+    for part in args.part.split(','):
+        for valve in args.valve.split(','):
+            if part == 'rigs':
+                show_random_rigs(valve, chosen, args.rigs)
+            else:
+                {'sine': show_sines, 'step': show_steps, 'gait': show_gait,
+                 'change': show_changes}[part](valve, chosen)
+
+
+if __name__ == '__main__':
+    main()
