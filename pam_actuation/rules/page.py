@@ -51,13 +51,13 @@ def page(found, view, top):
 def chart(grid, since):
     """Return the figure of one grid as SVG text: lines over few columns, else heat maps."""
     if len(grid.columns.values) <= 2:
+        versions = [('before', grid.before), ('now', grid.values)][not grid.before.any():]
         return svg.line_chart(
-            [svg.Curve(f'{name}{when}'.strip(', ') or 'now', grid.rows.values, values[:, c])
-             for c, name in enumerate(grid.columns.names or ('',))
-             for when, values in ((', before', grid.before), (', now', grid.values))],
+            [svg.Curve(f'{name}, {when}' if name else when, grid.rows.values, values[:, c])
+             for c, name in enumerate(grid.columns.names) for when, values in versions],
             grid.rows.title, 'added pressure [kPa]', grid.title, legend_share=0.27)
     maps = [('now', grid.values)]
-    if grid.change.any():
+    if grid.change.any() and grid.before.any():
         maps.append((f'changed against {since}', grid.change))
     return svg.heat_map_chart(
         [svg.HeatMap(name, grid.columns.labels, grid.rows.labels, values, grid.never)

@@ -61,6 +61,8 @@ def _grid(grid, since, width, colour):
              + (f', {grid.columns.title} across' if grid.columns.name else '')]
     left_out = grid.values.size - len(rows) * len(columns)
     legend = [f'{NEVER} never fired'] if grid.never[np.ix_(rows, columns)].any() else []
+    if grid.change.any() and not grid.before.any():
+        legend.append(f'all zero in {since}')
     if left_out:
         legend.append(f'{left_out} rules at the borders are zero and never fired')
     lines += [f'  ({"; ".join(legend)})'] if legend else []
@@ -73,12 +75,13 @@ def _grid(grid, since, width, colour):
     names = [grid.columns.labels[c] for c in columns]
     labels = [grid.rows.labels[r] for r in rows]
     parts = [('', values), ('changed by', changes), ('fired, s', fired)]
-    if largest < _LEAST_KPA:
+    told = largest >= _LEAST_KPA and grid.before.any()
+    if not told:
         del parts[1]
     if grid.never.all():
         del parts[-1]
     if len(columns) <= _FEW:
-        if largest >= _LEAST_KPA:
+        if told:
             lines[0] += f'; changes against {since}'
         heads = [name if not what else what for name in names for what, _ in parts]
         cells = [[part[row][c] for c in range(len(columns)) for _, part in parts]

@@ -97,10 +97,22 @@ def test_text_shows_values_changes_firing_and_words():
     assert any(line.strip().startswith('PS 0.667') and '5.00' in line for line in first)
     assert len({len(line) for line in first[2:10]}) == 1           # aligned
     forward = next(block for block in blocks if block.startswith('feedforward')).splitlines()
-    assert forward[-1].split() == ['15', '0·', '0', '·', '+6.30', '+6.30', '2.00']
+    assert 'all zero in the initial rules' in forward[1]
+    assert forward[-1].split() == ['15', '0·', '·', '+6.30', '2.00']
     assert blocks[-1].splitlines()[1].strip().endswith('% near 15 mm, extending: add 6.3 kPa'
                                                        .replace('% ', '%  '))
     assert len(blocks[-1].splitlines()) == 4
+
+
+def test_few_columns_have_their_changes_beside_them():
+    rules = taught()
+    rules.feedforward_initial[1, 12] = 5000.0
+    block = next(block for block in text_of(rules).split('\n\n') if block.startswith('feedf'))
+    lines = block.splitlines()
+    assert lines[0].endswith('changes against the initial rules')
+    assert lines[2].split() == ['contracting', 'changed', 'by', 'fired,', 's', 'extending',
+                                'changed', 'by', 'fired,', 's']
+    assert lines[-1].split() == ['15', '0·', '0', '·', '+6.30', '+1.30', '2.00']
 
 
 def test_text_of_rules_that_never_fired():
