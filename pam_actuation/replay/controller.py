@@ -36,6 +36,7 @@ _MEASURED = {
     'contraction': ('contraction_m', 'contraction_m'),
     'pressure': ('pressure_pa', 'pressure_pa'),
     'force': ('force_n', 'force_n')}
+_PROGRESS_EVERY = 2000    # ticks
 
 
 @dataclass
@@ -87,7 +88,7 @@ class ReplayResult:
                 f'{self.max_abs_difference_pa:g} Pa; differing: {where or "commands"}')
 
 
-def replay_controller(run, controller=None, keep_states=False):
+def replay_controller(run, controller=None, keep_states=False, progress=None):
     """
     Replay the controller of a recording.
 
@@ -101,6 +102,8 @@ def replay_controller(run, controller=None, keep_states=False):
         are then not compared.
     keep_states : bool
         Also return every internal number of every tick.
+    progress : callable, optional
+        Called now and then with the share of the ticks done, 0 to 1.
 
     Returns
     -------
@@ -142,6 +145,8 @@ def replay_controller(run, controller=None, keep_states=False):
     kept = np.empty((len(order), len(core.names))) if keep_states else None
     missing = 0
     for place, row in enumerate(order.tolist()):
+        if progress is not None and place % _PROGRESS_EVERY == 0:
+            progress(place / len(order))
         command_pa, values = core.run(_inputs(columns, row, lookups, unit, run.path))
         replayed[place] = command_pa
         if keep_states:

@@ -92,15 +92,23 @@ def _force(run, points):
 
 
 def _valve(run, points):
-    volts = signals.series(run, 'valve_signal', 'ppr_voltage')
-    if volts is not None:
-        return 'valve voltage [V]', [figures.line(
-            *volts, 'voltage', 'green', held=True, width=1.2, max_points=points)]
-    fill = signals.series(run, 'valve_signal', 'fill_duty')
-    vent = signals.series(run, 'valve_signal', 'vent_duty')
-    if fill is None or vent is None:
-        return None
-    return 'duty [–], vent downwards', [
-        figures.line(*fill, 'fill', 'green', held=True, width=1.0, max_points=points),
-        figures.line(vent[0], -np.asarray(vent[1]), 'vent', 'second', held=True, width=1.0,
-                     max_points=points)]
+    """Return what went to the valve, and what was asked for where signals were commanded."""
+    volts = _both(run, 'ppr_voltage', 'voltage', 'green', 1.0, points)
+    if volts:
+        return 'valve voltage [V]', volts
+    duties = (_both(run, 'fill_duty', 'fill', 'green', 1.0, points)
+              + _both(run, 'vent_duty', 'vent', 'second', -1.0, points))
+    return ('duty [–], vent downwards', duties) if duties else None
+
+
+def _both(run, field, name, role, sign, points):
+    """Return the traces of one signal as sent and, if there are commands, as commanded."""
+    traces = []
+    for topic, title, colour, dash in (('valve_signal', name, role, None),
+                                       ('valve_command', f'{name}, commanded', 'command', 'dot')):
+        pair = signals.series(run, topic, field)
+        if pair is not None:
+            traces.append(figures.line(
+                pair[0], sign * np.asarray(pair[1]), title, colour, held=True, dash=dash,
+                width=1.2, max_points=points))
+    return traces
