@@ -39,7 +39,8 @@ EXECUTABLES = (
     'reference_generator', 'experiment_recorder')
 
 # Import name -> name in setup.py, where they differ.
-DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
+                 'skfuzzy': 'scikit-fuzzy'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
 ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
@@ -50,6 +51,8 @@ ROSDEP_KEYS = {
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
+# Only where a cluster is named; tuning/workers.py says what to install.
+OPTIONAL = {'dask', 'ray'}
 
 
 @pytest.fixture(scope='module')
@@ -162,7 +165,7 @@ def test_shared_files_are_installed(setup_keywords):
 
 def test_every_import_is_declared(manifest, setup_keywords):
     modules = {**imported_modules('pam_sim'), **imported_modules('pam_actuation')}
-    for own in ('pam_sim', 'pam_actuation'):
+    for own in ('pam_sim', 'pam_actuation', *OPTIONAL):
         modules.pop(own, None)
     pip_names = requirement_names(setup_keywords['install_requires'])
     keys = {depend.name for depend in manifest.exec_depends}

@@ -208,15 +208,6 @@ def test_exchange_of_rules_makes_no_step_in_the_command():
     assert controller.rules_replaced == 1
 
 
-def test_rules_read_as_sentences():
-    controller = sofc(QUIET)
-    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
-    feed(controller, 60, 5e-4)
-    text = ' '.join(controller.rules.sentences())
-    assert 'if contracting and the reference is near 10.0 mm then add +' in text
-    assert 'the error is small positive' in text
-
-
 def test_every_output_has_a_name():
     assert len(layout.STATE_NAMES) == layout.OUTPUT_COUNT
     assert len(set(layout.STATE_NAMES)) == layout.OUTPUT_COUNT

@@ -386,7 +386,7 @@ def _guard(par, values, kept, st, inp, error, reason, out):
 
 def _entry(key):
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True)
+    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
     def sofc_step(par, inverse, values, initial, fired, kept, ring, st, inp, out):
         """
         Run one tick; return the pressure command [absolute Pa].
