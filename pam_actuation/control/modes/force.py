@@ -269,6 +269,11 @@ class ForceMode:
         """Return a table of the right size; every tick fills it."""
         return np.zeros(2 + int(self.surface[1]))
 
+    def rule_scaling(self):
+        """Return what turns the metres of the rules into newtons, as part of their scaling."""
+        return {'tracked_unit': 'N', 'tracked_per_m': self.stiffness_n_per_m,
+                'tracked_zero_m': 0.0}
+
     def wrap(self, law):
         """Return the law in this mode."""
         return ForceController(law, self.surface, self.stiffness_n_per_m, self.contraction_m)

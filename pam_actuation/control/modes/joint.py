@@ -292,6 +292,11 @@ class JointMode:
                              self._where)
         return np.zeros(2 + NODES)
 
+    def rule_scaling(self):
+        """Return what turns the metres of the rules into radians, as part of their scaling."""
+        return {'tracked_unit': 'rad', 'tracked_per_m': 1.0 / self.values['flexor_radius_m'],
+                'tracked_zero_m': self.values['flexor_contraction_at_zero_m']}
+
     def wrap(self, law):
         """Return the law in this mode, with the static inverse of the joint if it had none."""
         controller = JointController(law, *(self.values[key] for key in KEYS), self._where)
