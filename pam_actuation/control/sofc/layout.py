@@ -113,7 +113,8 @@ S_EXPECTED = 32
 S_SHARE = 33
 S_LEAD = 34
 S_RATE_CEILING = 35
-STATE_COUNT = 36
+S_FIRST_BAD = 36
+STATE_COUNT = 37
 
 # Outputs of one tick; STATE_NAMES are their names on topic controller_state.
 O_COMMAND = 0

@@ -63,7 +63,7 @@ SETTINGS = (
     Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
     Setting('motion_learning', '-', 0.4, 0.0, 2.0,
             'share of the index a motion rule mends per pass of the reference'),
-    Setting('pass_time_s', 's', 0.3, 0.05, 100.0,
+    Setting('pass_time_s', 's', 0.5, 0.05, 100.0,
             'standing still for so long counts as one pass'),
     Setting('correction_pa_per_m', 'Pa/m', 0.0, 0.0, 1e9,
             'pressure that mends an index of 1 m; 0 = slope of the static inverse'),
