@@ -19,7 +19,10 @@ A pneumatic muscle answers a command after dead time, valve lag and filter
 delay. A ring buffer keeps the firing strengths of the last ticks; the
 performance index of now belongs to the rules of ``delay`` ticks ago, or, when
 the delay is not known well, to those of ``delay - spread .. delay + spread``
-ticks ago with triangular weights that sum to 1.
+ticks ago with triangular weights that sum to 1. Each set of active rules is
+judged once, when all of the indices that belong to it are known: ``delay +
+spread`` ticks later. A spread also keeps fast swings of the error out of the
+rules, without a shift in phase.
 """
 
 from pam_sim.compiled import compiled
@@ -40,7 +43,8 @@ ENTRY_MOTION_PASS = 12    # the same for the motion rules
 ENTRY_CORRECTION = 13     # pressure that mends an index of 1 m there [Pa/m]
 ENTRY_VALID = 14          # 1 = neither saturated nor disturbed when it was active
 ENTRY_OUTPUT = 15         # command [Pa] of that tick
-ENTRY_SIZE = 16
+ENTRY_INDEX = 16          # performance index [m] of that tick, 0 where nothing was learned
+ENTRY_SIZE = 17
 
 
 def ring_rows(delay, spread, answer=0):
@@ -95,3 +99,16 @@ def kernel_weight(offset, spread):
     """Return the triangular weight of the entry ``offset`` ticks off the credit delay."""
     side = spread + 1
     return (side - abs(offset)) / (side * side)
+
+
+@compiled
+def credited_index(ring, tick, spread):
+    """Return the index [m] that belongs to the rules of ``delay + spread`` ticks ago."""
+    row = row_of(ring, tick, 2 * spread)
+    total = 0.0
+    for offset in range(-spread, spread + 1):
+        total += kernel_weight(offset, spread) * ring[row, ENTRY_INDEX]
+        row += 1
+        if row == ring.shape[0]:
+            row = 0
+    return total
