@@ -83,7 +83,7 @@ def test_credit_goes_to_the_rules_active_the_delay_ago():
         row = credit.row_of(ring, tick, 0)
         credit.push_feedback(ring, row, tick % 6, 0.1, 0, 0.0, 1.0)
         credit.push_feedforward(ring, row, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
-        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 1.0, 1e5 + tick)
+        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 0.0, 1.0, 1e5 + tick)
         if tick >= 5:
             row = credit.row_of(ring, tick, 5)
             assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6

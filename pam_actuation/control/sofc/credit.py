@@ -44,7 +44,8 @@ ENTRY_CORRECTION = 13     # pressure that mends an index of 1 m there [Pa/m]
 ENTRY_VALID = 14          # 1 = neither saturated nor disturbed when it was active
 ENTRY_OUTPUT = 15         # command [Pa] of that tick
 ENTRY_INDEX = 16          # performance index [m] of that tick, 0 where nothing was learned
-ENTRY_SIZE = 17
+ENTRY_MOVING = 17         # what the integral [Pa] added then beyond its mean
+ENTRY_SIZE = 18
 
 
 def ring_rows(delay, spread, answer=0):
@@ -79,11 +80,13 @@ def push_feedforward(ring, row, k, wk, m, wm, n, wn):
 
 
 @compiled
-def push_outcome(ring, row, a_pass, motion_pass, correction_pa_per_m, valid, output_pa):
+def push_outcome(
+        ring, row, a_pass, motion_pass, correction_pa_per_m, moving_pa, valid, output_pa):
     """Write how far the reference passed the rules, what an error is worth, and the command."""
     ring[row, ENTRY_PASS] = a_pass
     ring[row, ENTRY_MOTION_PASS] = motion_pass
     ring[row, ENTRY_CORRECTION] = correction_pa_per_m
+    ring[row, ENTRY_MOVING] = moving_pa
     ring[row, ENTRY_VALID] = valid
     ring[row, ENTRY_OUTPUT] = output_pa
 

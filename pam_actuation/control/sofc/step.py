@@ -66,6 +66,7 @@ def _start(par, inverse, values, kept, st, inp):
         if x > _LIFTED_M:
             trim = pressure - inverse_pressure_pa(inverse, x)
             st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
+            st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
 
 
 @compiled
@@ -151,7 +152,9 @@ def _learn(par, values, initial, ring, st):
         rate * index * par[at.P_PERIOD] * par[at.P_FEEDBACK_LEARNING],
         leak * par[at.P_FEEDBACK_LEAK], par[at.P_FEEDBACK_STEP_LIMIT])
     # What the index asks for in pressure, for one pass.
-    wanted_pa = rate * index * ring[row, credit.ENTRY_CORRECTION]
+    wanted_pa = rate * (
+        index * ring[row, credit.ENTRY_CORRECTION]
+        + par[at.P_TAKEOVER] * ring[row, credit.ENTRY_MOVING])
     ff_squares = learning.modify_feedforward(
         values[1], initial[1], share,
         int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
@@ -288,12 +291,14 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     # Credit memory and rule modification.
     undisturbed = st[at.S_FREEZE_LEFT] <= 0.0 and abs(offset) <= _START_BAND_M
     row = credit.row_of(ring, int(st[at.S_TICK]), 0)
+    mean = st[at.S_INTEGRAL_MEAN]
+    st[at.S_INTEGRAL_MEAN] += period / (par[at.P_TAKEOVER_TIME] + period) * (integral - mean)
     credit.push_feedback(ring, row, i, wi, j, wj, share)
     credit.push_feedforward(ring, row, k, wk, m, wm, n, wn)
     correction = par[at.P_CORRECTION]
     if not correction > 0.0:
         correction = dynamics.slope_pa_per_m(inverse, lead)
-    credit.push_outcome(ring, row, a_pass, motion_pass, correction,
+    credit.push_outcome(ring, row, a_pass, motion_pass, correction, integral - mean,
                         0.0 if limited or not undisturbed else 1.0, command)
     if par[at.P_INDEX_FORM] < 0.5:
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
