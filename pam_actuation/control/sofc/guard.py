@@ -25,7 +25,7 @@ the rules.
 * Two such windows in a row, the second clearly worse than the first, mean that
   learning itself spoils the rules (after a change of the plant the error falls from
   window to window): the copy comes back and the full rate is halved until there is a
-  new best. Five of them without growth are the new normal.
+  new best. So do five of them that grow slowly; five without growth are the new normal.
 """
 
 import math
@@ -34,7 +34,6 @@ from pam_actuation.control.sofc import layout as at
 from pam_sim.compiled import compiled
 
 _SAME_SPEED = 0.25        # windows whose mean speeds differ by more are not compared
-_BAD_WINDOWS = 2
 _NEW_NORMAL = 5
 _FALLING = 0.97           # error of a window over the best one that still counts as falling
 _GROWING = 1.1            # error of a bad window over the former one that counts as growing
@@ -108,9 +107,14 @@ def _judge(par, st, values, kept):
         return False
     st[at.S_RATE_FACTOR] = 1.0
     st[at.S_BAD_WINDOWS] += 1.0
-    if st[at.S_BAD_WINDOWS] >= _BAD_WINDOWS and rms > _GROWING * former:
+    if st[at.S_BAD_WINDOWS] <= 1.0:
+        st[at.S_FIRST_BAD] = rms
+        return False
+    if rms > _GROWING * former:
         return True
     if st[at.S_BAD_WINDOWS] >= _NEW_NORMAL:
+        if rms > _GROWING * st[at.S_FIRST_BAD]:
+            return True
         _new_best(st, rms, values, kept)
     return False
 
