@@ -193,3 +193,20 @@ def test_rules_read_in_newtons(rig):
     rules.motion_fired[5, -1] = 10.0
     assert rules.tables()[1].antecedents[0].words == ('rising', 'falling')
     assert any('N' in one.sentence and 'rising at' in one.sentence for one in ranked(rules))
+
+
+def test_rule_files_keep_what_is_tracked(rig, tmp_path):
+    rules = load_controller('sofc_force_ppr', rig).rules
+    rules.motion[5, 3] = 3e3
+    path = tmp_path / 'rules.json'
+    rules.save(path)
+    again = load_controller('sofc_force_ppr', rig, rules_file=path)
+    assert again.rules.digest() == rules.digest() and again.rules.scaling == rules.scaling
+    for name, value in (('tracked_unit', 'lbf'), ('tracked_per_m', -1.0), ('tracked_zero_m', None)):
+        spoiled = rules.copy()
+        spoiled.scaling[name] = value
+        if value is None:
+            del spoiled.scaling[name]
+        spoiled.save(path)
+        with pytest.raises(InputError, match='tracked'):
+            load_controller('sofc_force_ppr', rig, rules_file=path)
