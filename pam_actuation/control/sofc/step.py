@@ -128,6 +128,8 @@ def _reason(par, ring, st, inp, error, limited, lags):
     then = credit.row_of(ring, tick, delay)
     if limited or ring[then, credit.ENTRY_VALID] < 0.5:
         return learning.FROZEN_SATURATED
+    if st[at.S_FORMER] > 0.0 and abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0:
+        return learning.FROZEN_SURPRISE
     if abs(error) <= par[at.P_DEAD_ZONE]:
         return learning.FROZEN_DEAD_ZONE
     return learning.LEARNING
