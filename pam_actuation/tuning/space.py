@@ -55,10 +55,10 @@ SOFC_AXES = (
     Axis('reference_knots', 13, 61, log=False, whole=True),
 )
 PID_AXES = (
-    Axis('proportional_pa_per_m', 1e5, 1e7),
-    Axis('integral_pa_per_m_s', 1e6, 1e8),
-    Axis('derivative_pa_s_per_m', 5e3, 1e6),
-    Axis('change_filter_s', 0.005, 0.06),
+    Axis('proportional_pa_per_m', 1e5, 3e7),
+    Axis('integral_pa_per_m_s', 1e6, 6e8),
+    Axis('derivative_pa_s_per_m', 1e3, 3e6),
+    Axis('change_filter_s', 0.001, 0.06),
 )
 PID_INVERSE_AXES = PID_AXES + (Axis('lead_s', 0.0, 0.2, log=False),)
 LQI_AXES = (
