@@ -73,6 +73,8 @@ CLUSTER_REQUIRES = [
 # Only to compare speeds; nothing in the package imports it.
 BENCH_REQUIRES = [
     'mujoco>=3.2',
+    'scikit-fuzzy>=0.5',
+    'networkx>=3.2',  # scikit-fuzzy needs it and does not bring it
 ]
 
 

@@ -39,7 +39,8 @@ EXECUTABLES = (
     'reference_generator', 'experiment_recorder')
 
 # Import name -> name in setup.py, where they differ.
-DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
+                 'skfuzzy': 'scikit-fuzzy'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
 ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',

@@ -95,7 +95,7 @@ def load_run(path, namespace=None, recover=False):
         a pressure or contraction.
 
     """
-    bag = read_bag(path, recover=recover)
+    bag = read_bag(path, recover=recover, wanted=is_read)
     namespace = _choose_namespace(bag, namespace)
     found = topics_of(bag, namespace)
     remarks = list(bag.remarks)
@@ -136,8 +136,16 @@ def topics_of(bag, namespace):
 
 def is_rig_topic(topic):
     """Return whether a TopicData has the name and the message type of a topic of the rig."""
-    short = topic.name.rsplit('/', 1)[-1]
-    return topic.encoding == 'cdr' and codecs.TOPIC_TYPES.get(short) == topic.type_name
+    return _is_of_rig(topic.name, topic.type_name, topic.encoding)
+
+
+def is_read(name, type_name, encoding):
+    """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
+    return not name.endswith('/diagnostics') and _is_of_rig(name, type_name, encoding)
+
+
+def _is_of_rig(name, type_name, encoding):
+    return encoding == 'cdr' and codecs.TOPIC_TYPES.get(name.rsplit('/', 1)[-1]) == type_name
 
 
 def namespaces(bag):

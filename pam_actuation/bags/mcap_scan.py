@@ -83,7 +83,7 @@ class McapContent:
         return sum(len(channel.messages) for channel in self.channels.values())
 
 
-def scan(stream):
+def scan(stream, wanted=None):
     """
     Return the McapContent of a file.
 
@@ -94,6 +94,9 @@ def scan(stream):
     ----------
     stream : binary file or bytes
         Open for reading, seekable; or the bytes of the file themselves.
+    wanted : callable, optional
+        Called with topic, message type and encoding of every channel: whether to keep its
+        messages, or to count them only.
 
     """
     if isinstance(stream, (bytes, bytearray, memoryview)):
@@ -105,7 +108,7 @@ def scan(stream):
             'the file ends inside its first bytes' if MAGIC.startswith(begin)
             else 'not an MCAP file', 0)
         return content
-    scanner = _Scanner(content, stream)
+    scanner = _Scanner(content, stream, wanted)
     try:
         scanner.walk()
     except Damaged as damage:
@@ -121,7 +124,7 @@ def _read(stream, position, size):
 
 class _Scanner:
 
-    def __init__(self, content, stream):
+    def __init__(self, content, stream, wanted):
         # Imported late: a recorder reads bags only after a crash, the compiler is large.
         from pam_actuation.bags.message_batch import MessageBatch
         from pam_actuation.bags.record_walk import walk_messages
@@ -130,6 +133,7 @@ class _Scanner:
         self._unpack_zstd = zstandard.ZstdDecompressor().decompress
         self.content = content
         self.stream = stream
+        self.wanted = wanted
         self.size = stream.seek(0, os.SEEK_END)
         self.batch = MessageBatch()
         self.schemas = {0: ('', '', '')}
@@ -267,7 +271,8 @@ class _Scanner:
         metadata = _texts(data, begin)[0]
         self.content.channels[key] = Channel(
             topic, name, encoding, schema_encoding, text, metadata,
-            self.batch.add_channel(key))
+            self.batch.add_channel(
+                key, self.wanted is None or self.wanted(topic, name, encoding)))
 
 
 def _text(data, begin):

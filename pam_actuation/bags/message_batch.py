@@ -28,9 +28,14 @@ _KEYS = 2**16
 
 
 class MessageColumns:
-    """The messages of one channel in file order: their bytes and their times [ns]."""
+    """
+    The messages of one channel in file order: their bytes and their times [ns].
 
-    def __init__(self):
+    Of a channel that is not ``kept`` only the number of messages is known.
+    """
+
+    def __init__(self, kept=True):
+        self._kept = kept
         self.payloads = Payloads()
         self._log, self._publish = [], []
 
@@ -50,6 +55,9 @@ class MessageColumns:
 
     def append(self, data, positions):
         """Append the message records of ``data`` that begin at ``positions``, shape (n,)."""
+        if not self._kept:
+            self.payloads.skip(len(positions))
+            return
         heads = windows(data, MESSAGE_HEAD.itemsize)[positions].view(MESSAGE_HEAD)
         first = len(self.payloads)
         for length, places in alike(heads['length'].astype(np.int64)):
@@ -71,9 +79,9 @@ class MessageBatch:
     def _clear(self):
         self._data, self._positions, self._keys, self._size = [], [], [], 0
 
-    def add_channel(self, key):
+    def add_channel(self, key, kept=True):
         """Accept messages of channel number ``key`` from now on; return its MessageColumns."""
-        self._columns[key] = MessageColumns()
+        self._columns[key] = MessageColumns(kept)
         self._known[key] = True
         return self._columns[key]
 

@@ -59,6 +59,10 @@ class Payloads:
         self._parts.append((self._count, indices, rows))
         self._count += len(rows)
 
+    def skip(self, count):
+        """Count further messages whose bytes are not kept; they read as empty."""
+        self._count += count
+
     def extend(self, other):
         """Append all messages of another Payloads."""
         for first, indices, rows in other._parts:

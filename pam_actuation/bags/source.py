@@ -80,7 +80,7 @@ class Bag:
         return dict(self.records.get(EXPERIMENT_RECORD, {}))
 
 
-def read_bag(path, recover=False):
+def read_bag(path, recover=False, wanted=None):
     """
     Read a bag into memory.
 
@@ -90,6 +90,9 @@ def read_bag(path, recover=False):
         Directory with metadata.yaml, directory with only .mcap files, .mcap or .db3 file.
     recover : bool
         Also read what precedes the damage in a file that ended early.
+    wanted : callable, optional
+        Called with topic, message type and encoding: whether to keep these messages. Others
+        are counted, and nothing of them is kept in memory.
 
     Raises
     ------
@@ -102,13 +105,13 @@ def read_bag(path, recover=False):
         if not path.exists():
             raise InputError('no such file or directory; give the path of a bag', path)
         if path.is_dir():
-            return _read_directory(path, recover)
+            return _read_directory(path, recover, wanted)
         if path.suffix == '.mcap':
-            return _read_mcap(path, [path], recover)
+            return _read_mcap(path, [path], recover, wanted)
         if path.suffix == '.db3':
-            return _read_with_rosbags(path, path)
+            return _read_with_rosbags(path, path, wanted)
         if path.name == layout.METADATA_FILE:
-            return _read_directory(path.parent, recover)
+            return _read_directory(path.parent, recover, wanted)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
     except OSError as error:
@@ -118,22 +121,22 @@ def read_bag(path, recover=False):
         'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
 
 
-def _read_directory(path, recover):
+def _read_directory(path, recover, wanted):
     facts = _directory_facts(path)
     if facts is None:
         files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
         if files:
-            return _read_mcap(path, files, recover)
+            return _read_mcap(path, files, recover, wanted)
         databases = sorted(path.glob('*.db3'), key=_by_number)
         if len(databases) == 1:
-            return _read_with_rosbags(path, databases[0])
+            return _read_with_rosbags(path, databases[0], wanted)
         raise InputError(
             'no bag in this directory (neither metadata.yaml nor .mcap files); give the '
             "directory that 'pam run', 'pam simulate' or 'ros2 bag record' made", path)
     plain_mcap = (
         facts.get('storage_identifier') == 'mcap' and not facts.get('compression_mode'))
     if not plain_mcap:
-        return _read_with_rosbags(path, path)
+        return _read_with_rosbags(path, path, wanted)
     files = []
     for name in facts['relative_file_paths']:
         # Version 3 and older repeat the directory's name in front of the file's.
@@ -143,7 +146,7 @@ def _read_directory(path, recover):
             raise InputError(
                 f'the file {name} named in {layout.METADATA_FILE} is missing', path)
         files.append(found[0])
-    bag = _read_mcap(path, files, recover)
+    bag = _read_mcap(path, files, recover, wanted)
     announced, present = facts.get('message_count'), sum(bag.counts.values())
     if not isinstance(announced, int) or announced.bit_length() > 64:
         bag.remarks.append(f'{layout.METADATA_FILE} announces no number of messages.')
@@ -184,13 +187,15 @@ def _by_number(path):
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 
-def _read_mcap(path, files, recover):
+def _read_mcap(path, files, recover, wanted):
     bag = Bag(path=path, storage='mcap')
+    keep = None if wanted is None else (
+        lambda topic, type_name, encoding: wanted(topic, _full_type_name(type_name), encoding))
     pieces = {}
     for file in files:
         with open(file, 'rb') as stream:
             _refuse_foreign(stream.read(len(MAGIC)), file)
-            content = scan(stream)
+            content = scan(stream, keep)
         if content.damage is not None:
             readable = (
                 f'{content.message_count} messages before that can still be read')
@@ -253,7 +258,7 @@ def _full_type_name(name):
     return f'{package}/msg/{rest}' if rest and '/' not in rest else name
 
 
-def _read_with_rosbags(path, opened):
+def _read_with_rosbags(path, opened, wanted):
     bag = Bag(path=path, storage='sqlite3')
     try:
         with Reader(opened) as reader:
@@ -261,13 +266,20 @@ def _read_with_rosbags(path, opened):
                 bag.topics.setdefault(
                     connection.topic, TopicData(connection.topic, connection.msgtype))
             raws, times = ({name: [] for name in bag.topics} for _ in range(2))
-            for connection, log_time_ns, raw in reader.messages():
+            read, counted = [], []
+            for connection in reader.connections:
                 topic = bag.topics[connection.topic]
                 if connection.msgtype == topic.type_name:
-                    raws[topic.name].append(bytes(raw))
-                    times[topic.name].append(log_time_ns)
+                    kept = wanted is None or wanted(topic.name, topic.type_name, topic.encoding)
+                    (read if kept else counted).append(connection)
+            # Without a connection the library would read them all.
+            for connection, log_time_ns, raw in reader.messages(read) if read else ():
+                raws[connection.topic].append(bytes(raw))
+                times[connection.topic].append(log_time_ns)
             for name, topic in bag.topics.items():
                 topic.payloads = Payloads(raws[name])
+                topic.payloads.skip(sum(
+                    one.msgcount for one in counted if one.topic == name))
                 # This storage keeps only the receive time.
                 topic.log_time_ns = np.array(times[name], dtype=np.int64)
                 topic.publish_time_ns = topic.log_time_ns

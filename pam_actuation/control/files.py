@@ -40,7 +40,9 @@ def write_atomically(path, text):
             os.fsync(stream.fileno())
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
+        temporary = None
     except OSError as error:
+        raise InputError(f'cannot be written: {error.strerror}', path) from None
+    finally:
         if temporary is not None and os.path.exists(temporary):
             os.unlink(temporary)
-        raise InputError(f'cannot be written: {error.strerror}', path) from None

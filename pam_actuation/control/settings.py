@@ -16,7 +16,6 @@
 
 from dataclasses import dataclass
 import difflib
-import math
 
 from pam_sim.errors import InputError
 
@@ -67,7 +66,8 @@ def checked_settings(specification, given, where=None):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError(
                 f'{setting.name} must be a number, not {value!r}', place(setting.name))
-        if not (math.isfinite(value) and setting.lower <= value <= setting.upper):
+        # Also refuses what is not finite, and whole numbers beyond all floats.
+        if not setting.lower <= value <= setting.upper:
             raise InputError(
                 f'{setting.name} = {value} {setting.unit} is outside '
                 f'{setting.lower:g}...{setting.upper:g} {setting.unit}', place(setting.name))

@@ -42,8 +42,7 @@ class SofcNode(ControllerNode):
         """Load the controller and its rules, offer the services for the rules."""
         super().setup()
         self.learning = self.value('learning')
-        path = self.value('rules_file')
-        if path and os.path.exists(path):
+        if self.value('rules_file') and os.path.exists(self._path()):
             self._load()
         self._rule_services = [
             self.create_service(SetBool, '~/freeze_learning', self._freeze),
@@ -69,11 +68,15 @@ class SofcNode(ControllerNode):
         return response
 
     def _answered(self, action):
-        """Return a Trigger callback that reports what the action says or what is wrong."""
+        """
+        Return a Trigger callback that reports what the action says or what is wrong.
+
+        An action holds the lock of the loops for the exchange of rules only: a disk that takes
+        its time delays no tick.
+        """
         def callback(request, response):
             try:
-                with self.loops.lock:
-                    response.message = action()
+                response.message = action()
                 response.success = True
             except InputError as error:
                 response.message = str(error)
@@ -87,16 +90,20 @@ class SofcNode(ControllerNode):
         return os.path.expanduser(path)
 
     def _save(self):
-        self.controller.rules.save(self._path())
+        with self.loops.lock:
+            rules = self.controller.rules.copy()
+        rules.save(self._path())
         return f'rules saved to {self._path()}'
 
     def _load(self):
         rules = type(self.controller.rules).load(self._path(), self.controller.rules)
-        self.controller.replace_rules(rules, self._path())
+        with self.loops.lock:
+            self.controller.replace_rules(rules, self._path())
         return f'rules loaded from {self._path()}'
 
     def _reset(self):
-        self.controller.reset_rules()
+        with self.loops.lock:
+            self.controller.reset_rules()
         return 'rules are the initial ones again'
 
 

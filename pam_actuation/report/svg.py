@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Small still figures as SVG text: lines over two axes, surfaces over three.
+Small still figures as SVG text: lines over two axes, surfaces over three, maps in colours.
 
 The pages of this project draw with plotly; these are for documents, where a
 picture must stand by itself, without a script. matplotlib draws them; it is
@@ -28,6 +28,8 @@ import numpy as np
 SIZE_IN = (7.5, 5.0)
 MESHES = (32, 20)           # at most along a surface's rows and columns: files stay small
 INK, SOFT, RULE = '#1c2126', '#5c6670', '#d9dee3'
+DIVERGING = ('#2166ac', '#92c5de', '#f7f7f7', '#fdb863', '#b35806')    # as figures.DIVERGING
+MOST_NUMBERS, MOST_LABELS = 60, 24
 # Text stays text; the fixed salt and the missing date make equal figures equal files.
 STYLE = {
     'svg.fonttype': 'none', 'svg.hashsalt': 'pam_actuation', 'font.size': 10.0,
@@ -51,7 +53,7 @@ class Curve:
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
-def line_chart(curves, x_title, y_title, title):
+def line_chart(curves, x_title, y_title, title, legend_share=0.16):
     """
     Return the SVG text of curves over two axes, each named in a legend.
 
@@ -61,6 +63,8 @@ def line_chart(curves, x_title, y_title, title):
         In the units of the axes; coloured along the scale in this order.
     x_title, y_title, title : str
         Axis titles with units; what the picture shows.
+    legend_share : float
+        Share of the width that the legend takes.
 
     """
     def draw(figure):
@@ -74,13 +78,78 @@ def line_chart(curves, x_title, y_title, title):
                                              elinewidth=1.0, color=ink)
             dots.set(gid=f'points_{k}', clip_on=False)
             bars.set_gid(f'bars_{k}')
-        axes.set_xlim(0.0, 1.04 * max(np.max(curve.x) for curve in curves))
-        axes.set_ylim(0.0, 1.06 * max(np.max(curve.y) for curve in curves))
+        axes.set_xlim(_limits([curve.x for curve in curves], 1.04))
+        axes.set_ylim(_limits([curve.y for curve in curves], 1.06))
         # The legend reads from the highest curve down.
         handles, names = axes.get_legend_handles_labels()
         axes.legend(handles[::-1], names[::-1], loc='upper left', bbox_to_anchor=(1.0, 1.0))
-        figure.subplots_adjust(left=0.09, right=0.84, bottom=0.12, top=0.97)
+        figure.subplots_adjust(left=0.09, right=1.0 - legend_share, bottom=0.12, top=0.97)
     return _svg(draw, title)
+
+
+def _limits(arrays, room):
+    """Return the ends of an axis from zero over all values, with room beyond them."""
+    lowest = min(float(np.min(array)) for array in arrays)
+    highest = max(float(np.max(array)) for array in arrays)
+    return room * min(lowest, 0.0), room * max(highest, 0.0) or 1.0
+
+
+@dataclass
+class HeatMap:
+    """
+    A named table of numbers to be coloured.
+
+    ``values`` has shape (len(y_labels), len(x_labels)), the first row at the bottom;
+    ``dotted``, of that shape, are the cells marked with a dot.
+    """
+
+    name: str
+    x_labels: tuple
+    y_labels: tuple
+    values: np.ndarray
+    dotted: np.ndarray
+
+
+def heat_map_chart(maps, titles, title):
+    """
+    Return the SVG text of maps side by side in one scale of colours, white at zero.
+
+    Parameters
+    ----------
+    maps : list of HeatMap
+        From left to right. Cells of small maps carry their number.
+    titles : tuple of str
+        Titles of x, y and the scale, with units.
+    title : str
+        What the picture shows.
+
+    """
+    def draw(figure):
+        from matplotlib.colors import LinearSegmentedColormap
+        figure.set_layout_engine('constrained')
+        limit = max([float(np.max(np.abs(one.values))) for one in maps] + [1e-9])
+        colours = LinearSegmentedColormap.from_list('signed', DIVERGING)
+        row = figure.subplots(1, len(maps), squeeze=False)[0]
+        for k, (axes, one) in enumerate(zip(row, maps)):
+            image = axes.pcolormesh(one.values, cmap=colours, vmin=-limit, vmax=limit,
+                                    edgecolors='white', linewidth=0.6)
+            image.set_gid(f'map_{k}')
+            axes.grid(False)
+            axes.set(title=one.name, xlabel=titles[0], ylabel=titles[1] if k == 0 else '')
+            for axis, labels in ((axes.xaxis, one.x_labels), (axes.yaxis, one.y_labels)):
+                step = -(-len(labels) // MOST_LABELS)
+                axis.set_ticks(np.arange(len(labels))[::step] + 0.5, labels[::step])
+            axes.tick_params(axis='y', labelleft=k == 0)
+            axes.tick_params(axis='x', labelrotation=90)
+            for i, j in np.argwhere(one.dotted):
+                axes.plot(j + 0.85, i + 0.85, '.', color=SOFT, markersize=2.0)
+            if one.values.size <= MOST_NUMBERS:
+                for (i, j), value in np.ndenumerate(one.values):
+                    dark = abs(value) > 0.75 * limit
+                    axes.text(j + 0.5, i + 0.5, f'{round(value, 1) + 0.0:.1f}', fontsize=7.0,
+                              ha='center', va='center', color='white' if dark else INK)
+        figure.colorbar(image, ax=list(row), label=titles[2], fraction=0.05, pad=0.02)
+    return _svg(draw, title, (5.0 * len(maps), 4.6))
 
 
 def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
@@ -117,13 +186,13 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
     return _svg(draw, title)
 
 
-def _svg(draw, title):
+def _svg(draw, title, size_in=SIZE_IN):
     """Return what a function draws on an empty figure as SVG text."""
     from matplotlib import style
     from matplotlib.figure import Figure
     # The defaults come first: the reader's own settings do not reach the file.
     with style.context(['default', STYLE]):
-        figure = Figure(SIZE_IN)
+        figure = Figure(size_in)
         draw(figure)
         stream = io.StringIO()
         figure.savefig(stream, format='svg', metadata={'Date': None, 'Title': title})

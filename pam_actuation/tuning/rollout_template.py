@@ -30,8 +30,7 @@ from pam_actuation.control import inputs as place
 from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
-from pam_actuation.drivers.ppr import ppr_step
+from pam_actuation.tuning.loop_parts import drive, read
 from pam_sim.compiled import compiled
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
@@ -47,20 +46,12 @@ LOG_SIZE = 7
 
 
 @compiled
-def _read(value, step_size):
-    """Quantise a reading, 0 = no quantisation."""
-    if step_size > 0.0:
-        return np.rint(value / step_size) * step_size
-    return value
-
-
-@compiled
 def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log):
     """Fill the inputs of the controller and the measured part of the log."""
-    inp[place.IN_CONTRACTION] = _read(
+    inp[place.IN_CONTRACTION] = read(
         plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
-    inp[place.IN_PRESSURE] = _read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
-    inp[place.IN_FORCE] = _read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
+    inp[place.IN_PRESSURE] = read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
+    inp[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
     inp[place.IN_REFERENCE] = position[tick]
     inp[place.IN_REFERENCE_RATE] = rate[tick]
     whole = int(lead_ticks)
@@ -80,17 +71,10 @@ def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, i
 def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
              disturbance, plant_state, plant_par, plant_inp, plant_out, log):
     """Run the driver law where it is due and the physics of one controller period."""
-    driver_state, driver_par, driver_out = driver
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
     signal_1 = plant_inp[layout.INP_SIGNAL_1]
     if tick % driver_every == 0:
-        if hsv:
-            driver_state[S_AGE] = 0.0
-            hsv_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
-            signal_0, signal_1 = driver_out[0], driver_out[1]
-        else:
-            ppr_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
-            signal_0, signal_1 = driver_out[0], 0.0
+        signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa)
     plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
     plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
     for j in range(steps):

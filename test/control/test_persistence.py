@@ -14,23 +14,41 @@
 
 """Rule files: exact round trip; anything damaged or foreign is refused whole."""
 
+from collections import Counter
 import json
+import os
 
 import numpy as np
-from pam_actuation.control.sofc.persistence import load_rules, save_rules
+from pam_actuation.control.sofc import persistence
+from pam_actuation.control.sofc.persistence import load_rules, rules_to_mapping, save_rules
+from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_sim.errors import InputError
 import pytest
+from rule_files import signed, spoiled
 from straight_rig import sofc
+
+ALL = [(name, suffix) for name in RuleBase.NAMES for suffix in ('', '_initial', '_fired')]
+
+
+def teach(rules, seed=3):
+    """Fill every array of a rule base with numbers within the bounds."""
+    random = np.random.default_rng(seed)
+    for table in rules.tables():
+        bound = min(table.limit, 3e4)
+        table.values[...] = random.uniform(-bound, bound, table.values.shape)
+        table.fired[...] = random.uniform(0.0, 900.0, table.fired.shape)
+    return rules
+
+
+def numbers(rules):
+    """Return all numbers of a rule base as one vector."""
+    return np.concatenate([getattr(rules, name + suffix).ravel() for name, suffix in ALL])
 
 
 @pytest.fixture
 def learned():
     controller = sofc()
-    random = np.random.default_rng(3)
-    controller.rules.feedback += random.uniform(-0.2, 0.2, controller.rules.feedback.shape) * (
-        np.abs(controller.rules.feedback) < 0.7)
-    controller.rules.feedforward += random.uniform(
-        -3e4, 3e4, controller.rules.feedforward.shape)
+    teach(controller.rules)
     return controller
 
 
@@ -39,8 +57,7 @@ def test_round_trip_is_exact(learned, tmp_path):
     learned.rules.save(path)
     other = sofc()
     other.replace_rules(load_rules(path, other.rules))
-    assert np.array_equal(other.rules.feedback, learned.rules.feedback)
-    assert np.array_equal(other.rules.feedforward, learned.rules.feedforward)
+    assert np.array_equal(numbers(other.rules), numbers(learned.rules))
     assert other.rules.digest() == learned.rules.digest()
     assert [p.name for p in tmp_path.iterdir()] == ['rules.json']      # nothing left behind
 
@@ -56,34 +73,159 @@ def test_a_changed_number_is_found(learned, tmp_path):
 
 
 @pytest.mark.parametrize('content, words', [
-    ('', 'no JSON'), ('{"schema": 1', 'no JSON'), ('{"schema": 99}', 'schema'),
-    ('[1, 2]', 'schema'), ('{"schema": 2, "feedback": []}', 'lacks')])
+    (b'', 'empty'), (b' \n', 'empty'), (b'{"schema": 1', 'cut off'), (b'hello', 'not JSON'),
+    (b'{"schema": }', 'not JSON'), (b'\xff\xfe{}', 'not JSON'), (b'[' * 100_000, 'not JSON'),
+    (b'{"schema": 99}', 'of schema ., but of 99'), (b'{"schema": true}', 'True'),
+    (b'{}', 'names no schema'), (b'[1, 2]', 'names no schema'), (b'null', 'names no schema'),
+    (b'{"schema": %d, "feedback": []}' % persistence.SCHEMA, 'lacks shape, scaling'),
+    (b'[' + b'1,' * 2**23 + b'1]', 'larger than')])
 def test_truncated_or_foreign_files_are_refused(content, words, tmp_path):
     path = tmp_path / 'rules.json'
-    path.write_text(content)
+    path.write_bytes(content)
     with pytest.raises(InputError, match=words) as caught:
         load_rules(path)
     assert caught.value.where == str(path)
 
 
-def test_rules_of_another_scaling_rig_or_shape_are_refused(learned, tmp_path):
-    path = tmp_path / 'rules.json'
+def changed(mapping, path, value):
+    """Return a signed copy of a mapping with one entry exchanged."""
+    mapping = json.loads(json.dumps(mapping))
+    parent = mapping
+    for key in path[:-1]:
+        parent = parent[key]
+    if value is None:
+        del parent[path[-1]]
+    else:
+        parent[path[-1]] = value
+    return signed(mapping)
+
+
+# Each with a checksum that fits: what a program that writes such files could get wrong.
+WRONG = {
+    'rig': (('scaling', 'rig'), 'other/ppr', r'learned with rig other \(here straight\)$'),
+    'valve': (('scaling', 'rig'), 'straight/hsv', r'learned with valve hsv \(here ppr\)$'),
+    'no rig': (('scaling', 'rig'), '', r'rig unknown \(here straight\), valve unknown'),
+    'rate': (('scaling', 'rate_hz'), 100.0, r'with rate_hz 100 \(here 200\)$'),
+    'universe': (('scaling', 'error_universe_m'), 0.003,
+                 r'error_universe_m 0.003 \(here 0.002\)$'),
+    'gain': (('scaling', 'feedback_gain_pa'), 1e4, r'feedback_gain_pa 10000 \(here 6000\)$'),
+    'knots': (('scaling', 'reference_knots'), 13.0, 'its scaling says .2, 13.0'),
+    'range of knots': (('scaling', 'reference_upper_m'), 0.02,
+                       r'reference_upper_m 0.02 \(here 0.03\)$'),
+    'empty range': (('scaling', 'reference_upper_m'), 0.001, 'reference_upper_m 0.001 '),
+    'upside down': (('scaling', 'reference_lower_m'), 0.1, 'not larger than reference_lower_m'),
+    'scaling missing': (('scaling', 'rate_hz'), None, 'scaling lacks rate_hz'),
+    'scaling unknown': (('scaling', 'colour'), 1.0, "unknown entries 'colour'"),
+    'scaling too large': (('scaling', 'rate_hz'), 1e9, 'rate_hz = .* outside'),
+    'scaling beyond floats': (('scaling', 'rate_hz'), 10**400, 'rate_hz = .* outside'),
+    'scaling no number': (('scaling', 'rate_hz'), '200', 'rate_hz must be a number'),
+    'scaling no mapping': (('scaling',), [1], 'scaling is not a mapping'),
+    'shape': (('shape', 'feedback'), [2, 7, 8], r'feedback has shape \[2, 7, 7\], the file says'),
+    'shape no mapping': (('shape',), 3, 'shape .* the file says None'),
+    'row missing': (('feedback', 1, 6), None, 'feedback is not a table of numbers'),
+    'one branch': (('feedback', 1), None, r'feedback has shape \[1, 7, 7\]'),
+    'not finite': (('feedback', 0, 1, 2), float('nan'), 'feedback holds values .* not finite'),
+    'infinite': (('feedforward', 1, 2), float('inf'), 'feedforward holds values .* not finite'),
+    'text': (('feedback', 0, 1, 2), '0.5', 'feedback is not a table of numbers'),
+    'beyond floats': (('feedforward', 0, 0), 10**400, 'feedforward is not a table of numbers'),
+    'out of bounds': (('feedback', 0, 1, 2), -1.25, r'holds 1.25, allowed is \+-1$'),
+    'first out of bounds': (('feedforward_initial', 0, 0), 2e5, r'allowed is \+-120000$'),
+    'fired': (('feedback_fired', 0, 0, 0), -1.0, 'fired less than never'),
+    'entry missing': (('feedback_initial',), None, 'lacks feedback_initial'),
+    'entry unknown': (('remark',), 'mine', "unknown entries 'remark'"),
+    'schema': (('schema',), persistence.SCHEMA + 1, 'schema'),
+}
+
+
+@pytest.mark.parametrize('case', WRONG)
+def test_what_differs_is_named_and_the_old_rules_stay(case, learned, tmp_path):
+    path, value, words = WRONG[case]
+    file = tmp_path / 'rules.json'
+    file.write_text(json.dumps(changed(rules_to_mapping(learned.rules), path, value)))
+    before = numbers(learned.rules)
+    with pytest.raises(InputError, match=words) as caught:
+        learned.replace_rules(load_rules(file, learned.rules), str(file))
+    assert '\n' not in str(caught.value)
+    assert np.array_equal(numbers(learned.rules), before) and learned.rules_replaced == 0
+
+
+def test_every_difference_is_named_at_once(learned, tmp_path):
+    learned.rules.save(tmp_path / 'rules.json')
+    other = sofc({'rate_hz': 100.0, 'feedback_gain_pa': 1e4, 'reference_knots': 13})
+    other.rules.scaling['rig'] = 'straight/hsv'
+    with pytest.raises(InputError) as caught:
+        load_rules(tmp_path / 'rules.json', other.rules)
+    assert all(word in caught.value.problem for word in (
+        'valve ppr (here hsv)', 'rate_hz', 'feedback_gain_pa', 'reference_knots 25 (here 13)'))
+    other = learned.rules.copy()
+    other.feedback = np.zeros((2, 5, 5))
+    with pytest.raises(InputError, match=r'feedback rules of shape \[2, 7, 7\] do not fit'):
+        load_rules(tmp_path / 'rules.json', other)
+
+
+def test_spoiled_files_are_refused_whole_or_are_whole(learned, tmp_path):
+    mapping, path = rules_to_mapping(learned.rules), tmp_path / 'rules.json'
     learned.rules.save(path)
-    with pytest.raises(InputError, match='feedback_gain_pa'):
-        load_rules(path, sofc({'feedback_gain_pa': 1e4}).rules)
-    with pytest.raises(InputError, match='shape'):
-        load_rules(path, sofc({'reference_knots': 13}).rules)
-    other = sofc()
-    other.rules.scaling['rig'] = 'another/ppr'
-    with pytest.raises(InputError, match='another/ppr'):
-        load_rules(path, other.rules)
+    whole, outcomes = numbers(load_rules(path, learned.rules)), Counter()
+    for number in range(400):
+        path.write_bytes(spoiled(mapping, number))
+        controller = sofc()
+        before = numbers(controller.rules)
+        try:
+            controller.replace_rules(load_rules(path, controller.rules), str(path))
+            outcomes['taken'] += 1
+            # Bytes that say the same, or a file whose every number is one that can be learned.
+            found = numbers(controller.rules)
+            assert np.array_equal(found, whole) or number % 3, number
+            assert np.all(np.isfinite(found)), number
+            assert all(np.max(np.abs(values)) <= table.limit
+                       for table in controller.rules.tables()
+                       for values in (table.values, table.initial)), number
+        except InputError as error:
+            outcomes['refused'] += 1
+            assert error.where == str(path) and '\n' not in str(error), number
+            assert len(str(error)) < len(str(path)) + 400, number
+            assert np.array_equal(numbers(controller.rules), before), number
+    assert outcomes['refused'] > 300
 
 
-def test_a_missing_folder_is_the_users_mistake(learned, tmp_path):
+def test_a_mistake_in_writing_is_the_users_and_leaves_nothing(learned, tmp_path):
     with pytest.raises(InputError, match='cannot be written'):
         save_rules(learned.rules, tmp_path / 'no' / 'rules.json')
     with pytest.raises(InputError, match='cannot read'):
         load_rules(tmp_path / 'rules.json')
+    (tmp_path / 'folder').mkdir()
+    with pytest.raises(InputError, match='cannot be written'):
+        save_rules(learned.rules, tmp_path / 'folder')
+    with pytest.raises(InputError, match='cannot read'):
+        load_rules(tmp_path / 'folder')
+    assert [p.name for p in tmp_path.iterdir()] == ['folder']
+
+
+def test_a_failed_save_keeps_the_old_file(learned, tmp_path, monkeypatch):
+    path = tmp_path / 'rules.json'
+    learned.rules.save(path)
+    old = path.read_bytes()
+    learned.rules.feedforward[0, 0] = np.nan
+    with pytest.raises(InputError, match='not saved: feedforward .* not finite'):
+        learned.rules.save(path)
+    learned.rules.feedforward[0, 0] = 1.0
+    for failure, raised in ((OSError(28, 'No space left on device'), InputError),
+                            (KeyboardInterrupt(), KeyboardInterrupt)):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, 'fsync', _raising(failure))
+            with pytest.raises(raised):
+                learned.rules.save(path)
+        assert path.read_bytes() == old
+        assert [p.name for p in tmp_path.iterdir()] == ['rules.json']
+    learned.rules.save(path)
+    assert path.read_bytes() != old
+
+
+def _raising(failure):
+    def fails(handle):
+        raise failure
+    return fails
 
 
 def test_reset_returns_to_the_initial_rules(learned):

@@ -25,6 +25,7 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
 from lifecycle_msgs.srv import ChangeState, GetState                        # noqa: E402
 from live_rig import LiveRig, wait_for                                      # noqa: E402
+from pam_actuation.control.sofc.persistence import load_rules               # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue     # noqa: E402
 from rcl_interfaces.srv import DescribeParameters, SetParameters            # noqa: E402
@@ -128,9 +129,20 @@ def test_learning_can_be_frozen_and_rules_saved_loaded_and_reset(rig, rules_file
         answer = rig.call(Trigger, f'sofc_controller/{service}')
         assert answer.success, answer.message
     assert rules_file.stat().st_size > 100
-    rules_file.write_text('no rules')
-    answer = rig.call(Trigger, 'sofc_controller/load_rules')
-    assert not answer.success and 'rule' in answer.message
+    rig.call(Trigger, 'sofc_controller/save_rules')
+    kept = load_rules(rules_file)
+    other = kept.copy()
+    other.feedforward += 1e3
+    other.scaling['rig'] = 'another/ppr'
+    other.save(rules_file)
+    for content, reason in ((None, 'learned with rig another (here dmsp_5_300_realistic)'),
+                            ('no rules', 'not a rule file')):
+        if content:
+            rules_file.write_text(content)
+        answer = rig.call(Trigger, 'sofc_controller/load_rules')
+        assert not answer.success and reason in answer.message
+    rig.call(Trigger, 'sofc_controller/save_rules')
+    assert load_rules(rules_file).digest() == kept.digest()      # frozen, and none was taken
     rules_file.unlink()
     rig.call(SetBool, 'sofc_controller/freeze_learning', SetBool.Request(data=False))
     wait_for(lambda: _last_state(rig)['learning'] == 1.0, 3.0, 'learning')

@@ -25,6 +25,7 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap.result import Calibrated, GapResult, Share, SignalGap, Trace
+from pam_sim.run import Series
 import pytest
 from tracking_runs import step_run, tracking_run
 
@@ -119,6 +120,29 @@ def test_a_report_of_nothing_is_refused(tmp_path):
     with pytest.raises(InputError, match='at least one'):
         pages.bag_report([], tmp_path / 'page.html')
     assert not (tmp_path / 'page.html').exists()
+
+
+@pytest.mark.parametrize('valve, names', [
+    ('ppr', ['voltage', 'voltage, commanded']),
+    ('hsv', ['fill', 'fill, commanded', 'vent', 'vent, commanded'])])
+def test_commanded_valve_signals_are_drawn_beside_those_that_were_sent(valve, names, tmp_path):
+    run = tracking_run(AMPLITUDES, valve=valve)
+    sent = run.topics['valve_signal']
+    run.topics['valve_command'] = Series(
+        sent.stamp_ns[::2], {name: values[::2] + 0.25 for name, values in sent.values.items()})
+    pages.bag_report([run], tmp_path / 'page.html')
+    _, plots = markup(tmp_path / 'page.html')
+    found = {trace['name']: trace for plot in plots for trace in plot['data']
+             if trace.get('name') in names}
+    assert list(found) == names
+    for name in names[::2]:
+        commanded, signal = found[f'{name}, commanded'], found[name]
+        away = np.array(commanded['y'][:1]) - signal['y'][:1]
+        assert away == pytest.approx(-0.25 if name == 'vent' else 0.25, abs=1e-3)
+        assert commanded['line']['dash'] == 'dot' and commanded['line']['shape'] == 'hv'
+    del run.topics['valve_signal']
+    pages.bag_report([run], tmp_path / 'page.html')
+    assert names[1] in str(markup(tmp_path / 'page.html')[1])
 
 
 def test_runs_of_equal_name_stay_apart(tmp_path):

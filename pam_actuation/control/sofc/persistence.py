@@ -17,7 +17,8 @@ Files of learned rules: written atomically, checked, refused whole if anything d
 
 A rule file is JSON text: schema version, shapes, scaling (what the numbers
 mean and for which rig they were learned), the rules, their initial values, how
-often each fired, and a sha256 over all of that in canonical form.
+often each fired, and a sha256 over all of that in canonical form. Nothing of a
+file is used before all of it has been checked.
 """
 
 import hashlib
@@ -26,12 +27,22 @@ import os
 
 import numpy as np
 from pam_actuation.control.files import write_atomically
+from pam_actuation.control.settings import checked_settings
+from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
 
 SCHEMA = 2
+MAX_BYTES = 2**24         # more than the largest tables the settings allow
+# Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
+_SHAPES = {
+    'feedback': (2, SET_COUNT, SET_COUNT),
+    'feedforward': (2, 'reference_knots'),
+    'motion': ('motion_position_knots', 'motion_rate_knots')}
 _ARRAYS = tuple(
     name + suffix for suffix in ('', '_initial', '_fired') for name in RuleBase.NAMES)
+_KEYS = ('schema', 'shape', 'scaling', *_ARRAYS, 'sha256')
 
 
 def _digest(content):
@@ -70,51 +81,131 @@ def rules_from_mapping(mapping, where, expected=None):
         finite or out of bounds. Nothing is taken over in part.
 
     """
-    if not isinstance(mapping, dict) or mapping.get('schema') != SCHEMA:
-        found = mapping.get('schema') if isinstance(mapping, dict) else None
-        raise InputError(f'not a rule file of schema {SCHEMA} (found {found!r})', where)
-    missing = [name for name in _ARRAYS + ('shape', 'scaling', 'sha256') if name not in mapping]
-    if missing:
-        raise InputError(f'rule file lacks {", ".join(missing)}', where)
-    content = {name: value for name, value in mapping.items() if name != 'sha256'}
-    if _digest(content) != mapping['sha256']:
-        raise InputError('rule file is damaged: its checksum does not fit its content', where)
-    arrays = {}
-    for name in _ARRAYS:
-        try:
-            arrays[name] = np.array(mapping[name], dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f'{name} is not a table of numbers', where) from None
-        shape = mapping['shape'].get(name.split('_')[0])
-        if list(arrays[name].shape) != shape:
-            raise InputError(
-                f'{name} has shape {list(arrays[name].shape)}, the file says {shape}', where)
-        if not np.all(np.isfinite(arrays[name])):
-            raise InputError(f'{name} holds values that are not finite', where)
-    rules = RuleBase(scaling=dict(mapping['scaling']), **arrays)
+    _check_whole(mapping, where)
+    scaling = _checked_scaling(mapping['scaling'], where)
+    rules = RuleBase(scaling=scaling, **{
+        name: _checked_array(mapping, name, scaling, where) for name in _ARRAYS})
     for table in rules.tables():
-        worst = float(np.max(np.abs(table.values)))
-        if worst > table.limit:
-            raise InputError(
-                f'{table.name} holds {worst:g}, allowed is +-{table.limit:g}', where)
+        for kind in ('values', 'initial'):
+            worst = float(np.max(np.abs(getattr(table, kind))))
+            if worst > table.limit:
+                raise InputError(
+                    f'{table.name} ({kind}) holds {worst:g}, allowed is +-{table.limit:g}', where)
+        if np.min(table.fired) < 0.0:
+            raise InputError(f'{table.name} fired less than never', where)
     if expected is not None:
         check_fit(rules, expected, where)
     return rules
 
 
+def _check_whole(mapping, where):
+    """Raise InputError unless a mapping is a rule file of this schema, entire and unspoiled."""
+    if not isinstance(mapping, dict) or 'schema' not in mapping:
+        raise InputError('not a rule file: it names no schema', where)
+    if type(mapping['schema']) is not int or mapping['schema'] != SCHEMA:
+        raise InputError(
+            f'not a rule file of schema {SCHEMA}, but of {_short(mapping["schema"])}', where)
+    missing = [name for name in _KEYS if name not in mapping]
+    if missing:
+        raise InputError(f'rule file lacks {", ".join(missing)}', where)
+    foreign = [_short(name) for name in mapping if name not in _KEYS]
+    if foreign:
+        raise InputError(f'rule file has the unknown entries {", ".join(foreign[:5])}', where)
+    try:
+        digest = _digest({name: mapping[name] for name in mapping if name != 'sha256'})
+    except (TypeError, ValueError, RecursionError):
+        raise InputError('rule file holds what is no number, text, list or mapping',
+                         where) from None
+    if digest != mapping['sha256']:
+        raise InputError('rule file is damaged: its checksum does not fit its content', where)
+
+
+def _checked_scaling(scaling, where):
+    """Return the scaling of a file; InputError unless it says what the numbers mean."""
+    if not isinstance(scaling, dict):
+        raise InputError('scaling is not a mapping', where)
+    missing = [name for name in ('rig', *SCALING) if name not in scaling]
+    if missing:
+        raise InputError(f'scaling lacks {", ".join(missing)}', where)
+    if not isinstance(scaling['rig'], str):
+        raise InputError(f'the rig is {_short(scaling["rig"])}, not a name', where)
+    numbers = {name: value for name, value in scaling.items() if name != 'rig'}
+    foreign = [_short(name) for name in numbers if name not in SCALING]
+    if foreign:
+        raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
+    checked_settings(SETTINGS, numbers, lambda name: where)
+    if scaling['reference_upper_m'] <= scaling['reference_lower_m']:
+        raise InputError('reference_upper_m is not larger than reference_lower_m', where)
+    return dict(scaling)
+
+
+def _checked_array(mapping, name, scaling, where):
+    """Return one table of a file as an array of finite numbers, of the shape of its scaling."""
+    try:
+        array = np.array(mapping[name])
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.dtype.kind not in 'fiu' or not array.size:
+        raise InputError(f'{name} is not a table of numbers', where)
+    table = name.partition('_')[0]
+    shapes = mapping['shape']
+    for source, wanted in (
+            ('the file says', shapes.get(table) if isinstance(shapes, dict) else None),
+            ('its scaling says', [scaling.get(length, length) for length in _SHAPES[table]])):
+        if list(array.shape) != wanted:
+            raise InputError(
+                f'{name} has shape {list(array.shape)}, {source} {_short(wanted)}', where)
+    array = array.astype(float)
+    if not np.all(np.isfinite(array)):
+        raise InputError(f'{name} holds values that are not finite', where)
+    return array
+
+
+def _short(value):
+    """Return a value of a foreign file as a short piece of one sentence."""
+    text = ascii(value)
+    return text if len(text) <= 40 else f'{text[:40]}...'
+
+
 def check_fit(rules, expected, where):
-    """Raise InputError unless two rule bases agree in shapes and scaling."""
+    """
+    Raise InputError unless two rule bases agree in rig, valve, scaling and shapes.
+
+    The sentence names everything that differs.
+    """
+    differences = _rig_differences(rules.scaling.get('rig'), expected.scaling.get('rig'))
+    for key in sorted((set(rules.scaling) | set(expected.scaling)) - {'rig'}):
+        mine, other = rules.scaling.get(key), expected.scaling.get(key)
+        if mine != other:
+            differences.append(f'{key} {_stated(mine)} (here {_stated(other)})')
+    if differences:
+        raise InputError(
+            f'rules do not fit this controller: they were learned with '
+            f'{", ".join(differences)}', where)
     for name in RuleBase.NAMES:
         mine, other = getattr(rules, name).shape, getattr(expected, name).shape
         if mine != other:
             raise InputError(
                 f'{name} rules of shape {list(mine)} do not fit a controller with '
                 f'{list(other)}', where)
-    for key in sorted(set(rules.scaling) | set(expected.scaling)):
-        mine, other = rules.scaling.get(key), expected.scaling.get(key)
-        if mine != other:
-            raise InputError(
-                f'rules were learned with {key} = {mine!r}, this controller has {other!r}', where)
+
+
+def _rig_differences(mine, other):
+    """Return in words what differs between two rig identities ``name/valve``."""
+    found = []
+    if mine != other:
+        sides = [(str(one or '').rpartition('/')) for one in (mine, other)]
+        for what, place in (('rig', 0), ('valve', 2)):
+            first, second = (side[place] for side in sides)
+            if first != second:
+                found.append(f'{what} {first or "unknown"} (here {second or "unknown"})')
+    return found
+
+
+def _stated(value):
+    if value is None:
+        return 'not stated'
+    return f'{value:.10g}' if isinstance(value, float) else str(value)
 
 
 def save_rules(rules, path):
@@ -124,9 +215,14 @@ def save_rules(rules, path):
     Raises
     ------
     InputError
-        The file cannot be written.
+        The file cannot be written, or the rules hold values that are not finite; what stood
+        in the file before is still there.
 
     """
+    spoiled = [name for name in _ARRAYS if not np.all(np.isfinite(getattr(rules, name)))]
+    if spoiled:
+        raise InputError(
+            f'rules are not saved: {spoiled[0]} holds values that are not finite', str(path))
     write_atomically(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n')
 
 
@@ -137,15 +233,25 @@ def load_rules(path, expected=None):
     Raises
     ------
     InputError
-        As ``rules_from_mapping``, and when the file cannot be read or is not JSON.
+        As ``rules_from_mapping``, and when the file cannot be read, is cut off or is not JSON.
 
     """
     path = os.fspath(path)
     try:
-        with open(path, encoding='utf-8') as stream:
-            mapping = json.load(stream)
+        with open(path, 'rb') as stream:
+            data = stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise InputError(f'cannot read the rules: {error.strerror}', path) from None
-    except ValueError:
-        raise InputError('not a rule file (no JSON text)', path) from None
+    if not data.strip():
+        raise InputError('not a rule file: it is empty', path)
+    if len(data) > MAX_BYTES:
+        raise InputError(f'not a rule file: it is larger than {MAX_BYTES} bytes', path)
+    try:
+        mapping = json.loads(data.decode('utf-8'))
+    except (ValueError, RecursionError):
+        if data.lstrip()[:1] == b'{' and data.rstrip()[-1:] != b'}':
+            raise InputError(
+                f'rule file is cut off: its text ends early, after {len(data)} bytes',
+                path) from None
+        raise InputError('not a rule file: it is not JSON text', path) from None
     return rules_from_mapping(mapping, path, expected)

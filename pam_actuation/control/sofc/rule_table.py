@@ -34,7 +34,7 @@ import hashlib
 
 import numpy as np
 from pam_actuation.control.sofc.membership import (
-    SET_COUNT, SET_NAMES, SET_WORDS, signed_logarithmic_knots)
+    SET_COUNT, SET_WORDS, signed_logarithmic_knots)
 from pam_sim.compiled import compiled
 
 CONTRACTING, EXTENDING = 0, 1
@@ -230,15 +230,6 @@ class RuleBase:
             self.scaling['reference_lower_m'], self.scaling['reference_upper_m'],
             self.feedforward.shape[1])
 
-    def sentences(self, least_fired=1.0):
-        """Return the rules that fired as sentences, most active first."""
-        found = []
-        for table in self.tables():
-            for place, fired in np.ndenumerate(table.fired):
-                if fired >= least_fired:
-                    found.append((fired, _sentence(table, place)))
-        return [text for _, text in sorted(found, key=lambda item: -item[0])]
-
     def save(self, path):
         """Write the rules to a file atomically; see ``persistence.save_rules``."""
         from pam_actuation.control.sofc.persistence import save_rules
@@ -249,23 +240,3 @@ class RuleBase:
         """Return the rules of a file, refused whole if they do not fit ``expected``."""
         from pam_actuation.control.sofc.persistence import load_rules
         return load_rules(path, expected)
-
-
-def _sentence(table, place):
-    """Return one rule in words."""
-    parts, short = [], []
-    for antecedent, index in zip(table.antecedents, place):
-        knot = antecedent.knots[index] * 1e3
-        if antecedent.name == 'direction':
-            parts.append(antecedent.words[index])
-        elif antecedent.words:
-            subject = {'error': 'the error', 'change of error': 'its change'}[antecedent.name]
-            parts.append(f'{subject} is {antecedent.words[index]}')
-            short.append(SET_NAMES[index])
-        elif antecedent.unit == 'm':
-            parts.append(f'the reference is near {knot:.1f} mm')
-        else:
-            parts.append(f'moves at about {knot:+.1f} mm/s')
-    was = f'was {table.initial[place] * table.scale * 1e-3:+.2f} kPa'
-    return (f'if {" and ".join(parts)} then add {table.values[place] * table.scale * 1e-3:+.2f} '
-            f'kPa ({", ".join([*short, ""])[:-2] + "; " if short else ""}{was})')

@@ -15,11 +15,12 @@
 """The controller's rules before and after learning."""
 
 import numpy as np
-
+from pam_actuation.control.sofc.words import ranked
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, text
+from pam_actuation.rules.grids import grids
 
-DIRECTIONS = ('contracting', 'extending')
+_MOST_WORDS = 12
 
 
 def rules(before, after, key='rules', title='What the rules learned'):
@@ -35,58 +36,53 @@ def rules(before, after, key='rules', title='What the rules learned'):
         Anchor and heading.
 
     """
-    gain_kpa = after.scaling.get('feedback_gain_pa', 1e3) * 1e-3
-    first = after.feedback_initial if before is None else before.feedback
-    first_forward = after.feedforward_initial if before is None else before.feedforward
-    error_mm = np.linspace(-1, 1, after.feedback.shape[1]) * 1e3 * after.scaling.get(
-        'error_universe_m', 1e-3)
-    change = np.linspace(-1, 1, after.feedback.shape[2]) * 1e3 * after.scaling.get(
-        'change_universe_m_per_s', 1e-3)
-    limit = gain_kpa * max(float(np.max(np.abs(first))), float(np.max(np.abs(after.feedback))),
-                           1e-6)
+    found = grids(after, before)
     body = paragraph(
-        'Feed-forward rules add a pressure near each reference position, one set for '
-        'contracting and one for extending; their difference is the hysteresis the '
-        'controller found. Feedback rules add a pressure for each pair of error and change '
-        'of error. All maps share one colour scale.')
-    body += plot(_forward(first_forward, after), 'Feed-forward rules: knots are the rules, '
-                 'between them the controller interpolates.')
-    maps = [(f'{name}, {when}', change, error_mm, table[d] * gain_kpa)
-            for d, name in enumerate(DIRECTIONS)
-            for when, table in (('before', first), ('after', after.feedback))]
-    for pair in (maps[:2], maps[2:]):
-        body += plot(figures.heat_maps(
-            pair, 'change of error [mm/s]', 'error [mm]', 'kPa', limit))
-    moved = float(np.max(np.abs(after.feedback - first))) * gain_kpa
-    moved_forward = float(np.max(np.abs(after.feedforward - first_forward))) * 1e-3
-    body += paragraph(
-        f'Largest change of a feedback rule {moved:.2f} kPa, of a feed-forward rule '
-        f'{moved_forward:.2f} kPa.', 'note')
-    return Section(key, title, body + _sentences(after))
+        'Every rule adds a pressure where it holds. Feedback rules stand over pairs of error '
+        'and change of error, feed-forward rules over the reference, motion rules over '
+        'reference and its rate; the difference of contracting and extending is the '
+        'hysteresis the controller found.')
+    for grid in sorted(found, key=lambda one: len(one.columns.values)):
+        body += _figure(grid)
+    body += ''.join(paragraph(
+        f'{grid.title[:1].upper()}{grid.title[1:]}: largest change '
+        f'{np.max(np.abs(grid.change)):.2f} kPa, {int(grid.never.sum())} of {grid.never.size} '
+        'never fired.', 'note') for grid in found)
+    return Section(key, title, body + _words(after))
 
 
-def _forward(first, after):
-    if 'reference_lower_m' in after.scaling:
-        x, label = after.knots_m() * 1e3, 'reference contraction [mm]'
-    else:
-        x, label = np.arange(after.feedforward.shape[1]), 'rule'
+def _figure(grid):
+    """Return the plot of one grid: lines over few columns, else heat maps of one scale."""
+    if not (grid.values.any() or grid.before.any()):
+        return ''
+    if len(grid.columns.values) <= 2:
+        return plot(_lines(grid), f'{grid.title}: knots are the rules, between them the '
+                    'controller interpolates.')
+    limit = max(float(np.max(np.abs(grid.values))), float(np.max(np.abs(grid.before))))
+    maps = [(f'{grid.title}, {when}', grid.columns.values, grid.rows.values, values)
+            for when, values in (('before', grid.before), ('after', grid.values))]
+    return plot(figures.heat_maps(maps, grid.columns.title, grid.rows.title, 'kPa', limit))
+
+
+def _lines(grid):
     traces = []
-    for d, role in enumerate(('after', 'second')):
-        for when, values, dash in (('before', first, 'dot'),
-                                   ('after', after.feedforward, None)):
-            trace = figures.line(x, values[d] * 1e-3, f'{DIRECTIONS[d]}, {when}', role,
+    for c, role in zip(range(len(grid.columns.values)), ('after', 'second')):
+        name = grid.columns.labels[c]
+        for when, values, dash in (('before', grid.before, 'dot'),
+                                   ('after', grid.values, None)):
+            trace = figures.line(grid.rows.values, values[:, c], f'{name}, {when}', role,
                                  dash=dash)
             if dash is None:
                 trace['mode'] = 'lines+markers'
                 trace['marker'] = {'color': f'@{role}', 'size': 6}
             traces.append(trace)
-    return figures.stack([('added pressure [kPa]', traces)], label, row_px=280)
+    return figures.stack([('added pressure [kPa]', traces)], grid.rows.title, row_px=280)
 
 
-def _sentences(after, most=12):
-    spoken = after.sentences() if hasattr(after, 'sentences') else []
+def _words(after):
+    spoken = ranked(after)[:_MOST_WORDS]
     if not spoken:
         return ''
-    items = ''.join(f'<li>{text(s)}</li>' for s in spoken[:most])
-    return (f'<details><summary>The {min(most, len(spoken))} most active rules in words'
+    items = ''.join(f'<li>{text(one.sentence)}</li>' for one in spoken)
+    return (f'<details><summary>The {len(spoken)} most important rules in words'
             f'</summary><ol>{items}</ol></details>')

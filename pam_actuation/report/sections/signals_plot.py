@@ -17,7 +17,7 @@
 import numpy as np
 
 from pam_actuation.report import figures, signals
-from pam_actuation.report.metrics import tracking_error
+from pam_actuation.report.metrics import force_error, tracking_error
 from pam_actuation.report.page import plot, Section
 from pam_sim.units import P_ATM_PA
 
@@ -59,7 +59,10 @@ def _contraction(run, points):
 
 
 def _error(run, points):
-    tracked = tracking_error(run)
+    tracked, pulled = tracking_error(run), force_error(run)
+    if pulled is not None:
+        return 'force error [N]', [figures.line(
+            *pulled, 'reference − force', 'residual', width=1.1, max_points=points)]
     if tracked is None:
         return None
     return 'tracking error [mm]', [figures.line(
@@ -78,24 +81,34 @@ def _pressure(run, points):
 
 def _force(run, points):
     traces = []
-    for topic, name, role in (('force', 'load cell', 'measured'),
-                              ('external_force', 'external force', 'second')):
-        pair = signals.series(run, topic)
+    for topic, name, role, dash in (('force', 'load cell', 'measured', None),
+                                    ('external_force', 'external force', 'second', None),
+                                    ('reference', 'reference', 'reference', 'dash')):
+        pair = signals.series(run, topic, 'force_n')
         if pair is not None:
-            traces.append(figures.line(*pair, name, role, width=1.2, max_points=points))
+            traces.append(figures.line(
+                *pair, name, role, dash=dash, width=1.2, max_points=points))
     return ('force [N]', traces) if traces else None
 
 
 def _valve(run, points):
-    volts = signals.series(run, 'valve_signal', 'ppr_voltage')
-    if volts is not None:
-        return 'valve voltage [V]', [figures.line(
-            *volts, 'voltage', 'green', held=True, width=1.2, max_points=points)]
-    fill = signals.series(run, 'valve_signal', 'fill_duty')
-    vent = signals.series(run, 'valve_signal', 'vent_duty')
-    if fill is None or vent is None:
-        return None
-    return 'duty [–], vent downwards', [
-        figures.line(*fill, 'fill', 'green', held=True, width=1.0, max_points=points),
-        figures.line(vent[0], -np.asarray(vent[1]), 'vent', 'second', held=True, width=1.0,
-                     max_points=points)]
+    """Return what went to the valve, and what was asked for where signals were commanded."""
+    volts = _both(run, 'ppr_voltage', 'voltage', 'green', 1.0, points)
+    if volts:
+        return 'valve voltage [V]', volts
+    duties = (_both(run, 'fill_duty', 'fill', 'green', 1.0, points)
+              + _both(run, 'vent_duty', 'vent', 'second', -1.0, points))
+    return ('duty [–], vent downwards', duties) if duties else None
+
+
+def _both(run, field, name, role, sign, points):
+    """Return the traces of one signal as sent and, if there are commands, as commanded."""
+    traces = []
+    for topic, title, colour, dash in (('valve_signal', name, role, None),
+                                       ('valve_command', f'{name}, commanded', 'command', 'dot')):
+        pair = signals.series(run, topic, field)
+        if pair is not None:
+            traces.append(figures.line(
+                pair[0], sign * np.asarray(pair[1]), title, colour, held=True, dash=dash,
+                width=1.2, max_points=points))
+    return traces

@@ -1,0 +1,156 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Tables of rules as grids of two axes, in the units people read.
+
+Every presentation draws these: a table over two axes is one grid, one over a
+direction and two more axes is a grid per direction. Nothing here knows a table
+by its name.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pam_actuation.control.sofc.membership import SET_NAMES, SET_WORDS
+from pam_actuation.control.sofc.words import DIRECTION, number, shown
+from pam_sim.errors import InputError
+
+_SHORT = dict(zip(SET_WORDS, SET_NAMES))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """
+    One axis of a grid.
+
+    ``values`` are the knots in ``unit`` (for people), ``names`` the short names of sets, or
+    empty; ``labels`` say both.
+    """
+
+    name: str
+    unit: str
+    values: np.ndarray
+    names: tuple = ()
+
+    @property
+    def title(self):
+        """Name with unit."""
+        return f'{self.name} [{self.unit}]' if self.unit else self.name
+
+    @property
+    def labels(self):
+        """One text per knot."""
+        if not self.unit:
+            return self.names
+        texts = [number(value) for value in self.values]
+        return tuple(f'{name} {text}' for name, text in zip(self.names, texts)) \
+            if self.names else tuple(texts)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """
+    One grid of rules, shape (len(rows.values), len(columns.values)).
+
+    ``values`` and ``before`` are outputs now and before [kPa], ``fired_s`` how long each
+    rule acted [s].
+    """
+
+    title: str
+    rows: Axis
+    columns: Axis
+    values: np.ndarray
+    before: np.ndarray
+    fired_s: np.ndarray
+
+    @property
+    def change(self):
+        """What was changed [kPa]."""
+        return self.values - self.before
+
+    @property
+    def never(self):
+        """Which rules never fired."""
+        return self.fired_s <= 0.0
+
+
+def grids(rules, before=None):
+    """
+    Return all rules of a rule base as grids.
+
+    Parameters
+    ----------
+    rules : RuleBase
+        What is shown.
+    before : RuleBase, optional
+        What changes are counted against; by default the initial rules kept in ``rules``.
+
+    Raises
+    ------
+    InputError
+        The two have not the same antecedents.
+
+    """
+    earlier = [None] * len(rules.tables())
+    if before is not None:
+        check_comparable(rules, before)
+        earlier = before.tables()
+    rate_hz = rules.scaling.get('rate_hz', 1.0)
+    return [grid for table, other in zip(rules.tables(), earlier)
+            for grid in _of_table(table, other, rate_hz)]
+
+
+def check_comparable(rules, other, where=''):
+    """Raise InputError unless the rules of two bases stand for the same places."""
+    mine, theirs = (one.tables() for one in (rules, other))
+    for table, second in zip(mine, theirs):
+        for a, b in zip(table.antecedents, second.antecedents):
+            if len(a.knots) != len(b.knots):
+                raise InputError(
+                    f'cannot be compared: {table.name} rules have {len(b.knots)} knots of '
+                    f'{a.name} there and {len(a.knots)} here', where)
+            if not np.allclose(a.knots, b.knots, rtol=1e-9, atol=0.0):
+                raise InputError(
+                    f'cannot be compared: the {a.name} of the {table.name} rules runs from '
+                    f'{_span(b)} there and from {_span(a)} here', where)
+
+
+def _span(antecedent):
+    ends = [shown(float(antecedent.knots[k]), antecedent.unit) for k in (0, -1)]
+    return f'{number(ends[0][0])} to {number(ends[1][0])} {ends[1][1]}'.rstrip()
+
+
+def _of_table(table, other, rate_hz):
+    """Return the grids of one table."""
+    now = table.values * table.scale * 1e-3
+    then = (table.initial * table.scale if other is None else other.values * other.scale) * 1e-3
+    arrays = (now, then, table.fired / rate_hz)
+    axes = [_axis(antecedent) for antecedent in table.antecedents]
+    if len(axes) == 1:
+        axes.append(Axis('', '', np.zeros(1), ('',)))
+        arrays = tuple(array[:, None] for array in arrays)
+    if len(axes) == 2:
+        # Directions side by side, knots below each other.
+        if axes[0].name == DIRECTION:
+            axes, arrays = axes[::-1], tuple(array.T for array in arrays)
+        return [Grid(f'{table.name} rules', *axes, *arrays)]
+    return [Grid(f'{table.name} rules, {name}', *axes[1:], *(array[d] for array in arrays))
+            for d, name in enumerate(axes[0].names)]
+
+
+def _axis(antecedent):
+    values, unit = shown(np.asarray(antecedent.knots, dtype=float), antecedent.unit)
+    return Axis(antecedent.name, unit, values,
+                tuple(_SHORT.get(word, word) for word in antecedent.words))

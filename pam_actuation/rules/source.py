@@ -1,0 +1,120 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rules from what a user names: a rule file, a controller, a preset, or a recording."""
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc.persistence import load_rules
+from pam_sim.errors import InputError
+
+SAVED_NAME = 'rules.json'
+_BAG_ENDINGS = ('.mcap', '.db3')
+
+
+@dataclass(frozen=True)
+class FoundRules:
+    """
+    Rules and where they come from.
+
+    ``rules`` are shown; ``before`` those they started from, None for the initial ones kept
+    in ``rules``; ``since`` names these in words. ``kind`` is 'rule file', 'controller' or
+    'recording'; ``remarks`` are sentences on anything odd.
+    """
+
+    title: str
+    kind: str
+    rules: object
+    before: object = None
+    since: str = 'the initial rules'
+    remarks: tuple = ()
+
+
+def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
+    """
+    Return the rules a user names.
+
+    Parameters
+    ----------
+    name : str
+        A file ending in .json, a bag (directory, .mcap, .db3), or what ``load_controller``
+        takes.
+    rig : callable, optional
+        Returns the rig of a controller that does not bring its own; called only then.
+    namespace : str, optional
+        Which muscle of a bag.
+    recover : bool
+        Also read a recording that broke off.
+    progress : callable, optional
+        Called with the share done, 0 to 1, while a recording is stepped through.
+
+    Raises
+    ------
+    InputError
+        Nothing of that name, damaged, or without rules.
+
+    """
+    path = Path(name).expanduser()
+    if path.suffix == '.json':
+        return FoundRules(path.name, 'rule file', load_rules(path))
+    if path.is_dir() or path.suffix in _BAG_ENDINGS or path.name == 'metadata.yaml':
+        return _of_recording(path, namespace, recover, progress)
+    controller = load_controller(name, None if rig is None else rig())
+    if controller.rules is None:
+        raise InputError(f'a {controller.kind} controller has no rules', name)
+    return FoundRules(path.stem, 'controller', controller.rules)
+
+
+def saved_beside(path):
+    """Return where rules learned in a recording are kept: in its folder, or beside its file."""
+    path = Path(path)
+    if path.name == 'metadata.yaml':
+        path = path.parent
+    return path / SAVED_NAME if path.is_dir() else path.with_suffix(f'.{SAVED_NAME}')
+
+
+def _of_recording(path, namespace, recover, progress):
+    """Return the rules at the end of a recording, and those at its start."""
+    from pam_actuation.bags.load import load_run
+    from pam_actuation.replay.controller import replay_controller
+    run = load_run(path, namespace=namespace, recover=recover)
+    text = run.metadata.get('controller')
+    if not text:
+        raise InputError('the recording does not say which controller ran', os.fspath(path))
+    controller = load_controller(text)
+    if controller.rules is None:
+        raise InputError(
+            f'the recording was made with a {controller.kind} controller, which has no rules',
+            os.fspath(path))
+    before = controller.rules
+    since, title, remarks = 'the rules at its start', path.resolve().name, []
+    saved = saved_beside(path)
+    if saved.is_file():
+        return FoundRules(title, 'recording', load_rules(saved, before), before, since,
+                          (f'The rules at the end were read from {saved}.',))
+    try:
+        result = replay_controller(run, progress=progress)
+    except InputError as error:
+        return FoundRules(
+            title, 'recording', before.copy(), before, since,
+            (f'These are the rules at its start: what was learned is not known, for '
+             f'{error.problem}.',))
+    if not result.identical:
+        remarks.append('The controller was not reproduced to the bit, the rules at the end are '
+                       'near those that were learned.')
+    return FoundRules(
+        title, 'recording', result.controller.rules, before, since, tuple(remarks))

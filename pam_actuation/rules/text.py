@@ -1,0 +1,167 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rules in the terminal: aligned grids, coloured where there are colours, and sentences."""
+
+import numpy as np
+from pam_actuation.control.sofc.words import number
+
+NEVER = '·'
+_LEAST_KPA = 0.005        # what the two digits of a cell show
+_GAP = 2
+_FEW = 2                  # columns that leave room for changes and firing beside them
+# 256-colour codes from little to much: adding pressure towards orange, taking off towards blue.
+_ADD, _TAKE = (223, 215, 208, 202), (153, 111, 69, 33)
+_DIM, _PLAIN = '\x1b[2m', '\x1b[0m'
+
+
+def as_text(found, view, top, width=99, colour=False):
+    """
+    Return rules as text for a terminal.
+
+    Parameters
+    ----------
+    found : FoundRules
+        Where they come from.
+    view : View
+        Grids and sentences.
+    top : int
+        How many sentences.
+    width : int
+        Columns of the terminal; wide grids are broken into blocks.
+    colour : bool
+        Whether the terminal has colours.
+
+    """
+    lines = [f'{found.title} ({found.kind}), {view.summary()}', *found.remarks, *view.remarks]
+    for grid in view.grids:
+        lines += ['', *_grid(grid, view.since, width, colour)]
+    lines += ['', *_sentences(view, top)]
+    return '\n'.join(lines)
+
+
+def _grid(grid, since, width, colour):
+    """Return the lines of one grid: values, then changes and firing where there are any."""
+    shown, rows, columns = _trimmed(grid)
+    if not shown.any():
+        return [f'{grid.title}: all zero, never fired']
+    limit = float(np.max(np.abs(grid.values)))
+    lines = [f'{grid.title}, kPa: {grid.rows.title} downwards'
+             + (f', {grid.columns.title} across' if grid.columns.name else '')]
+    left_out = grid.values.size - len(rows) * len(columns)
+    legend = [f'{NEVER} never fired'] if grid.never[np.ix_(rows, columns)].any() else []
+    if grid.change.any() and not grid.before.any():
+        legend.append(f'all zero in {since}')
+    if left_out:
+        legend.append(f'{left_out} rules at the borders are zero and never fired')
+    lines += [f'  ({"; ".join(legend)})'] if legend else []
+    values = _part(rows, columns, lambda r, c: _value(
+        grid.values[r, c], grid.never[r, c], limit, colour))
+    largest = float(np.max(np.abs(grid.change)))
+    changes = _part(rows, columns, lambda r, c: _value(
+        grid.change[r, c], abs(grid.change[r, c]) < _LEAST_KPA, largest, colour, ''))
+    fired = _part(rows, columns, lambda r, c: _seconds(grid.fired_s[r, c], colour))
+    names = [grid.columns.labels[c] for c in columns]
+    labels = [grid.rows.labels[r] for r in rows]
+    parts = [('', values), ('changed by', changes), ('fired, s', fired)]
+    told = largest >= _LEAST_KPA and grid.before.any()
+    if not told:
+        del parts[1]
+    if grid.never.all():
+        del parts[-1]
+    if len(columns) <= _FEW:
+        if told:
+            lines[0] += f'; changes against {since}'
+        heads = [name if not what else what for name in names for what, _ in parts]
+        cells = [[part[row][c] for c in range(len(columns)) for _, part in parts]
+                 for row in range(len(rows))]
+        return lines + _block(labels, heads, cells, width)
+    for what, part in parts:
+        if what:
+            against = f', kPa, against {since}' if what == 'changed by' else ''
+            lines.append(f'{grid.title}, {what}{against}')
+        lines += _block(labels, names, part, width)
+    return lines
+
+
+def _part(rows, columns, cell):
+    """Return one cell, (plain, painted), per rule that is shown."""
+    return [[cell(r, c) for c in columns] for r in rows]
+
+
+def _trimmed(grid):
+    """Return what is worth showing, and the rows and columns between whose ends it lies."""
+    shown = ~grid.never | (grid.values != 0.0) | (grid.change != 0.0)
+    ends = []
+    for axis in (1, 0):
+        places = np.flatnonzero(shown.any(axis=axis))
+        ends.append(range(places[0], places[-1] + 1) if len(places) else range(0))
+    return shown, *ends
+
+
+def _block(labels, names, cells, width):
+    """Return the lines of a table, broken into blocks of columns that fit the width."""
+    head = max(map(len, labels))
+    size = max([len(plain) for row in cells for plain, _ in row] + [*map(len, names)])
+    fit = max((width - head - _GAP) // (size + _GAP), 1)
+    lines = []
+    for begin in range(0, len(names), fit):
+        part = slice(begin, begin + fit)
+        lines.append(' ' * (head + _GAP) + ''.join(
+            name.rjust(size + _GAP) for name in names[part]))
+        for label, row in zip(labels, cells):
+            lines.append((' ' * _GAP + label.rjust(head) + ''.join(
+                ' ' * (_GAP + size - len(plain)) + painted
+                for plain, painted in row[part])).rstrip())
+    return lines
+
+
+def _value(value, dim, limit, colour, mark=NEVER):
+    """Return a number as (plain, painted) text; what never fired is marked."""
+    plain = f'{value:+.2f}' if abs(value) >= _LEAST_KPA else '0'
+    plain += mark if dim else ' ' * len(mark)
+    return plain, _painted(plain, value / limit if limit else 0.0, dim) if colour else plain
+
+
+def _seconds(value, colour):
+    if value <= 0.0:
+        return NEVER, f'{_DIM}{NEVER}{_PLAIN}' if colour else NEVER
+    plain = '<0.01' if value < 0.01 else f'{value:.2f}' if value < 10.0 else number(value)
+    return plain, plain
+
+
+def _painted(plain, share, dim):
+    """Return a text in the colour of a share -1 to 1 of the largest size."""
+    if dim:
+        return f'{_DIM}{plain}{_PLAIN}'
+    scale = _ADD if share > 0.0 else _TAKE
+    step = min(int(abs(share) * len(scale)), len(scale) - 1)
+    return plain if share == 0.0 else f'\x1b[38;5;{scale[step]}m{plain}{_PLAIN}'
+
+
+def _sentences(view, top):
+    """Return the most important rules in words."""
+    spoken = view.spoken[:top]
+    if not view.spoken:
+        return ['No rule acts: all that fired are zero.']
+    if not spoken:
+        return []
+    if view.fired:
+        lines = [f'The {len(spoken)} most important of {len(view.spoken)} rules that acted '
+                 '(firing times size), with their share of the whole:']
+        total = sum(one.importance_pa_s for one in view.spoken)
+        return lines + [f'  {100.0 * one.importance_pa_s / total:5.1f} %  {one.sentence}'
+                        for one in spoken]
+    lines = [f'No rule has fired yet; the {len(spoken)} largest of {len(view.spoken)}:']
+    return lines + [f'  {one.sentence}' for one in spoken]

@@ -1,0 +1,121 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What there is to show of rules: grids, changes, firing, sentences."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pam_actuation.control.sofc.words import ranked
+from pam_actuation.rules.grids import check_comparable, grids
+from pam_sim.errors import InputError
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class View:
+    """
+    Rules ready for showing.
+
+    ``grids`` are all of them, ``spoken`` those that act, the most important first, ``since``
+    what changes are counted against, in words.
+    """
+
+    rules: object
+    before: object
+    grids: tuple
+    spoken: tuple
+    since: str
+    remarks: tuple = ()
+
+    @property
+    def fired(self):
+        """Whether any rule has fired."""
+        return any(not grid.never.all() for grid in self.grids)
+
+    def summary(self):
+        """Return in words how many rules there are, fired and changed."""
+        count = sum(grid.values.size for grid in self.grids)
+        never = sum(int(grid.never.sum()) for grid in self.grids)
+        changed = sum(int(np.sum(grid.change != 0.0)) for grid in self.grids)
+        largest = max(float(np.max(np.abs(grid.change))) for grid in self.grids)
+        text = f'{count} rules, {never} never fired, '
+        if not changed:
+            return f'{text}none differs from {self.since}'
+        return f'{text}{changed} differ from {self.since} (by up to {largest:.2f} kPa)'
+
+    def to_dict(self):
+        """Return plain data for ``--json``, SI."""
+        earlier = (self.rules if self.before is None else self.before).tables()
+        return {
+            'schema': SCHEMA, 'since': self.since, 'remarks': list(self.remarks),
+            'scaling': dict(self.rules.scaling),
+            'tables': [_table(table, other, self.before is None)
+                       for table, other in zip(self.rules.tables(), earlier)],
+            'rules': [{
+                'table': one.table, 'place': list(one.place), 'sentence': one.sentence,
+                'value_pa': one.value_pa, 'initial_pa': one.initial_pa,
+                'fired_s': one.fired_s, 'importance_pa_s': one.importance_pa_s}
+                for one in self.spoken]}
+
+
+def view_of(found, against=None):
+    """
+    Return the View of FoundRules.
+
+    Parameters
+    ----------
+    found : FoundRules
+        What is shown.
+    against : FoundRules, optional
+        What changes are counted against; by default what ``found`` says.
+
+    Raises
+    ------
+    InputError
+        The two stand for other places.
+
+    """
+    before, since, remarks = found.before, found.since, []
+    if against is not None:
+        try:
+            check_comparable(found.rules, against.rules)
+        except InputError as error:
+            raise InputError(error.problem, against.title) from None
+        before, since = against.rules, against.title
+        remarks += against.remarks
+        other = _other_scaling(found.rules.scaling, against.rules.scaling)
+        if other:
+            remarks.append(f'{found.title} and {against.title} differ in {", ".join(other)}.')
+    return View(found.rules, before, tuple(grids(found.rules, before)),
+                tuple(ranked(found.rules)), since, tuple(remarks))
+
+
+def _other_scaling(mine, theirs):
+    return [f'{name} ({mine.get(name)} and {theirs.get(name)})'
+            for name in sorted(set(mine) | set(theirs)) if mine.get(name) != theirs.get(name)]
+
+
+def _table(table, other, from_initial):
+    """Return one table as plain data, outputs in Pa."""
+    now = table.values * table.scale
+    then = (other.initial if from_initial else other.values) * other.scale
+    return {
+        'name': table.name, 'unit': table.unit,
+        'antecedents': [{
+            'name': one.name, 'unit': one.unit, 'knots': np.asarray(one.knots).tolist(),
+            'words': list(one.words)} for one in table.antecedents],
+        'values': now.tolist(), 'before': then.tolist(), 'change': (now - then).tolist(),
+        'fired': table.fired.tolist(), 'never_fired': int(np.sum(table.fired <= 0.0))}
