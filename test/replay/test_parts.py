@@ -112,8 +112,8 @@ def test_clocks_that_disagree_are_noted_beside_other_parts_and_refused_alone(
         runs, monkeypatch):
     run = runs['pid_ppr']
 
-    def shifted(path, recover=False):
-        bag = read_bag(path, recover=recover)
+    def shifted(path, **options):
+        bag = read_bag(path, **options)
         for topic in bag.topics.values():
             topic.log_time_ns = [int(t) + 7_000_000_000 for t in topic.log_time_ns]
         return bag
