@@ -61,7 +61,13 @@ TEST_REQUIRES = [
     'flake8-import-order>=0.18.2',
     'flake8-quotes>=3.4',
     'pydocstyle>=6.3',
+    'distributed>=2022.12',
     'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
+]
+
+# To run `pam tune --cluster` on a Dask scheduler that exists already.
+CLUSTER_REQUIRES = [
+    'distributed>=2022.12',
 ]
 
 # Only to compare speeds; nothing in the package imports it.
@@ -99,7 +105,9 @@ setup(
     ],
     python_requires='>=3.11,<3.13',
     install_requires=RUN_REQUIRES,
-    extras_require={'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'bench': BENCH_REQUIRES},
+    extras_require={
+        'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'cluster': CLUSTER_REQUIRES,
+        'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',
     maintainer_email='pam_actuation@example.org',

@@ -52,25 +52,32 @@ class Force:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """Wanted contraction [m] and its rate [m/s]: topic reference."""
+    """
+    Wanted contraction [m] and its rate [m/s], or wanted force [N]: topic reference.
+
+    What is not asked for is NaN.
+    """
 
     stamp_ns: int
-    contraction_m: float
-    velocity_m_per_s: float
+    contraction_m: float = math.nan
+    velocity_m_per_s: float = math.nan
+    force_n: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTrajectory:
     """
-    Wanted contraction known ahead: topic reference_trajectory.
+    Wanted contraction, or wanted force, known ahead: topic reference_trajectory.
 
-    Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length.
+    Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length, those
+    of what is not asked for are empty.
     """
 
     stamp_ns: int
     time_from_start_ns: tuple
-    contraction_m: tuple
-    velocity_m_per_s: tuple
+    contraction_m: tuple = ()
+    velocity_m_per_s: tuple = ()
+    force_n: tuple = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -168,26 +168,32 @@ def joint_state_layout(raw):
 
 def joint_trajectory(raw):
     """
-    Return (times, positions, velocities) of a trajectory_msgs/JointTrajectory.
+    Return (times, positions, velocities, efforts) of a trajectory_msgs/JointTrajectory.
 
     Tuples of equal length: ``time_from_start`` [ns], first position and first
-    velocity (NaN if left out) of every point that has a position.
+    velocity (NaN if left out) of every point that has a position. Where no point has one:
+    the first effort of every point that has an effort, positions and velocities empty.
     """
     walker = _Walker(raw)
     walker.string()
     walker.strings()
-    points = []
+    points, efforts = [], []
     for _ in range(walker.limited_count()):
         (position, number), (velocity, velocities) = (
             walker.double_sequence(), walker.double_sequence())
         walker.double_sequence()
-        walker.double_sequence()
+        effort, has_effort = walker.double_sequence()
         after_ns = walker.duration_ns()
         if number:
             points.append((
                 after_ns, _DOUBLE.unpack_from(raw, position)[0],
                 _DOUBLE.unpack_from(raw, velocity)[0] if velocities else math.nan))
-    return tuple(zip(*points)) if points else ((), (), ())
+        elif has_effort:
+            efforts.append((after_ns, _DOUBLE.unpack_from(raw, effort)[0]))
+    if points:
+        return (*zip(*points), ())
+    times, values = zip(*efforts) if efforts else ((), ())
+    return times, (), (), values
 
 
 def diagnostic_array(raw):

@@ -155,6 +155,8 @@ def value_layout(short, raw):
             columns = {
                 'contraction_m': layout.columns.get(('position', 0)),
                 'velocity_m_per_s': layout.columns.get(('velocity', 0))}
+            if short == 'reference' and columns['contraction_m'] is None:
+                columns = {'force_n': layout.columns.get(('effort', 0))}
     return cdr.Layout(columns, layout.fixed)
 
 
@@ -171,6 +173,12 @@ def _encode_motion(message):
     return cdr.joint_state(
         message.stamp_ns, MUSCLE, (message.contraction_m,),
         () if math.isnan(velocity) else (velocity,))
+
+
+def _encode_reference(message):
+    if math.isfinite(message.force_n):
+        return cdr.joint_state(message.stamp_ns, MUSCLE, effort=(message.force_n,))
+    return _encode_motion(message)
 
 
 def _encode_valve_signal(message):
@@ -196,12 +204,12 @@ def _encode_trajectory(message):
     types = typestore().types
     empty = np.empty(0)
     points = []
-    for after_ns, contraction_m, velocity_m_per_s in zip(
-            message.time_from_start_ns, message.contraction_m, message.velocity_m_per_s):
+    for i, after_ns in enumerate(message.time_from_start_ns):
         seconds, nanoseconds = cdr.split_stamp(after_ns)
         points.append(types['trajectory_msgs/msg/JointTrajectoryPoint'](
-            positions=np.array([contraction_m]), velocities=np.array([velocity_m_per_s]),
-            accelerations=empty, effort=empty,
+            positions=np.array(message.contraction_m[i:i + 1]),
+            velocities=np.array(message.velocity_m_per_s[i:i + 1]),
+            accelerations=empty, effort=np.array(message.force_n[i:i + 1]),
             time_from_start=types['builtin_interfaces/msg/Duration'](
                 sec=seconds, nanosec=nanoseconds)))
     return _serialised(
@@ -253,7 +261,7 @@ def _decode_force(stamp_ns, values):
 
 
 _ENCODERS = {
-    'reference': _encode_motion,
+    'reference': _encode_reference,
     'reference_trajectory': _encode_trajectory,
     'pressure_command': _encode_pressure,
     'valve_command': _encode_valve_signal,

@@ -57,8 +57,10 @@ def topic_remarks(topic, info, stamp_ns, values):
     if topic.name.endswith('/controller_state'):
         # Internals may be undefined, such as the time since the tick before the first.
         return remarks
+    # A reference that asks for a force says nothing of a contraction.
+    asks_force = topic.name.endswith('/reference') and 'force_n' in values
     for name, column in values.items():
-        if len(column):
+        if len(column) and (not asks_force or np.isfinite(column).any()):
             remarks += _value_remarks(topic.name, name, column)
     return remarks
 

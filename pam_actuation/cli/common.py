@@ -68,7 +68,8 @@ def add_controller_options(parser):
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
         '--controller', default=None, metavar='NAME|FILE',
-        help='controller preset or YAML (default: sofc_ppr or sofc_hsv, after the valve)')
+        help='controller preset or YAML (default: sofc_ppr or sofc_hsv, after the valve; '
+        'sofc_force_… for an experiment in force)')
     parser.add_argument(
         '--rules', default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
@@ -88,7 +89,7 @@ def load_setup(args):
     """
     Return (experiment, rig, controller) that the options name.
 
-    The controller is None where the experiment is not in contraction.
+    The controller is None where the experiment is in pressure or a valve signal.
 
     Raises
     ------
@@ -98,14 +99,19 @@ def load_setup(args):
     """
     # Here and not above: --help must not wait for the simulator to load.
     from pam_actuation.control.config import load_controller
+    from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
+    from pam_actuation.experiments.limits import check_tracked
     from pam_sim import load_rig
     experiment = load_experiment(args.experiment)
     rig = load_rig(args.rig, valve=args.valve)
-    if experiment.domain != 'contraction':
+    if not experiment.tracked:
         return experiment, rig, None
-    return experiment, rig, load_controller(
-        default_controller(args, rig.valve), rig, rules_file=args.rules)
+    experiment.check_reachable(rig)
+    controller = load_controller(
+        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules)
+    check_tracked(experiment, controller)
+    return experiment, rig, controller
 
 
 def default_controller(args, valve):

@@ -12,58 +12,132 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``pam tune``: improve the controller offline, on the model, from what was recorded."""
+"""``pam tune``: improve a controller offline, on a model, from what was recorded."""
 
 import os
 
 from pam_actuation.cli.common import (
     add_controller_options, default_controller, emit, EXIT_DONE, EXIT_FINDING, progress)
 
-HELP = 'Tune the controller offline against the model of a bag; writes a controller YAML.'
-EXAMPLE = 'pam tune runs/first --out tuned.yaml --rollouts 400'
+HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
+        'writes controller YAML, initial rules and report.')
+EXAMPLE = 'pam tune runs/first --randomise 4 --out tuned.yaml'
+EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
+CHECK = 'tuning_check'
 
 
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', nargs='*', help='bags that say rig, controller and experiment')
-    parser.add_argument('--rig', default=None, metavar='NAME|FILE',
-                        help='rig to tune on (default: the one of the bag)')
+    parser.add_argument('--model', '--rig', dest='rig', default=None, metavar='NAME|FILE',
+                        help='model to tune on (default: the rig of the first bag)')
     parser.add_argument('--valve', metavar='ppr|hsv', default=None, help='valve type')
-    parser.add_argument('--experiment', default=None, help='experiment (default: of the bag)')
+    parser.add_argument(
+        '--experiment', action='append', default=None, metavar='NAME|FILE',
+        help='experiment to tune for, may be repeated (default: those of the bags; without '
+        f'bags {", ".join(EXPERIMENTS)})')
+    parser.add_argument(
+        '--check', action='append', default=None, metavar='NAME|FILE',
+        help=f'experiment of the held-out check, may be repeated (default: {CHECK} and those of '
+        'the search, with other noise)')
     add_controller_options(parser)
-    parser.add_argument('--rollouts', type=int, default=400, help='budget of simulated runs')
-    parser.add_argument('--jobs', type=int, default=1, help='worker processes')
-    parser.add_argument('--seed', type=int, default=0, help='seed of search and sensor noise')
-    parser.add_argument('--out', default='tuned.yaml', metavar='FILE',
-                        help='controller YAML to write (default: %(default)s)')
+    parser.add_argument('--rollouts', type=int, default=3000, metavar='N',
+                        help='budget of simulated runs of the search (default: %(default)s)')
+    parser.add_argument('--randomise', type=int, default=0, metavar='N',
+                        help='tune on so many random rigs beside the model (default: 0)')
+    parser.add_argument('--patience', type=int, default=30, metavar='N',
+                        help='stop after so many generations without progress, 0 = never '
+                        '(default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=-1, metavar='N',
+                        help='threads; -1 = one a core (default)')
+    parser.add_argument('--cluster', default=None, metavar='ADDRESS',
+                        help='run on a Dask scheduler (tcp://HOST:PORT) or a Ray cluster '
+                        '(ray://HOST:PORT) instead')
+    parser.add_argument('--seed', type=int, default=0,
+                        help='seed of search, sensor noise and random rigs')
+    parser.add_argument('--out', default='tuned.yaml', metavar='FILE.yaml',
+                        help='controller to write; its rules and the report go beside it '
+                        '(default: %(default)s)')
 
 
 def run(args):
-    """Tune; exit code 1 where the held-out check did not improve."""
+    """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.control.config import load_controller
-    from pam_actuation.experiments import load_experiment
-    from pam_actuation.tuning.tune import tune
+    from pam_actuation.report.tuning_page import tuning_report
+    from pam_actuation.tuning.random_rigs import random_rigs
+    from pam_actuation.tuning.recording import check_recordings
+    from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
     from pam_sim import load_rig
-    from pam_sim.errors import InputError
-    if args.rollouts < 10:
-        raise InputError(f'is {args.rollouts}; allowed is 10 or more', '--rollouts')
-    metadata = load_run(args.bag[0]).metadata if args.bag else {}
-    rig_source = args.rig or metadata.get('rig')
-    experiment_source = args.experiment or metadata.get('experiment')
-    if not rig_source or not experiment_source:
-        raise InputError(
-            'no rig or experiment to tune on: give a bag that was recorded here, '
-            'or both --rig and --experiment')
-    rig = load_rig(rig_source, valve=args.valve)
-    controller_source = args.controller or metadata.get('controller') \
-        or default_controller(args, rig.valve)
-    controller = load_controller(controller_source, rig, rules_file=args.rules)
-    experiment = load_experiment(experiment_source)
+    stem = _checked(args)
+    runs = [load_run(bag) for bag in args.bag]
+    rig = load_rig(_rig_source(args, runs), valve=args.valve)
+    controller = load_controller(
+        args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
+        rig, rules_file=args.rules)
+    controller.freeze_learning = args.freeze
+    experiments, check = _experiments(args, runs)
+    rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
+    others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]
     with progress(args, args.rollouts, ' rollouts', 'tuning') as bar:
-        result = tune(rig, controller, experiment, budget=args.rollouts, seed=args.seed,
-                      jobs=args.jobs, progress=lambda done: bar.update(max(done - bar.n, 0)))
-    result.save(args.out)
-    emit(args, {'controller': os.fspath(args.out), **result.to_dict()},
-         f'{result.text()}\ncontroller: {args.out}')
-    return EXIT_DONE if result.improved else EXIT_FINDING
+        result = tune(
+            rigs, controller, experiments, budget=args.rollouts, seed=args.seed, jobs=args.jobs,
+            progress=lambda done: bar.update(max(done - bar.n, 0)), held_out=check,
+            held_out_rigs=others, patience=args.patience, cluster=args.cluster,
+            learn_rules=not args.freeze)
+    recordings = check_recordings(runs, rig, result.controller)
+    written = {'controller': args.out, 'report': f'{stem}.html'}
+    if result.controller.rules is not None:
+        written['rules'] = f'{stem}_rules.json'
+    result.save(args.out, written.get('rules'))
+    tuning_report(written['report'], result, recordings, rig, experiments, runs)
+    emit(args, {**{key: os.fspath(path) for key, path in written.items()}, **result.to_dict(),
+                'recordings': [one.to_dict() for one in recordings]},
+         '\n'.join([result.text(), *(f'  {text}' for one in recordings for text in one.lines()),
+                    *(f'{key}: {path}' for key, path in written.items())]))
+    wrong = any(one.model is not None and one.model.verdict == 'wrong' for one in recordings)
+    return EXIT_DONE if result.improved and not wrong else EXIT_FINDING
+
+
+def _checked(args):
+    """Return the path of ``--out`` without its ending; raise InputError for bad options."""
+    from pam_sim.errors import InputError
+    for name, least in (('rollouts', 10), ('randomise', 0), ('patience', 0)):
+        if getattr(args, name) < least:
+            raise InputError(f'is {getattr(args, name)}; allowed is {least} or more', f'--{name}')
+    if args.jobs == 0:
+        raise InputError('is 0; allowed is 1 or more, or -1 for one a core', '--jobs')
+    folder = os.path.dirname(os.path.abspath(args.out))
+    if not os.path.isdir(folder):
+        raise InputError('the folder does not exist', folder)
+    return os.path.splitext(args.out)[0]
+
+
+def _first(runs, key):
+    """Return the first metadata entry of that name among the runs, None without any."""
+    return next((run.metadata[key] for run in runs if run.metadata.get(key)), None)
+
+
+def _rig_source(args, runs):
+    """Return name, file or text of the model to tune on."""
+    from pam_sim.errors import InputError
+    source = args.rig or _first(runs, 'rig')
+    if not source:
+        raise InputError(
+            'no model to tune on: give a bag that was recorded here, or --model', '--model')
+    return source
+
+
+def _experiments(args, runs):
+    """Return the experiments of the search and those of the held-out check."""
+    from pam_actuation.experiments import load_experiment
+    if args.experiment:
+        search = [load_experiment(one) for one in args.experiment]
+    else:
+        texts = dict.fromkeys(run.metadata.get('experiment') or '' for run in runs)
+        recorded = [load_experiment(text) for text in texts if text]
+        search = [one for one in recorded if one.domain == 'contraction'] or [
+            load_experiment(one) for one in EXPERIMENTS]
+    if args.check:
+        return search, [load_experiment(one) for one in args.check]
+    return search, [load_experiment(CHECK), *search]

@@ -17,20 +17,26 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
 
 ::
 
-    controller: sofc              # or pid
+    controller: sofc              # or pid, lqi
     settings:                     # only what differs from the defaults
       lead_s: 0.1
       index_form: linear          # or table
+    mode: contraction             # or force, joint: what is tracked (``control/modes``)
+    force: {stiffness_n_per_m: 1800}             # of mode force, all keys optional
+    joint: {co_contraction_gauge_pa: 300000}     # of mode joint, all keys optional
     rules: learned.json           # optional: rules to start from, path relative to this file
 
 Written by ``to_yaml`` for recordings, which must not depend on anything else:
 ``rig`` (identity), ``static_inverse`` (table) and ``initial_rules`` (content of a
-rule file).
+rule file); for an LQI controller instead its ``model`` and ``gains``, see ``lqi_files``.
 """
 
 import os
 
 import numpy as np
+from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
+from pam_actuation.control.modes.files import KEYS as MODE_KEYS, mode_to_mapping, read_mode
+from pam_actuation.control.modes.tracked import FORCE, tracked_by
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import (
@@ -39,14 +45,18 @@ from pam_actuation.control.static_inverse import tabulate_static_inverse
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
-_KINDS = ('sofc', 'pid')
-_KEYS = ('controller', 'rig', 'settings', 'rules', 'static_inverse', 'initial_rules')
+_KINDS = ('sofc', 'pid', 'lqi')
+_KEYS = ('controller', 'rig', 'settings', *MODE_KEYS)
+_OWN_KEYS = {
+    'sofc': ('static_inverse', 'rules', 'initial_rules'), 'pid': ('static_inverse',),
+    'lqi': ('model', 'gains')}
+_ALL_KEYS = _KEYS + _OWN_KEYS['sofc'] + _OWN_KEYS['lqi']
 _INDEX_FORMS = ('linear', 'table')
 
 
 def rig_identity(rig):
-    """Return the text that ties rules to a rig: its name and valve."""
-    return f'{rig.name}/{rig.valve}'
+    """Return the text that ties rules to a rig or a joint: its name and valve."""
+    return f'{rig.name}/{getattr(rig, "flexor", rig).valve}'
 
 
 def load_controller(name_or_path_or_text, rig=None, rules_file=None):
@@ -65,7 +75,7 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
 
     Returns
     -------
-    SelfOrganizingFuzzyController or PidController
+    SelfOrganizingFuzzyController, PidController or LqiController
 
     Raises
     ------
@@ -93,21 +103,27 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
 
 def controller_from_tree(tree, rig=None, folder='.'):
     """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
-    tree.check_keys(_KEYS)
+    tree.check_keys(_ALL_KEYS)
     kind = tree.require('controller', str, choices=_KINDS)
+    for key in tree:
+        if key not in _KEYS + _OWN_KEYS[kind]:
+            raise tree.error(f'a {kind} controller has no `{key}`', key)
     located = tree.get('settings', dict)
     settings = dict(located.plain()) if located is not None else {}
     where = located.where if located is not None else tree.where
     if kind == 'sofc' and isinstance(settings.get('index_form'), str):
         form = located.require('index_form', str, choices=_INDEX_FORMS)
         settings['index_form'] = float(_INDEX_FORMS.index(form))
-    inverse = _static_inverse(tree, rig)
+    mode = read_mode(tree, rig)
     identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
+    if kind == 'lqi':
+        return lqi_from_tree(tree, rig, settings, identity, where)
+    inverse = _static_inverse(tree, rig, mode)
+    if mode is not None:
+        identity = mode.identity(identity)
     if kind == 'pid':
-        for key in ('rules', 'initial_rules'):
-            if key in tree:
-                raise tree.error(f'a pid controller has no `{key}`', key)
-        return PidController(inverse, settings, identity, where)
+        controller = PidController(inverse, settings, identity, where)
+        return controller if mode is None else mode.wrap(controller)
     controller = SelfOrganizingFuzzyController(
         inverse, settings, rig_name=identity, where=where)
     if 'rules' in tree and 'initial_rules' in tree:
@@ -121,11 +137,11 @@ def controller_from_tree(tree, rig=None, folder='.'):
         rules = rules_from_mapping(mapping, tree.where('initial_rules'), controller.rules)
     if rules is not None:
         controller.rules.assign(rules)
-    return controller
+    return controller if mode is None else mode.wrap(controller)
 
 
-def _static_inverse(tree, rig):
-    """Return the table of the file, else that of the rig."""
+def _static_inverse(tree, rig, mode):
+    """Return the table of the file, else that of the mode or the rig."""
     if 'static_inverse' in tree:
         table = tree.require('static_inverse', dict)
         table.check_keys(('lower_m', 'step_m', 'pressure_pa'))
@@ -137,28 +153,35 @@ def _static_inverse(tree, rig):
         values = [nodes.require(i, float, lower=0.0, upper=1e7, unit='Pa')
                   for i in range(len(nodes))]
         return np.array([lower_m, step_m] + values)
+    if mode is not None:
+        return mode.blank_inverse()
     if rig is None:
         raise InputError(
             'without a rig the controller text must bring its `static_inverse`', tree.where())
     return tabulate_static_inverse(rig)
 
 
-def controller_to_yaml(controller):
+def controller_to_yaml(controller, rules_file=None):
     """
     Return YAML text that rebuilds a controller bit for bit, its present rules included.
 
     A recording keeps this text, so that it can be replayed without rig, preset or rule file.
+    With ``rules_file`` the text names that file, to lie in the same folder, instead.
     """
     settings = dict(controller.settings)
     if 'index_form' in settings:
         settings['index_form'] = _INDEX_FORMS[int(round(settings['index_form']))]
-    inverse = controller.static_inverse.tolist()
     data = {
-        'controller': controller.kind,
-        'rig': controller.rig_name,
-        'settings': settings,
-        'static_inverse': {
-            'lower_m': inverse[0], 'step_m': inverse[1], 'pressure_pa': inverse[2:]}}
-    if controller.rules is not None:
+        'controller': controller.kind, 'rig': controller.rig_name, 'settings': settings,
+        **mode_to_mapping(controller)}
+    if controller.kind == 'lqi':
+        data.update(lqi_to_mapping(controller))
+    elif tracked_by(controller) != FORCE:       # there the surface says it
+        inverse = controller.static_inverse.tolist()
+        data['static_inverse'] = {
+            'lower_m': inverse[0], 'step_m': inverse[1], 'pressure_pa': inverse[2:]}
+    if controller.rules is not None and rules_file is not None:
+        data['rules'] = os.path.basename(rules_file)
+    elif controller.rules is not None:
         data['initial_rules'] = rules_to_mapping(controller.rules)
     return dump_yaml(data)

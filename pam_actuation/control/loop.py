@@ -25,6 +25,7 @@ input                                          what the loop does
 no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
+force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
 reference silent for more than 0.5 s           holds the last position, learning frozen
@@ -38,13 +39,22 @@ the loop itself stood still over 0.25 s        starts bumplessly
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.tick import TickCore, TickInputs
 from pam_actuation.messages import ControllerState, Pressure
+from pam_sim.errors import InputError
 
 MAX_AGE_NS = 100_000_000
 MAX_AHEAD_NS = 20_000_000
 STALL_NS = 250_000_000
+_FORCE_MARGIN = 1.5       # of the largest force in the table: above, the load cell is wrong
+# Codes of: none yet, too old, too far ahead, not finite, implausible.
+_REASONS = {
+    CONTRACTION: (codes.NO_CONTRACTION, codes.CONTRACTION_OLD, codes.CONTRACTION_AHEAD,
+                  codes.CONTRACTION_NOT_FINITE, codes.CONTRACTION_IMPLAUSIBLE),
+    FORCE: (codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD, codes.FORCE_NOT_FINITE,
+            codes.FORCE_IMPLAUSIBLE)}
 
 
 class ControllerLoop:
@@ -53,26 +63,40 @@ class ControllerLoop:
 
     Parameters
     ----------
-    controller : SelfOrganizingFuzzyController or PidController
+    controller : SelfOrganizingFuzzyController, PidController or ForceController
         As ``load_controller`` gives it.
     contraction_range_m : tuple of float
-        Measurements outside are implausible: the sensor is wrong, not the muscle.
+        Measurements outside are implausible: the sensor is wrong, not the muscle. For a
+        controller that tracks force the range follows from the largest force of its table.
+
+    Raises
+    ------
+    InputError
+        The controller tracks the angle of a joint: this loop has a single muscle.
 
     """
 
     def __init__(self, controller, contraction_range_m=(-0.01, 0.1)):
         self.controller = controller
-        self.contraction_range_m = contraction_range_m
-        self.references = ReferenceBuffer()
+        self.tracked = tracked_by(controller)
+        if self.tracked == JOINT:
+            raise InputError('the controller tracks a joint; this is the loop of one muscle',
+                             controller.rig_name)
+        self._range = contraction_range_m
+        if self.tracked == FORCE:
+            self._range = (
+                -0.5 * controller.upper_force_n, _FORCE_MARGIN * controller.upper_force_n)
+        self._reasons = _REASONS[self.tracked]
+        self.references = ReferenceBuffer(force=self.tracked == FORCE)
         self.rejected_references = 0
-        self.reason = codes.REASONS[codes.NO_CONTRACTION]
+        self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None
         self._force = None
         self._last_tick_ns = None
-        self._used_contraction_ns = None
+        self._used_ns = None
 
     @property
     def rate_hz(self):
@@ -130,27 +154,33 @@ class ControllerLoop:
         return (Pressure(now_ns, command_pa),
                 ControllerState(now_ns, self._core.names, values))
 
-    def _contraction_reason(self, now_ns):
-        """Return the code for the newest contraction, OK if it can be used."""
+    def _measured(self):
+        """Return the newest message of what is tracked and its value; None, NaN before."""
+        if self.tracked == FORCE:
+            return self._force, math.nan if self._force is None else self._force.force_n
         message = self._contraction
+        return message, math.nan if message is None else message.contraction_m
+
+    def _measured_reason(self, now_ns):
+        """Return the code for the newest measurement of what is tracked, OK if usable."""
+        message, value = self._measured()
+        none, old, ahead, not_finite, implausible = self._reasons
         if message is None:
-            return codes.NO_CONTRACTION
+            return none
         if now_ns - message.stamp_ns > MAX_AGE_NS:
-            return codes.CONTRACTION_OLD
+            return old
         if message.stamp_ns - now_ns > MAX_AHEAD_NS:
-            return codes.CONTRACTION_AHEAD
-        if not math.isfinite(message.contraction_m):
-            return codes.CONTRACTION_NOT_FINITE
-        lowest, highest = self.contraction_range_m
-        if not lowest <= message.contraction_m <= highest:
-            return codes.CONTRACTION_IMPLAUSIBLE
-        return codes.OK
+            return ahead
+        if not math.isfinite(value):
+            return not_finite
+        lowest, highest = self._range
+        return codes.OK if lowest <= value <= highest else implausible
 
     def _gather(self, now_ns, learning):
         """Return the ``TickInputs`` of now."""
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
-        reason = self._contraction_reason(now_ns)
+        reason = self._measured_reason(now_ns)
         references = self.references
         if reason == codes.OK:
             reason = {
@@ -162,18 +192,21 @@ class ControllerLoop:
             learning and reason == codes.OK and not self.controller.freeze_learning)
         inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
         if reason not in codes.RUNNING:
-            self._used_contraction_ns = None
+            self._used_ns = None
             return inputs
-        measured_ns = self._contraction.stamp_ns
-        inputs.contraction_m = self._contraction.contraction_m
+        measured_ns = self._measured()[0].stamp_ns
         # The error belongs to the time of the measurement, the preview to now.
-        inputs.reference_m, inputs.reference_m_per_s = references.at(now_ns, measured_ns)
-        inputs.lead_reference_m, inputs.lead_reference_m_per_s = references.at(
+        inputs.reference, inputs.reference_rate = references.at(now_ns, measured_ns)
+        inputs.lead_reference, inputs.lead_reference_rate = references.at(
             now_ns, now_ns + round(self.controller.lead_s * 1e9))
-        if self._used_contraction_ns is not None:
-            inputs.elapsed_s = (measured_ns - self._used_contraction_ns) * 1e-9
-        self._used_contraction_ns = measured_ns
-        pressure_ns = force_ns = reference_ns = trajectory_ns = -1
+        if self._used_ns is not None:
+            inputs.elapsed_s = (measured_ns - self._used_ns) * 1e-9
+        self._used_ns = measured_ns
+        contraction_ns = pressure_ns = force_ns = reference_ns = trajectory_ns = -1
+        if self._fresh(self._contraction, now_ns) and math.isfinite(
+                self._contraction.contraction_m):
+            inputs.contraction_m = self._contraction.contraction_m
+            contraction_ns = self._contraction.stamp_ns
         if self._fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
             inputs.pressure_pa = self._pressure.pressure_pa
             pressure_ns = self._pressure.stamp_ns
@@ -184,7 +217,7 @@ class ControllerLoop:
             trajectory_ns = references.trajectory.stamp_ns
         else:
             reference_ns = references.reference.stamp_ns
-        inputs.stamps_ns = (measured_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
+        inputs.stamps_ns = (contraction_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
         return inputs
 
     @staticmethod

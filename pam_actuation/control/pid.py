@@ -128,7 +128,7 @@ def _tick(par, inverse, st, inp, out):
 
 def _entry(key):
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True)
+    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
     def pid_step(par, inverse, st, inp, out):
         """
         Run one tick; return the pressure command [absolute Pa].

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The wanted contraction now and a little ahead, from what was published.
+The wanted contraction (or force) now and a little ahead, from what was published.
 
 ``reference`` alone is extrapolated with its rate; a ``reference_trajectory``
 is interpolated (cubic through positions and rates). Rules:
@@ -40,16 +40,30 @@ NONE, FRESH, HELD, LOST = range(4)      # what ``state`` can be
 
 
 class ReferenceBuffer:
-    """Newest reference and trajectory; answers what is wanted at a time."""
+    """
+    Newest reference and trajectory; answers what is wanted at a time.
 
-    def __init__(self):
+    Parameters
+    ----------
+    force : bool
+        The messages ask for a force [N]. They carry no rate of it; between points of a
+        trajectory it is that of the line through them, without a trajectory 0.
+
+    """
+
+    def __init__(self, force=False):
+        self._force = force
+        self.clear()
+
+    def clear(self):
+        """Forget everything."""
         self.reference = None
         self.trajectory = None
-        self._times_ns = ()
+        self._times_ns = self._values = self._rates = ()
 
     def set_reference(self, message):
         """Take a ``Reference``; one that is not finite is ignored and False returned."""
-        if not math.isfinite(message.contraction_m):
+        if not math.isfinite(self._value(message)):
             return False
         self.reference = message
         return True
@@ -61,18 +75,21 @@ class ReferenceBuffer:
         Usable: at least one point, equal lengths, finite, times strictly rising.
         """
         times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
+        values = self._value(message)
         usable = (
-            len(times) > 0 and len(times) == len(message.contraction_m)
+            len(times) > 0 and len(times) == len(values)
             and all(a < b for a, b in zip(times, times[1:]))
-            and all(math.isfinite(x) for x in message.contraction_m))
+            and all(math.isfinite(x) for x in values))
         if usable:
             self.trajectory = message
             self._times_ns = times
+            self._values = values
+            self._rates = () if self._force else message.velocity_m_per_s
         return usable
 
-    def clear(self):
-        """Forget everything."""
-        self.__init__()
+    def _value(self, message):
+        """Return what a message asks for, of the quantity that counts here."""
+        return message.force_n if self._force else message.contraction_m
 
     def uses_trajectory(self, now_ns):
         """Return whether the trajectory is the one that counts now."""
@@ -105,37 +122,37 @@ class ReferenceBuffer:
 
     def at(self, now_ns, time_ns):
         """
-        Return (position m, rate m/s) wanted at ``time_ns``, judged at ``now_ns``.
+        Return (position, rate per second) wanted at ``time_ns``, judged at ``now_ns``.
 
         Only valid unless ``state`` is ``NONE``.
         """
         if self.uses_trajectory(now_ns):
             return self._interpolate(time_ns)
         if self.reference is None:
-            return self.trajectory.contraction_m[-1], 0.0
+            return self._values[-1], 0.0
         reference = self.reference
-        rate = reference.velocity_m_per_s
+        rate = 0.0 if self._force else reference.velocity_m_per_s
         if not math.isfinite(rate):
             rate = 0.0
         age_s = (now_ns - reference.stamp_ns) * 1e-9
         ahead_s = (time_ns - now_ns) * 1e-9
         trusted_s = min(age_s, TRUST_S)
         fade = min(max((LOST_S - age_s) / (LOST_S - TRUST_S), 0.0), 1.0)
-        position = reference.contraction_m + rate * (trusted_s + ahead_s * fade)
+        position = self._value(reference) + rate * (trusted_s + ahead_s * fade)
         return position, rate * fade
 
     def _interpolate(self, time_ns):
         """Return position and rate of the trajectory, straight beyond its ends."""
-        times, trajectory = self._times_ns, self.trajectory
+        times, values = self._times_ns, self._values
         after = bisect_right(times, time_ns)
         if after == 0 or after == len(times):
             i = 0 if after == 0 else after - 1
             rate = self._rate(i)
-            return trajectory.contraction_m[i] + rate * (time_ns - times[i]) * 1e-9, rate
+            return values[i] + rate * (time_ns - times[i]) * 1e-9, rate
         i = after - 1
         span_s = (times[after] - times[i]) * 1e-9
         part = (time_ns - times[i]) * 1e-9 / span_s
-        x0, x1 = trajectory.contraction_m[i], trajectory.contraction_m[after]
+        x0, x1 = values[i], values[after]
         v0, v1 = self._rate(i, None), self._rate(after, None)
         if v0 is None or v1 is None:
             return x0 + (x1 - x0) * part, (x1 - x0) / span_s
@@ -147,7 +164,7 @@ class ReferenceBuffer:
 
     def _rate(self, index, missing=0.0):
         """Return the rate of a point, ``missing`` where there is none."""
-        rates = self.trajectory.velocity_m_per_s
+        rates = self._rates
         if index < len(rates) and math.isfinite(rates[index]):
             return rates[index]
         return missing

@@ -23,10 +23,12 @@ state. ``TickCore`` turns it into a command and the numbers of
 from dataclasses import dataclass
 import math
 
+from pam_actuation.control.modes.tracked import tracked_by
 from pam_sim.units import P_ATM_PA
 
 (OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
- CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD) = range(9)
+ CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
+ FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE) = range(14)
 REASONS = (
     'ok',
     'no contraction measured yet',
@@ -36,15 +38,33 @@ REASONS = (
     'contraction is outside what the muscle can do',
     'no reference yet',
     'reference lost, muscle vented',
-    'reference lost, holding its last position')
+    'reference lost, holding its last position',
+    'no force measured yet',
+    'force is older than 0.1 s',
+    'force is stamped more than 0.02 s ahead',
+    'force is not a finite number',
+    'force is outside what the muscle can do')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
-INPUT_NAMES = (
-    'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced',
-    *(f'{name}_stamp_{part}' for name in STAMPED for part in ('sec', 'nanosec')),
-    'contraction_m', 'reference_m', 'reference_m_per_s', 'lead_reference_m',
-    'lead_reference_m_per_s', 'elapsed_s', 'pressure_pa', 'force_n')
+
+
+def input_names(unit):
+    """
+    Return the names of the inputs of a tick in ``controller_state``, in order.
+
+    ``unit`` is the suffix of the reference: ``m``, or ``n`` where a force is tracked.
+    """
+    return (
+        'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced',
+        *(f'{name}_stamp_{part}' for name in STAMPED for part in ('sec', 'nanosec')),
+        'contraction_m', *reference_names(unit), 'elapsed_s', 'pressure_pa', 'force_n')
+
+
+def reference_names(unit):
+    """Return the names of reference, its rate, and both one preview ahead."""
+    return (f'reference_{unit}', f'reference_{unit}_per_s', f'lead_reference_{unit}',
+            f'lead_reference_{unit}_per_s')
 
 
 @dataclass(slots=True)
@@ -53,9 +73,9 @@ class TickInputs:
     Everything one tick depends on.
 
     ``reason`` is one of this module's codes; ``stamps_ns`` gives the stamp of every input
-    used, in the order of ``STAMPED``, -1 for one not used. Other fields: see
-    ``SelfOrganizingFuzzyController.step``. ``restarted``: the loop stood still, so that the
-    motion known from before means nothing.
+    used, in the order of ``STAMPED``, -1 for one not used. References are in the unit of what
+    the controller tracks. Other fields: see ``step`` of the controller. ``restarted``: the
+    loop stood still, so that the motion known from before means nothing.
     """
 
     reason: int = OK
@@ -63,10 +83,10 @@ class TickInputs:
     restarted: bool = False
     stamps_ns: tuple = (-1,) * len(STAMPED)
     contraction_m: float = math.nan
-    reference_m: float = math.nan
-    reference_m_per_s: float = math.nan
-    lead_reference_m: float = math.nan
-    lead_reference_m_per_s: float = math.nan
+    reference: float = math.nan
+    reference_rate: float = math.nan
+    lead_reference: float = math.nan
+    lead_reference_rate: float = math.nan
     elapsed_s: float = math.nan
     pressure_pa: float = math.nan
     force_n: float = math.nan
@@ -91,14 +111,14 @@ class TickCore:
 
     Parameters
     ----------
-    controller : SelfOrganizingFuzzyController or PidController
+    controller : SelfOrganizingFuzzyController, PidController or ForceController
 
     """
 
     def __init__(self, controller):
         self.controller = controller
         self.ticks = 0
-        self.names = INPUT_NAMES + tuple(controller.state_names)
+        self.names = input_names(tracked_by(controller).unit) + tuple(controller.state_names)
 
     def run(self, inputs):
         """
@@ -118,15 +138,15 @@ class TickCore:
         command_pa = P_ATM_PA
         if inputs.reason in RUNNING:
             command_pa = float(controller.step(
-                inputs.contraction_m, inputs.reference_m, inputs.reference_m_per_s,
-                inputs.lead_reference_m, inputs.lead_reference_m_per_s, inputs.learning,
+                inputs.contraction_m, inputs.reference, inputs.reference_rate,
+                inputs.lead_reference, inputs.lead_reference_rate, inputs.learning,
                 inputs.elapsed_s, inputs.pressure_pa, inputs.force_n))
         values = (
             float(self.ticks), float(inputs.reason), float(inputs.learning),
             float(inputs.restarted), float(controller.rules_replaced),
             *(part for stamp_ns in inputs.stamps_ns for part in split_stamp(stamp_ns)),
-            inputs.contraction_m, inputs.reference_m, inputs.reference_m_per_s,
-            inputs.lead_reference_m, inputs.lead_reference_m_per_s, inputs.elapsed_s,
+            inputs.contraction_m, inputs.reference, inputs.reference_rate,
+            inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
             inputs.pressure_pa, inputs.force_n, *controller.state_values())
         self.ticks += 1
         return command_pa, values

@@ -47,11 +47,16 @@ class Domain:
 # In a file: hsv_duty above 0 is the duty of the filling valve, below 0 of the venting one.
 DOMAINS = {d.name: d for d in (
     Domain('contraction', 'm', 0.0, 0.0, 0.25, 1.0),
+    Domain('force', 'n', 0.0, 0.0, 10_000.0, 1e5),
+    Domain('joint_angle', 'rad', 0.0, -3.15, 3.15, 50.0),
     Domain('pressure', 'pa', P_ATM_PA, P_ATM_PA, 1_300_000.0, 2e7),
     Domain('ppr_voltage', 'v', 0.0, 0.0, 6.0, 200.0),
     Domain('hsv_duty', 'duty', -1.0, -1.0, 1.0, 100.0),
 )}
 FORCE = Domain('disturbance', 'n', 0.0, -200.0, 200.0, 10_000.0)
+
+
+TRACKED = ('contraction', 'force')      # domains that a controller of one muscle tracks
 
 
 class Chain:

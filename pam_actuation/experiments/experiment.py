@@ -14,7 +14,7 @@
 
 """An experiment file: a domain and a chain of primitives, checked before it runs."""
 
-from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S
+from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S, TRACKED
 from pam_actuation.experiments.limits import check_rig
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
@@ -34,9 +34,10 @@ class Experiment:
     name, description : str
         Name used in bags, and a sentence for people.
     domain : str
-        What the values are: wanted contraction [m], wanted pressure [Pa absolute], or
-        the raw valve signal (``ppr_voltage`` [V], ``hsv_duty``); all but ``contraction``
-        run without a controller.
+        What the values are: wanted contraction [m], wanted force [N], wanted joint angle
+        [rad], wanted pressure [Pa absolute], or the raw valve signal (``ppr_voltage`` [V],
+        ``hsv_duty``); pressure and valve signal run without a controller, an angle is
+        tracked offline only.
     segments : list of (name, arguments, where)
         The primitives in order, with the keys of the file and ``file:line``.
     where : str
@@ -93,9 +94,14 @@ class Experiment:
 
     def sends_valve_command(self, valve):
         """Tell whether some part of it speaks to a valve of this type directly."""
-        if self.domain in ('contraction', 'pressure'):
+        if self.domain in (*TRACKED, 'pressure'):
             return valve == 'hsv' and any(s.SHUTS_VALVE for s in self.chain.segments)
         return True
+
+    @property
+    def tracked(self):
+        """Whether a controller of one muscle tracks the values."""
+        return self.domain in TRACKED
 
     @property
     def cycles(self):

@@ -14,8 +14,11 @@
 
 """What a rig can do of an experiment, asked before the first message is sent."""
 
+from pam_actuation.control.modes.force_surface import highest_force_n
+from pam_actuation.control.modes.tracked import tracked_by
 from pam_actuation.drivers.for_rig import driver_config
 from pam_sim.errors import InputError
+from pam_sim.load import LOADS
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 _VALVE_OF = {'ppr_voltage': 'ppr', 'hsv_duty': 'hsv'}
@@ -25,13 +28,20 @@ def check_rig(experiment, rig):
     """
     Raise InputError where an experiment asks for more than a rig can give.
 
-    Contraction: the stroke of the muscle. Pressure: the limit of the driver and the supply
+    Contraction: the stroke of the muscle. Force: what the muscle gives at the limit of the
+    driver where its load holds it, and a load whose contraction is prescribed. Joint angle: a
+    joint, and its range. Pressure: the limit of the driver and the supply
     of the valves. Raw valve signal: the valve it is meant for. Disturbance: a load that
     moves freely. Measured topics it needs.
     """
     place = f'experiment "{experiment.name}"'
+    if experiment.domain == 'joint_angle' or hasattr(rig, 'flexor'):
+        _check_joint(experiment, rig, place)
+        return
     if experiment.domain == 'contraction':
         _check_stroke(experiment, rig, place)
+    elif experiment.domain == 'force':
+        _check_force(experiment, rig, place)
     elif experiment.domain == 'pressure':
         _check_pressure(experiment, rig, place)
     elif rig.valve != _VALVE_OF[experiment.domain]:
@@ -48,6 +58,17 @@ def check_rig(experiment, rig):
             place)
 
 
+def check_tracked(experiment, controller):
+    """Raise InputError where an experiment is in one quantity, its controller in another."""
+    if not experiment.tracked:
+        return
+    tracked = tracked_by(controller)
+    if tracked.topic != experiment.domain:
+        raise InputError(
+            f'is in {experiment.domain}; the controller has `mode: {tracked.mode}`',
+            f'experiment "{experiment.name}"')
+
+
 def _check_stroke(experiment, rig, place):
     stroke = rig.muscle.stroke_m
     worst = experiment.chain.extremes()[1]
@@ -55,6 +76,33 @@ def _check_stroke(experiment, rig, place):
         raise InputError(
             f'asks for {1e3 * worst:.1f} mm of contraction; {rig.name} allows 0 to '
             f'{1e3 * stroke:.1f} mm', place)
+
+
+def _check_force(experiment, rig, place):
+    if LOADS[rig.load].MOVES_FREELY:
+        raise InputError(
+            f'asks for a force; the load `{rig.load}` of {rig.name} moves freely, a force can be '
+            'tracked where the contraction is prescribed (isometric, driven)', place)
+    highest = highest_force_n(
+        rig, driver_config(rig).safety.max_pressure_gauge_pa,
+        rig.parameters.get('contraction_m', 0.0))
+    worst = experiment.chain.extremes()[1]
+    if worst > highest:
+        raise InputError(
+            f'asks for {worst:.1f} N; {rig.name} allows 0 to {highest:.1f} N', place)
+
+
+def _check_joint(experiment, joint, place):
+    if not hasattr(joint, 'flexor') or experiment.domain != 'joint_angle':
+        raise InputError(
+            f'is in {experiment.domain}; {joint.name} is '
+            + ('a joint' if hasattr(joint, 'flexor') else 'a single muscle'), place)
+    lower, upper = joint.range_rad
+    worst = experiment.chain.extremes()
+    if worst[0] < lower or worst[1] > upper:
+        raise InputError(
+            f'asks for {worst[0]:.3f} to {worst[1]:.3f} rad; {joint.name} allows {lower:.3f} to '
+            f'{upper:.3f} rad', place)
 
 
 def _check_pressure(experiment, rig, place):

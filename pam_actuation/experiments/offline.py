@@ -30,6 +30,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.messages import Status
 from pam_actuation.plant_loop import PlantLoop
@@ -81,7 +82,7 @@ class _Loops:
                   ('valve_command', self.driver.on_valve_command),
                   ('external_force', self._from_its_stamp(self.plant.set_external_force)),
                   ('valve_signal', self._from_its_stamp(self.plant.set_signal))]
-        if experiment.domain == 'contraction':
+        if experiment.tracked:
             self.control = ControllerLoop(controller)
             self.loops.append(('controller', controller.rate_hz, self.tick_controller))
             self.lead_ns = LEAD_NS
@@ -172,7 +173,7 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     Parameters
     ----------
     experiment : Experiment
-        What to ask for. Only the domain contraction uses the controller.
+        What to ask for. The domains contraction and force use the controller.
     rig : pam_sim.rig.Rig
         The simulated rig, valve included.
     controller : object or None
@@ -204,10 +205,12 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     Raises
     ------
     InputError
-        The experiment asks for what the rig cannot do; the bag directory exists.
+        The experiment asks for what the rig cannot do or the controller does not track; the
+        bag directory exists.
 
     """
     experiment.check_reachable(rig)
+    check_tracked(experiment, controller)
     metadata = experiment_metadata(
         experiment=experiment.to_yaml(), rig=rig.to_yaml(),
         controller=controller.to_yaml() if controller is not None else '', valve=rig.valve,

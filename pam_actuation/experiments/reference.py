@@ -46,6 +46,7 @@ class ReferenceLoop:
         self.valve = valve
         self.rate_hz = float(rate_hz)
         self._speaks_to_valve = experiment.sends_valve_command(valve)
+        self._force = experiment.domain == 'force'
         self.start_ns = None
         self._next_trajectory_ns = 0
 
@@ -61,7 +62,8 @@ class ReferenceLoop:
         """
         Return the messages due now as a dict of short topic name to message.
 
-        Domain ``contraction``: ``reference``, and every 0.1 s ``reference_trajectory``.
+        Domain ``contraction`` or ``force``: ``reference``, and every 0.1 s
+        ``reference_trajectory``.
         Domain ``pressure``: ``pressure_command``, or ``valve_command`` while a pair of valves
         is to be shut. Raw valve signals: ``valve_command``, after the end the one that vents.
         With a disturbance ``external_force`` as well, first.
@@ -73,8 +75,9 @@ class ReferenceLoop:
         out = {}
         if self.experiment.disturbance:
             out['external_force'] = Force(now_ns, self.experiment.external_force_n(elapsed_s))
-        if self.experiment.domain == 'contraction':
-            out['reference'] = Reference(now_ns, value, rate)
+        if self.experiment.tracked:
+            out['reference'] = (Reference(now_ns, force_n=value) if self._force
+                                else Reference(now_ns, value, rate))
             if now_ns >= self._next_trajectory_ns:
                 out['reference_trajectory'] = self.trajectory(now_ns)
                 self._next_trajectory_ns += TRAJECTORY_EVERY_NS
@@ -90,7 +93,7 @@ class ReferenceLoop:
     def topics(self):
         """Return the topics it may send on, the one with the wanted value first."""
         domain = self.experiment.domain
-        if domain == 'contraction':
+        if self.experiment.tracked:
             topics = ('reference', 'reference_trajectory')
         else:
             topics = ('pressure_command',) if domain == 'pressure' else ()
@@ -123,6 +126,8 @@ class ReferenceLoop:
         """Return the next 0.6 s of the reference as one message."""
         offsets = tuple(k * POINT_NS for k in range(POINTS))
         points = [self.experiment.at(self.elapsed_s(now_ns + o)) for o in offsets]
+        if self._force:
+            return ReferenceTrajectory(now_ns, offsets, force_n=tuple(p[0] for p in points))
         return ReferenceTrajectory(
             now_ns, offsets, tuple(p[0] for p in points), tuple(p[1] for p in points))
 

@@ -86,15 +86,21 @@ def _read_force(message):
 
 
 def _read_reference(message):
+    if not len(message.position):
+        return Reference(stamp_ns(message), force_n=_first(message.effort))
     velocity = message.velocity[0] if len(message.velocity) else 0.0
     return Reference(stamp_ns(message), _first(message.position), velocity)
 
 
 def _read_trajectory(message):
     points = message.points
+    times_ns = tuple(
+        p.time_from_start.sec * NANOSECONDS + p.time_from_start.nanosec for p in points)
+    if not any(len(p.positions) for p in points):
+        return ReferenceTrajectory(
+            stamp_ns(message), times_ns, force_n=tuple(_first(p.effort) for p in points))
     return ReferenceTrajectory(
-        stamp_ns(message),
-        tuple(p.time_from_start.sec * NANOSECONDS + p.time_from_start.nanosec for p in points),
+        stamp_ns(message), times_ns,
         tuple(_first(p.positions) for p in points),
         tuple(p.velocities[0] if len(p.velocities) else 0.0 for p in points))
 
@@ -184,6 +190,9 @@ class RosWriter:
         message.velocity = array('d', () if math.isnan(velocity) else (velocity,))
 
     def _fill_reference(self, message, plain):
+        if math.isfinite(plain.force_n):
+            message.effort = array('d', (plain.force_n,))
+            return
         message.position = array('d', (plain.contraction_m,))
         message.velocity = array('d', (plain.velocity_m_per_s,))
 
@@ -202,14 +211,14 @@ class RosWriter:
 
     def _fill_reference_trajectory(self, message, plain):
         points = self._points
-        while len(points) < len(plain.contraction_m):
+        while len(points) < len(plain.time_from_start_ns):
             points.append(JointTrajectoryPoint())
-        rows = zip(points, plain.time_from_start_ns, plain.contraction_m, plain.velocity_m_per_s)
-        for point, time_ns, contraction_m, velocity in rows:
+        for i, (point, time_ns) in enumerate(zip(points, plain.time_from_start_ns)):
             set_stamp(point.time_from_start, time_ns)
-            point.positions = array('d', (contraction_m,))
-            point.velocities = array('d', (velocity,))
-        message.points = points[:len(plain.contraction_m)]
+            point.positions = array('d', plain.contraction_m[i:i + 1])
+            point.velocities = array('d', plain.velocity_m_per_s[i:i + 1])
+            point.effort = array('d', plain.force_n[i:i + 1])
+        message.points = points[:len(plain.time_from_start_ns)]
 
 
 def diagnostic_array(status):

@@ -25,8 +25,9 @@ import os
 
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.modes.tracked import TRACKED, tracked_by
 from pam_actuation.control.tick import (
-    INPUT_NAMES, join_stamp, RUNNING, TickCore, TickInputs)
+    input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 
@@ -126,7 +127,8 @@ def replay_controller(run, controller=None, keep_states=False, progress=None):
     elif isinstance(controller, (str, os.PathLike)):
         rig_text = run.metadata.get('rig')
         controller = load_controller(controller, load_rig(rig_text) if rig_text else None)
-    columns = _columns(states, run.path)
+    unit = tracked_by(controller).unit
+    columns = _columns(states, unit, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     _check_complete(columns, order, run.path)
     lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
@@ -145,7 +147,7 @@ def replay_controller(run, controller=None, keep_states=False, progress=None):
     for place, row in enumerate(order.tolist()):
         if progress is not None and place % _PROGRESS_EVERY == 0:
             progress(place / len(order))
-        command_pa, values = core.run(_inputs(columns, row, lookups, run.path))
+        command_pa, values = core.run(_inputs(columns, row, lookups, unit, run.path))
         replayed[place] = command_pa
         if keep_states:
             kept[place] = values
@@ -171,9 +173,12 @@ def _same(a, b):
     return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
 
 
-def _columns(states, path):
+def _columns(states, unit, path):
     """Return the columns of ``controller_state``, refusing foreign ones."""
-    missing = [name for name in INPUT_NAMES if name not in states.values]
+    if f'reference_{unit}' not in states.values and any(
+            f'reference_{one.unit}' in states.values for one in TRACKED.values()):
+        raise InputError('the recorded controller and this one track different quantities', path)
+    missing = [name for name in input_names(unit) if name not in states.values]
     if missing:
         raise InputError(
             f'controller_state is not from a controller of this project: it lacks {missing[0]}',
@@ -208,7 +213,7 @@ def _lookup(run, topic):
     return dict(zip(series.stamp_ns.tolist(), series.values[_MEASURED[topic][1]].tolist()))
 
 
-def _inputs(columns, row, lookups, path):
+def _inputs(columns, row, lookups, unit, path):
     """Return the ``TickInputs`` of one recorded tick, measurements taken from their topics."""
     stamps = tuple(
         join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])
@@ -216,9 +221,10 @@ def _inputs(columns, row, lookups, path):
     inputs = TickInputs(
         reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
         restarted=bool(columns['restarted'][row]), stamps_ns=stamps)
-    for name in ('reference_m', 'reference_m_per_s', 'lead_reference_m',
-                 'lead_reference_m_per_s', 'elapsed_s'):
-        setattr(inputs, name, float(columns[name][row]))
+    inputs.elapsed_s = float(columns['elapsed_s'][row])
+    fields = ('reference', 'reference_rate', 'lead_reference', 'lead_reference_rate')
+    for field_name, name in zip(fields, reference_names(unit)):
+        setattr(inputs, field_name, float(columns[name][row]))
     for (topic, (target, _)), stamp_ns in zip(_MEASURED.items(), stamps):
         if stamp_ns < 0:
             continue

@@ -20,7 +20,7 @@ The functions on arrays take SI values and return SI values; those on a
 missing, so that a page can leave a cell empty instead of failing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -74,6 +74,9 @@ class RunMetrics:
     timing: tuple
     interruptions: tuple | None = None
     air_fed_kg: float | None = None
+    rmse_n: float | None = None
+    max_error_n: float | None = None
+    cycle_rmse_n: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 def rmse(error):
@@ -91,8 +94,17 @@ def tracking_error(run):
     only the stretch in which both exist is used. Time counts from the first
     reference message, which is when the experiment starts.
     """
-    reference = signals.series(run, 'reference')
-    measured = signals.series(run, 'contraction')
+    return _difference(signals.series(run, 'reference', 'contraction_m'),
+                       signals.series(run, 'contraction'))
+
+
+def force_error(run):
+    """Return (time_s, error_n) with error = wanted - measured force, or None."""
+    return _difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
+
+
+def _difference(reference, measured):
+    """Return (time_s, reference - measured) where both exist, or None."""
     if reference is None or measured is None or len(reference[0]) < 2:
         return None
     (tr, r), (tx, x) = reference, measured
@@ -359,7 +371,7 @@ def run_metrics(run, cycles=None, volume_m3=None, rig=None):
 
     """
     cycles = find_cycles(run) if cycles is None else cycles
-    tracked = tracking_error(run)
+    tracked, pulled = tracking_error(run), force_error(run)
     error = None if tracked is None else tracked[1]
     saturation = saturation_share(run) or (None, None)
     used = None
@@ -380,4 +392,8 @@ def run_metrics(run, cycles=None, volume_m3=None, rig=None):
         air_use_kg=used, timing=tuple(t for t in timing if t is not None),
         interruptions=interruptions(run),
         air_fed_kg=None if rig is None else air_fed(
-            run, rig.parameters['C'], rig.parameters['b'], rig.parameters['supply_pa']))
+            run, rig.parameters['C'], rig.parameters['b'], rig.parameters['supply_pa']),
+        rmse_n=None if pulled is None else rmse(pulled[1]),
+        max_error_n=None if pulled is None else float(np.max(np.abs(pulled[1]))),
+        cycle_rmse_n=np.empty(0) if not cycles or pulled is None else split_rmse(
+            *pulled, cycles[1], cycles[0], cycles[2]))

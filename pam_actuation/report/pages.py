@@ -136,6 +136,12 @@ def run_numbers(named):
                             f'{title}: {signed(100 * (last / first - 1))} %', ''))
         elif m.rmse_m is not None:
             numbers.append((f'{m.rmse_m * 1e3:.2f} mm', 'Tracking RMSE', title, ''))
+        if len(m.cycle_rmse_n) > 1:
+            first, last = m.cycle_rmse_n[0], m.cycle_rmse_n[-1]
+            numbers.append((f'{first:.2f} → {last:.2f} N', 'Force RMSE, first → last cycle',
+                            f'{title}: {signed(100 * (last / first - 1))} %', ''))
+        elif m.rmse_n is not None:
+            numbers.append((f'{m.rmse_n:.2f} N', 'Force RMSE', title, ''))
         if m.max_error_m is not None and len(named) == 1:
             numbers.append((f'{m.max_error_m * 1e3:.2f} mm', 'Largest error', title, ''))
     return numbers
@@ -146,6 +152,8 @@ def summary(m):
     return {'duration_s': m.duration_s, 'tracking_rmse_m': m.rmse_m,
             'max_error_m': m.max_error_m,
             'cycle_rmse_m': [float(v) for v in m.cycle_rmse_m],
+            'tracking_rmse_n': m.rmse_n, 'max_error_n': m.max_error_n,
+            'cycle_rmse_n': [float(v) for v in m.cycle_rmse_n],
             'settling_s': [s.settling_s for s in m.steps],
             'interruptions': m.interruptions and m.interruptions[0],
             'saturation_high': m.saturation_high, 'air_use_kg': m.air_use_kg,

@@ -62,7 +62,7 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     ----------
     experiment, rig, controller : str, path or object
         Name, path, or what ``load_experiment``, ``load_rig``, ``load_controller`` return.
-        Without controller: the preset ``sofc_<valve>``.
+        Without controller: the preset of the valve for what the experiment asks for.
     valve : str, optional
         'ppr' or 'hsv'; default: that of the rig.
     bag : path, optional
@@ -85,7 +85,9 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
 
     """
     from pam_actuation.control.config import load_controller
+    from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
+    from pam_actuation.experiments.limits import check_tracked
     from pam_sim import load_rig
     if not hasattr(experiment, 'to_yaml'):
         experiment = load_experiment(experiment)
@@ -94,17 +96,20 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     elif valve and valve != rig.valve:
         rig = rig.with_(valve=valve)
     experiment.check_reachable(rig)
-    if experiment.domain != 'contraction':
+    if not experiment.tracked:
         controller = None
     elif not hasattr(controller, 'to_yaml'):
-        controller = load_controller(controller or f'sofc_{rig.valve}', rig)
+        controller = load_controller(controller or preset_for(experiment, rig), rig)
+    check_tracked(experiment, controller)
     if bag is not None and os.path.exists(bag) and not overwrite:
         raise InputError('exists already; choose another folder or allow to replace it', str(bag))
     _compile(rig, controller)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(experiment, rig, controller, '', {}, folder)
     if controller is not None:
-        plan.controller_node = f'{controller.kind}_controller'
+        # The node of fixed gains runs every controller without rules.
+        plan.controller_node = (
+            'sofc_controller' if controller.kind == 'sofc' else 'pid_controller')
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
     if realtime:
         for parameters in plan.parameters.values():

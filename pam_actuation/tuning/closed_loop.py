@@ -20,35 +20,34 @@ controller on it. The same compiled steps as in the live nodes are used
 (controller, driver law, plant), only the clock differs.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import functools
 import hashlib
 import math
 from pathlib import Path
 
 import numpy as np
-from pam_actuation.control import compiled_entry, pid
+from pam_actuation.control import compiled_entry, lqi, pid
 from pam_actuation.control.sofc import step as sofc_step_module
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.hsv import initial_state
+from pam_actuation.tuning import loop_parts
+from pam_actuation.tuning.loop_setup import (
+    DriverLaw, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_sim.errors import InputError
 from pam_sim.rollout import layout
 from pam_sim.rollout.generate import kernel_hash, load_cached_module
 
-PHYSICS_S = 0.001
-_MAX_LEAD_S = 0.5
-
 
 @functools.cache
 def compiled_rollouts():
-    """Return the module with ``sofc_rollout`` and ``pid_rollout``, compiled for this kernel."""
+    """Return the module with a rollout per kind of controller, compiled for this kernel."""
     source = (Path(__file__).parent / 'rollout_template.py').read_text(encoding='utf-8')
     key = hashlib.sha256(source.encode())
     key.update(kernel_hash().encode())
-    for names in (sofc_step_module.SOURCES, pid.SOURCES):
+    for names in (sofc_step_module.SOURCES, pid.SOURCES, lqi.SOURCES):
         key.update(str(compiled_entry.source_key(*names)).encode())
-    for module in (hsv_kernel, ppr):
+    for module in (hsv_kernel, ppr, loop_parts):
         key.update(Path(module.__file__).read_bytes())
     return load_cached_module('pam_closed_loop', source, key.hexdigest()[:12])
 
@@ -126,16 +125,17 @@ class ClosedLoop:
 
     """
 
+    DOMAIN = 'contraction'
+
     def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
                  external_force_n=None, driver=None, supply_pa=None):
-        if experiment.domain != 'contraction':
+        self._arguments = (
+            rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa)
+        if experiment.domain != self.DOMAIN:
             raise InputError(
-                f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
-                'be tracked')
-        steps = round(1.0 / (rate_hz * PHYSICS_S))
-        if steps < 1 or abs(steps * PHYSICS_S * rate_hz - 1.0) > 1e-9:
-            raise InputError(
-                f'{rate_hz:g} Hz is no whole number of {PHYSICS_S * 1e3:g} ms steps per period')
+                f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
+                f'{self.DOMAIN}')
+        steps = steps_per_tick(rate_hz)
         self.rig = rig
         self.rate_hz = rate_hz
         self.experiment = experiment
@@ -144,29 +144,21 @@ class ClosedLoop:
         if self._par[layout.PAR_DT] != PHYSICS_S:
             raise InputError(
                 f'the rig is packed for {self._par[layout.PAR_DT]} s, not {PHYSICS_S} s')
-        period_s = 1.0 / rate_hz
-        self.ticks = int(round(experiment.duration_s * rate_hz))
-        ahead = int(math.ceil(_MAX_LEAD_S * rate_hz)) + 2
-        wanted = [experiment.at(k * period_s) for k in range(self.ticks + ahead)]
-        self._position = np.array([value for value, _ in wanted], dtype=float)
-        self._rate = np.array([rate for _, rate in wanted], dtype=float)
-        sensors = dict(rig.sensors)
-        sigma = np.array([sensors.get(name, 0.0) for name in (
-            'pressure_noise_pa', 'contraction_noise_m', 'force_noise_n')])
-        self._noise = np.random.default_rng(seed).standard_normal((self.ticks, 3)) * sigma
-        self._quantum = np.array([float(sensors.get(name, 0.0)) for name in (
-            'pressure_step_pa', 'contraction_step_m', 'force_step_n')])
+        self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
+        self._noise, self._quantum = sensor_noise(rig, self.ticks, seed)
         self._disturbance = np.zeros((self.ticks, 2))
         self._disturbance[:, 1] = rig.parameters['supply_pa']
         for column, course in enumerate((external_force_n, supply_pa)):
             if course is not None:
-                self._disturbance[:, column] = [course(k * period_s) for k in range(self.ticks)]
-        driver = driver if driver is not None else driver_config(rig)
-        self._hsv_config = driver.hsv
-        self._ppr_config = replace(driver.ppr, period_s=period_s)
-        driver_period = driver.hsv.period_s if self.hsv else period_s
+                self._disturbance[:, column] = [
+                    course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
+        self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
-        self._timing = (steps, max(1, round(driver_period * rate_hz)), latency)
+        self._timing = (steps, self._driver.every, latency)
+
+    def __reduce__(self):
+        """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
+        return ClosedLoop, self._arguments
 
     @property
     def reference_m(self):
@@ -179,19 +171,13 @@ class ClosedLoop:
         cycles = self.experiment.cycles
         return 0 if cycles is None else int(cycles[0] * self.rate_hz)
 
-    def _driver(self):
-        """Return fresh state, par, out of the driver law."""
-        if self.hsv:
-            return initial_state(), self._hsv_config.par(), np.zeros(hsv_kernel.OUT_SIZE)
-        return np.zeros(ppr.PPR_STATE_SIZE), self._ppr_config.par(), np.zeros(ppr.PPR_OUT_SIZE)
-
     def run(self, controller, learn=True):
         """
         Track the experiment; the controller's rules change in place.
 
         Parameters
         ----------
-        controller : SelfOrganizingFuzzyController or PidController
+        controller : SelfOrganizingFuzzyController, PidController or LqiController
             Starts as after ``pause``.
         learn : bool or callable
             Whether the rules may change, possibly as a function of time [s].
@@ -231,9 +217,10 @@ class ClosedLoop:
         from pam_sim.rollout.kernel import look
         look(state, self._par, plant_inp, plant_out)
         log = np.empty((self.ticks, module.LOG_SIZE))
-        rollout = module.sofc_rollout if controller.kind == 'sofc' else module.pid_rollout
+        rollout = getattr(module, f'{controller.kind}_rollout')
         rollout(
-            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver(), self._timing,
-            controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
-            self._quantum, self._disturbance, mask, controller.compiled_arguments(), log)
+            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver.fresh(),
+            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._noise, self._quantum, self._disturbance, mask,
+            controller.compiled_arguments(), log)
         return log

@@ -19,7 +19,7 @@ import numpy as np
 LATE_SHARE = 0.3          # of the experiment, counted from its end
 _EARLY_WEIGHT = 0.25
 _WORST_WEIGHT = 0.1
-_LOST_MM = 1e3            # cost of a run that is not finite
+LOST_MM = 1e3             # cost of a run that is not finite
 
 
 def tracking_cost_mm(error_m, start_tick=0):
@@ -39,7 +39,7 @@ def tracking_cost_mm(error_m, start_tick=0):
     """
     error_mm = np.asarray(error_m)[start_tick:] * 1e3
     if not np.all(np.isfinite(error_mm)):
-        return _LOST_MM
+        return LOST_MM
     late = error_mm[-max(1, int(len(error_mm) * LATE_SHARE)):]
     return float(
         np.sqrt(np.mean(late ** 2)) + _EARLY_WEIGHT * np.sqrt(np.mean(error_mm ** 2))

@@ -27,10 +27,11 @@ signal arrives after ``latency_steps`` of them.
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
+from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
-from pam_actuation.drivers.ppr import ppr_step
+from pam_actuation.tuning.loop_parts import drive, read
+from pam_sim.compiled import compiled
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
 
@@ -44,21 +45,13 @@ LOG_MEASURED = 6          # m
 LOG_SIZE = 7
 
 
-@njit(error_model='numpy', nogil=True)
-def _read(value, step_size):
-    """Quantise a reading, 0 = no quantisation."""
-    if step_size > 0.0:
-        return np.rint(value / step_size) * step_size
-    return value
-
-
-@njit(error_model='numpy', nogil=True)
-def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row):
+@compiled
+def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log):
     """Fill the inputs of the controller and the measured part of the log."""
-    inp[place.IN_CONTRACTION] = _read(
+    inp[place.IN_CONTRACTION] = read(
         plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
-    inp[place.IN_PRESSURE] = _read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
-    inp[place.IN_FORCE] = _read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
+    inp[place.IN_PRESSURE] = read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
+    inp[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
     inp[place.IN_REFERENCE] = position[tick]
     inp[place.IN_REFERENCE_RATE] = rate[tick]
     whole = int(lead_ticks)
@@ -68,27 +61,20 @@ def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, i
     inp[place.IN_LEAD_RATE] = (1.0 - part) * rate[at] + part * rate[at + 1]
     inp[place.IN_LEARN] = learn[tick]
     inp[place.IN_ELAPSED] = np.nan
-    row[LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
-    row[LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
-    row[LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
-    row[LOG_MEASURED] = inp[place.IN_CONTRACTION]
+    log[tick, LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
+    log[tick, LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
+    log[tick, LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
+    log[tick, LOG_MEASURED] = inp[place.IN_CONTRACTION]
 
 
-@njit(error_model='numpy', nogil=True)
+@compiled
 def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
-             disturbance, plant_state, plant_par, plant_inp, plant_out, row):
+             disturbance, plant_state, plant_par, plant_inp, plant_out, log):
     """Run the driver law where it is due and the physics of one controller period."""
-    driver_state, driver_par, driver_out = driver
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
     signal_1 = plant_inp[layout.INP_SIGNAL_1]
     if tick % driver_every == 0:
-        if hsv:
-            driver_state[S_AGE] = 0.0
-            hsv_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
-            signal_0, signal_1 = driver_out[0], driver_out[1]
-        else:
-            ppr_step(driver_state, driver_par, command_pa, measured_pa, np.nan, driver_out)
-            signal_0, signal_1 = driver_out[0], 0.0
+        signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa)
     plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
     plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
     for j in range(steps):
@@ -96,12 +82,12 @@ def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, la
             plant_inp[layout.INP_SIGNAL_0] = signal_0
             plant_inp[layout.INP_SIGNAL_1] = signal_1
         step(plant_state, plant_par, plant_inp, plant_out)
-    row[LOG_COMMAND] = command_pa
-    row[LOG_SIGNAL_0] = signal_0
-    row[LOG_SIGNAL_1] = signal_1
+    log[tick, LOG_COMMAND] = command_pa
+    log[tick, LOG_SIGNAL_0] = signal_0
+    log[tick, LOG_SIGNAL_1] = signal_1
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                  learn, controller, log):
     """
@@ -135,14 +121,13 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
     position, rate = reference
     inp = controller[8]
     for tick in range(log.shape[0]):
-        row = log[tick]
-        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
         command_pa = sofc_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
 def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
                 learn, controller, log):
     """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
@@ -151,8 +136,22 @@ def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
     position, rate = reference
     inp = controller[3]
     for tick in range(log.shape[0]):
-        row = log[tick]
-        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, row)
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
         command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, row)
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
+
+
+@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+def lqi_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
+                learn, controller, log):
+    """Track a reference with the LQI; arguments as ``sofc_rollout``, of ``lqi_step``."""
+    plant_state, plant_par, plant_inp, plant_out = plant
+    steps, driver_every, latency_steps = timing
+    position, rate = reference
+    inp = controller[3]
+    for tick in range(log.shape[0]):
+        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
+        command_pa = lqi_step(controller[0], controller[1], controller[2], inp, controller[4])
+        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
+                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)

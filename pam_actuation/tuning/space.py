@@ -43,7 +43,7 @@ SOFC_AXES = (
     Axis('integral_pa_per_m_s', 1e6, 4e7),
     Axis('derivative_pa_s_per_m', 5e3, 5e5),
     Axis('change_filter_s', 0.005, 0.06),
-    Axis('direction_blend_m_per_s', 2e-4, 1e-2),
+    Axis('direction_blend_m', 2e-4, 5e-3),
     Axis('index_tau_s', 0.01, 0.3),
     Axis('feedback_gain_pa', 5e2, 2e4),
     Axis('reference_knots', 13, 61, log=False, whole=True),
@@ -55,6 +55,13 @@ PID_AXES = (
     Axis('change_filter_s', 0.005, 0.06),
 )
 PID_INVERSE_AXES = PID_AXES + (Axis('lead_s', 0.0, 0.2, log=False),)
+LQI_AXES = (
+    Axis('lead_s', 0.0, 0.2, log=False),
+    Axis('reference_feedforward', 0.0, 1.0, log=False),
+    Axis('integral_weight', 1e-2, 1e5),
+    Axis('command_weight', 1e-5, 10.0),
+    Axis('disturbance_pa', 1.0, 1e5),
+)
 
 
 def default_axes(controller):
@@ -63,12 +70,15 @@ def default_axes(controller):
 
     Settings that give learned rules their meaning stay fixed once rules have been learned.
     """
+    if controller.kind == 'lqi':
+        return LQI_AXES
     if controller.kind == 'pid':
         return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
     from pam_actuation.control.sofc.settings import SCALING
     rules = controller.rules
     learned = rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any()
-    return tuple(axis for axis in SOFC_AXES if not (learned and axis.name in SCALING))
+    return tuple(axis for axis in SOFC_AXES if axis.name in controller.settings
+                 and not (learned and axis.name in SCALING))
 
 
 def to_unit(axes, settings):

@@ -13,31 +13,31 @@
 # limitations under the License.
 
 """
-Offline tuning: settings of a controller optimised over closed-loop rollouts.
+Offline tuning: settings and initial rules of a controller, over closed-loop rollouts.
 
-Differential evolution (Storn and Price 1997, scipy) in the unit cube of
-``space``; the same seed gives the same result with any number of jobs.
-Rollouts go through joblib: threads by default (compiled code holds no lock),
-or whatever backend ``joblib.parallel_config`` names, a cluster for instance.
+The settings are searched in the unit cube of ``space`` (``search``); then the
+controller learns the rules it is to begin with (``initial_rules``); both are
+judged on runs that were never searched. The same seed gives the same result
+with any number of ``workers``.
 """
 
 from dataclasses import dataclass, field
 import time
 
-import joblib
-import numpy as np
 from pam_actuation.control.config import controller_to_yaml
 from pam_actuation.control.files import write_atomically
-from pam_actuation.control.pid import PidController
-from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
-from pam_actuation.tuning.cost import tracking_cost_mm
+from pam_actuation.tuning.initial_rules import initial_rules
+from pam_actuation.tuning.problem import cost_of, Problem, rebuild
+from pam_actuation.tuning.search import default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import check_axes, default_axes, from_unit, to_unit
+from pam_actuation.tuning.workers import Workers
 from pam_sim.errors import InputError
-from scipy.optimize import differential_evolution
+from pam_sim.units import P_ATM_PA
 
-HELD_OUT_SEED = 7919      # added to the seed for the noise the optimiser never sees
+HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
+_MARGIN_PA = 30e3         # of pressure above the static one: dry friction and acceleration
 
 
 @dataclass
@@ -47,8 +47,8 @@ class TuneResult:
 
     Attributes
     ----------
-    controller : SelfOrganizingFuzzyController or PidController
-        With the tuned settings and the rules it was given, ready to run.
+    controller : SelfOrganizingFuzzyController, PidController or LqiController
+        With the tuned settings and initial rules, ready to run.
     changed : dict of str -> (float, float)
         Settings before and after.
     history : list of (int, float)
@@ -56,13 +56,27 @@ class TuneResult:
     cost_before, cost_after : float
         Training cost [mm].
     held_out_before, held_out_after : float
-        Cost [mm] on runs the optimiser did not see.
+        Cost [mm] on runs the search did not see.
     improved : bool
         The held-out cost fell; otherwise ``controller`` has the settings from before.
     rollouts : int
         Closed-loop runs simulated, the held-out ones included.
+    simulated_s : float
+        Their length in all.
     seconds : float
         Wall-clock time.
+    ended : str
+        Why the search ended.
+    rules : str
+        Which initial rules were chosen, '' for a controller without rules.
+    left_out : int
+        Pairs of rig and experiment left out because the rig cannot reach it.
+    axes : tuple of space.Axis
+        What was searched.
+    start : object
+        The controller from before.
+    problem, check : Problem
+        The closed loops of the search and of the held-out check.
 
     """
 
@@ -75,24 +89,38 @@ class TuneResult:
     held_out_after: float
     improved: bool
     rollouts: int
+    simulated_s: float
     seconds: float
+    ended: str = ''
+    rules: str = ''
+    left_out: int = 0
     axes: tuple = field(default=(), repr=False)
+    start: object = field(default=None, repr=False)
+    problem: object = field(default=None, repr=False)
+    check: object = field(default=None, repr=False)
 
     def to_yaml(self):
         """Return the tuned controller as YAML text for ``load_controller``."""
         return controller_to_yaml(self.controller)
 
-    def save(self, path):
+    def save(self, path, rules_path=None):
         """
         Write the tuned controller to a file, whole or not at all.
+
+        With ``rules_path`` its rules go into a file of their own, which the first one names;
+        both should lie in one folder.
 
         Raises
         ------
         InputError
-            The file cannot be written.
+            A file cannot be written.
 
         """
-        write_atomically(path, self.to_yaml())
+        if rules_path is None or self.controller.rules is None:
+            write_atomically(path, self.to_yaml())
+            return
+        self.controller.rules.save(rules_path)
+        write_atomically(path, controller_to_yaml(self.controller, rules_file=rules_path))
 
     def to_dict(self):
         """Return the outcome as plain data."""
@@ -100,7 +128,8 @@ class TuneResult:
             'improved': self.improved,
             'cost_before_mm': self.cost_before, 'cost_after_mm': self.cost_after,
             'held_out_before_mm': self.held_out_before, 'held_out_after_mm': self.held_out_after,
-            'rollouts': self.rollouts, 'seconds': self.seconds,
+            'rollouts': self.rollouts, 'simulated_s': self.simulated_s, 'seconds': self.seconds,
+            'ended': self.ended, 'initial_rules': self.rules, 'left_out': self.left_out,
             'changed': {name: {'before': before, 'after': after}
                         for name, (before, after) in self.changed.items()}}
 
@@ -108,59 +137,64 @@ class TuneResult:
         """Return the outcome for people."""
         verdict = 'better' if self.improved else 'not better: settings left as they were'
         lines = [
-            f'{self.rollouts} rollouts in {self.seconds:.1f} s; cost on held-out runs '
-            f'{self.held_out_before:.3f} -> {self.held_out_after:.3f} mm, {verdict}']
+            f'{self.rollouts} rollouts in {self.seconds:.1f} s '
+            f'({self.simulated_s / max(self.seconds, 1e-9):,.0f} times real time), {self.ended}; '
+            f'cost on held-out runs {self.held_out_before:.3f} -> {self.held_out_after:.3f} mm, '
+            f'{verdict}']
+        if self.rules:
+            lines.append(f'  initial rules: {self.rules}')
+        if self.left_out:
+            lines.append(f'  {self.left_out} pairs of rig and experiment left out: beyond what '
+                         'the rig can reach')
         lines += [f'  {name}: {before:g} -> {after:g}'
                   for name, (before, after) in self.changed.items()]
         return '\n'.join(lines)
 
 
-def rebuild(controller, settings):
-    """Return a fresh controller of the same kind, rig and rules with other settings."""
-    merged = {**controller.settings, **settings}
-    if controller.kind == 'pid':
-        return PidController(controller.static_inverse, merged, controller.rig_name)
-    fresh = SelfOrganizingFuzzyController(
-        controller.static_inverse, merged, rig_name=controller.rig_name)
-    if fresh.rules.scaling == controller.rules.scaling:
-        fresh.rules.assign(controller.rules)
-    fresh.freeze_learning = controller.freeze_learning
-    return fresh
-
-
-def evaluate(loops, controller, settings):
-    """Return the mean cost [mm] of settings over closed loops, each from the same rules."""
-    costs = []
-    for loop in loops:
-        log = loop.run_raw(rebuild(controller, settings))
-        costs.append(tracking_cost_mm(loop.reference_m - log[:, 0], loop.start_tick))
-    return float(np.mean(costs))
+def reachable(rig, experiment, controller):
+    """Return whether a rig can hold an experiment's largest contraction with some to spare."""
+    highest_m = experiment.chain.extremes()[1]
+    limit_pa = P_ATM_PA + controller.settings['max_pressure_gauge_pa']
+    if rig.valve == 'hsv':
+        limit_pa = min(limit_pa, rig.parameters['supply_pa'])
+    return float(rig.static_pressure_pa(highest_m)) + _MARGIN_PA <= limit_pa
 
 
 def _as_list(thing):
     return list(thing) if isinstance(thing, (list, tuple)) else [thing]
 
 
+def _loops(rigs, experiments, seed, controller, driver):
+    """Return the closed loops of all pairs that can be reached, and how many cannot."""
+    pairs = [(rig, experiment) for rig in rigs for experiment in experiments]
+    kept = [pair for pair in pairs if reachable(*pair, controller)]
+    if not kept:
+        raise InputError('no rig can reach any of the experiments', experiments[0].name)
+    return [ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=driver)
+            for rig, experiment in kept], len(pairs) - len(kept)
+
+
 def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None, axes=None,
-         held_out=None, population=None, patience=0):
+         held_out=None, population=None, patience=0, cluster=None, held_out_rigs=None,
+         learn_rules=True):
     """
-    Tune the settings of a controller on a model.
+    Tune settings and initial rules of a controller on a model.
 
     Parameters
     ----------
     rig : Rig or list of Rig
         Cost is the mean over all (nominal and randomised ones, for instance). The valve driver
         knows the data sheet of the first one only.
-    controller : SelfOrganizingFuzzyController or PidController
+    controller : SelfOrganizingFuzzyController, PidController or LqiController
         Start of the search; not changed. Its rules are where every rollout starts.
     experiment : Experiment or list of Experiment
         Domain ``contraction``; cost is the mean over all.
     budget : int
-        Largest number of training rollouts.
+        Largest number of training rollouts of the search.
     seed : int
-        Of the optimiser and, apart from the held-out runs, of the sensor noise.
+        Of the search and, apart from the held-out runs, of the sensor noise.
     jobs : int
-        Parallel rollouts.
+        Parallel rollouts on this machine; -1 for one a core.
     progress : callable, optional
         Called with the number of rollouts done after every generation.
     axes : tuple of space.Axis, optional
@@ -168,9 +202,15 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     held_out : Experiment or list, optional
         Judges the result, with other noise; the training experiments by default.
     population : int, optional
-        Members of the population; chosen from the budget by default.
+        Members of a generation; chosen from the axes and the budget by default.
     patience : int
         Stop after so many generations without improvement; 0 = never.
+    cluster : str, optional
+        Address of a Dask or Ray cluster to run on, see ``workers``.
+    held_out_rigs : list of Rig, optional
+        Rigs of the held-out runs; by default those of the search.
+    learn_rules : bool
+        Whether a controller with rules gets new initial ones.
 
     Returns
     -------
@@ -179,70 +219,58 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     Raises
     ------
     InputError
-        Budget too small, unknown axis, experiment not in contraction.
+        Budget too small, unknown axis, experiment not in contraction or beyond all rigs,
+        cluster not to be had.
 
     """
     began = time.perf_counter()
     axes = tuple(axes) if axes is not None else default_axes(controller)
     check_axes(axes, controller.settings)
     rigs, experiments = _as_list(rig), _as_list(experiment)
-    rate_hz = controller.rate_hz
     driver = driver_config(rigs[0])
-    train = [ClosedLoop(r, e, seed, rate_hz, driver=driver) for r in rigs for e in experiments]
-    test = [ClosedLoop(r, e, seed + HELD_OUT_SEED, rate_hz, driver=driver)
-            for r in rigs for e in _as_list(held_out or experiments)]
-    members = population or int(min(max(budget // (10 * len(train)), 5), 3 * len(axes)))
-    generations = budget // (members * len(train)) - 1
-    if members < 5 or generations < 1:
+    train, left_out = _loops(rigs, experiments, seed, controller, driver)
+    test, _ = _loops(held_out_rigs or rigs, _as_list(held_out or experiments),
+                     seed + HELD_OUT_SEED, controller, driver)
+    members = population or default_members(len(axes), budget // len(train))
+    generations = budget // (members * len(train))
+    if members < SMALLEST or generations < 2:
         raise InputError(
-            f'a budget of {budget} rollouts is too small: {2 * len(train) * max(members, 5)} at '
-            'least', 'budget')
+            f'a budget of {budget} rollouts is too small: '
+            f'{2 * len(train) * max(members, SMALLEST)} at least', 'budget')
     before = {axis.name: controller.settings[axis.name] for axis in axes}
-    start = to_unit(axes, before)
-    cost_before = evaluate(train, controller, {})
-    seen = {'rollouts': 0, 'best': cost_before, 'since': 0}
-    history = [(0, cost_before)]
+    problem, check = Problem(train, controller), Problem(test, controller)
+    done = [0]
+    history = []
 
-    def mapped(_, points):
-        """Evaluate a whole generation; ``differential_evolution`` calls it as ``map``."""
-        points = [np.array(point) for point in points]
-        with joblib.Parallel(n_jobs=jobs, prefer='threads') as parallel:
-            costs = parallel(
-                joblib.delayed(evaluate)(train, controller, from_unit(axes, point))
-                for point in points)
-        seen['rollouts'] += len(points) * len(train)
-        best = min(costs)
-        seen['since'] = 0 if best < seen['best'] else seen['since'] + 1
-        seen['best'] = min(seen['best'], best)
-        history.append((seen['rollouts'], seen['best']))
-        if progress is not None:
-            progress(min(seen['rollouts'], budget))
-        return costs
+    with Workers(jobs, cluster) as workers:
+        def costs_of(points):
+            costs = workers.map(cost_of, problem, [from_unit(axes, p) for p in points])
+            done[0] += len(points) * len(train)
+            history.append((done[0], min(costs + [cost for _, cost in history[-1:]])))
+            if progress is not None:
+                progress(min(done[0], budget))
+            return costs
 
-    found = differential_evolution(
-        lambda point: 0.0, [(0.0, 1.0)] * len(axes), workers=mapped, updating='deferred',
-        init=_first_generation(start, members, seed), maxiter=generations, rng=seed, tol=0.0,
-        polish=False, mutation=(0.4, 0.9), recombination=0.8,
-        callback=lambda *_: bool(patience) and seen['since'] >= patience)
-    after = from_unit(axes, found.x)
-    cost_after = float(found.fun)
-    if cost_after >= cost_before:       # the start may lie outside the box of the axes
-        after, cost_after = {}, cost_before
-    held_before = evaluate(test, controller, {})
-    held_after = evaluate(test, controller, after) if after else held_before
+        cost_before, held_before = (workers.map(cost_of, one, [{}])[0] for one in (problem, check))
+        history.append((0, cost_before))
+        found = minimise(
+            costs_of, to_unit(axes, before), members, generations, seed, patience)
+        after, cost_after = from_unit(axes, found.point), found.cost
+        if cost_after >= cost_before:       # the start may lie outside the box of the axes
+            after, cost_after = {}, cost_before
+        tuned, rules, extra = rebuild(controller, after), '', 0
+        if learn_rules and controller.rules is not None:
+            (rules, table, cost_after), extra = initial_rules(workers, problem, after)
+            tuned = rebuild(controller, after, table)
+        held_after = workers.map(cost_of, Problem(test, tuned), [{}])[0]
     improved = held_after < held_before
-    tuned = rebuild(controller, after if improved else {})
-    changed = {name: (before[name], tuned.settings[name]) for name in before
-               if tuned.settings[name] != before[name]}
+    if not improved:
+        tuned, rules = rebuild(controller, {}), ''
+    changed = {name: (value, tuned.settings[name]) for name, value in before.items()
+               if tuned.settings[name] != value}
+    rollouts = done[0] + len(train) + 2 * len(test) + extra
+    mean_s = sum(loop.experiment.duration_s for loop in train) / len(train)
     return TuneResult(
         tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
-        seen['rollouts'] + len(train) + 2 * len(test), time.perf_counter() - began, axes)
-
-
-def _first_generation(start, members, seed):
-    """Return the start, a cloud around it, and as many points anywhere in the unit cube."""
-    random = np.random.default_rng(seed)
-    near = start + random.normal(0.0, 0.12, (members, len(start)))
-    near[1::2] = random.uniform(0.0, 1.0, near[1::2].shape)
-    near[0] = start
-    return np.clip(near, 0.0, 1.0)
+        rollouts, rollouts * mean_s, time.perf_counter() - began, found.reason, rules, left_out,
+        axes, controller, problem, check)

@@ -56,11 +56,11 @@ def test_feedforward_rules_interpolate_between_knots_and_directions():
     assert infer_feedforward(table, 0.5, 1, 0.25) == pytest.approx(0.0)
 
 
-def test_direction_is_blended_at_small_speed():
-    assert contracting_share(0.01, 5e-4) == 1.0
-    assert contracting_share(-0.01, 5e-4) == 0.0
-    assert contracting_share(0.0, 5e-4) == 0.5
-    assert contracting_share(2.5e-4, 5e-4) == pytest.approx(0.75)
+def test_direction_changes_over_a_way_after_a_reversal_and_stays_at_rest():
+    assert contracting_share(1.0, 1e-4, 1e-3) == 1.0
+    assert contracting_share(1.0, -1e-3, 1e-3) == 0.0
+    assert contracting_share(0.25, 0.0, 1e-3) == 0.25
+    assert contracting_share(0.5, 2.5e-4, 1e-3) == pytest.approx(0.75)
 
 
 def test_linear_index_is_zero_on_the_wanted_decay_and_bounded():

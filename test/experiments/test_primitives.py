@@ -206,7 +206,8 @@ def test_experiment_is_continuous_but_for_steps():
 
 BAD = {
     'domain: torque\n':
-        '`domain` is `torque`, allowed: contraction, pressure, ppr_voltage, hsv_duty',
+        '`domain` is `torque`, allowed: contraction, force, joint_angle, pressure, ppr_voltage, '
+        'hsv_duty',
     'sorts: 1\n': 'unknown key `sorts`',
     'segments: []\n': 'empty',
     'segments:\n  - jump: {to_m: 0.01}\n': 'unknown primitive `jump`',

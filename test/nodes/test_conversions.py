@@ -21,7 +21,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from pam_actuation import messages                                          # noqa: E402, I100
-from pam_actuation.bags.codecs import decode, TOPIC_TYPES                   # noqa: E402
+from pam_actuation.bags.codecs import decode, encode, TOPIC_TYPES           # noqa: E402
 from pam_actuation.nodes.conversions import diagnostic_array, from_ros      # noqa: E402
 from pam_actuation.nodes.conversions import MESSAGE_TYPES, RosWriter        # noqa: E402
 from rclpy.serialization import serialize_message                           # noqa: E402
@@ -52,6 +52,20 @@ def test_every_topic_of_a_bag_has_a_ros_message():
 @pytest.mark.parametrize('topic', SAMPLES)
 def test_there_and_back(topic):
     assert from_ros(topic, RosWriter(topic).fill(SAMPLES[topic])) == SAMPLES[topic]
+
+
+FORCES = {
+    'reference': messages.Reference(STAMP_NS, force_n=42.5),
+    'reference_trajectory': messages.ReferenceTrajectory(
+        STAMP_NS, (0, 20_000_000), force_n=(42.5, 43.0))}
+
+
+@pytest.mark.parametrize('topic', FORCES)
+def test_a_wanted_force_travels_in_effort(topic):
+    message = RosWriter(topic).fill(FORCES[topic])
+    assert repr(from_ros(topic, message)) == repr(FORCES[topic])
+    assert repr(decode(topic, serialize_message(message))) == repr(FORCES[topic])
+    assert encode(topic, FORCES[topic]) == encode(topic, decode(topic, serialize_message(message)))
 
 
 @pytest.mark.parametrize('topic', SAMPLES)

@@ -151,6 +151,11 @@ class SelfOrganizingFuzzyController:
         """Return the arrays ``sofc_step`` takes, for compiled closed loops."""
         return self._arguments
 
+    @property
+    def input_array(self):
+        """The array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
+        return self._inputs
+
     def state_values(self):
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
         return tuple(self._outputs.tolist())

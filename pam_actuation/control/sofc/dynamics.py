@@ -55,22 +55,26 @@ def to_go(size_m, left_s, duration_s):
     """Return how much of a move is still to come [m] and the rate it has now [m/s]."""
     if not left_s > 0.0:
         return 0.0, 0.0
-    q = 1.0 - left_s / duration_s
+    q = max(1.0 - left_s / duration_s, 0.0)
     done = q * q * q * (10.0 + q * (6.0 * q - 15.0))
     rate = 30.0 * q * q * (1.0 - q) * (1.0 - q) / duration_s
     return size_m * (1.0 - done), size_m * rate
 
 
 @compiled
-def smooth_jump(par, st, jump_m, s_size, s_left):
-    """Take up a jump in one of the two references; return what is to go [m] and its rate."""
+def smooth_jump(par, st, jump_m, wait_s, s_size, s_left):
+    """
+    Take up a jump in one of the two references; return what is to go [m] and its rate.
+
+    ``wait_s``: the move begins so much later.
+    """
     duration = par[at.P_JUMP_TIME]
     if not duration > 0.0:
         return 0.0, 0.0
     if jump_m != 0.0:
         rest, _ = to_go(st[s_size], st[s_left], duration)
         st[s_size] = rest + jump_m
-        st[s_left] = duration
+        st[s_left] = duration + wait_s
     rest, rate = to_go(st[s_size], st[s_left], duration)
     st[s_left] = max(0.0, st[s_left] - par[at.P_PERIOD])
     return rest, rate

@@ -31,6 +31,7 @@ from pam_sim.compiled import compiled
 
 _SAME_SPEED = 0.25        # windows whose mean speeds differ by more are not compared
 _BAD_WINDOWS = 2
+_STILL_M_PER_S = 1e-4
 _LEAST_FACTOR = 1.0 / 64.0
 
 
@@ -58,9 +59,9 @@ def restart_window(st):
 
 
 @compiled
-def _turned(par, st, rate_m_per_s):
+def _turned(st, rate_m_per_s):
     """Tell whether the reference turned round in this tick."""
-    if abs(rate_m_per_s) <= par[at.P_DIRECTION_BLEND]:
+    if abs(rate_m_per_s) <= _STILL_M_PER_S:
         return False
     moving = math.copysign(1.0, rate_m_per_s)
     turned = moving * st[at.S_MOVING] < 0.0
@@ -106,7 +107,7 @@ def watch(par, st, error_m, rate_m_per_s, values, kept):
         Whether the rules in ``values`` were exchanged for ``kept``.
 
     """
-    turned = _turned(par, st, rate_m_per_s)
+    turned = _turned(st, rate_m_per_s)
     st[at.S_WINDOW_TICKS] += 1.0
     st[at.S_WINDOW_SQUARES] += error_m * error_m
     st[at.S_WINDOW_TRAVEL] += abs(rate_m_per_s)

@@ -108,7 +108,9 @@ S_BAD_WINDOWS = 29
 S_RATE_FACTOR = 30
 S_ROLLED_BACK = 31
 S_EXPECTED = 32
-STATE_COUNT = 33
+S_SHARE = 33
+S_LEAD = 34
+STATE_COUNT = 35
 
 # Outputs of one tick; STATE_NAMES are their names on topic controller_state.
 O_COMMAND = 0

@@ -20,7 +20,7 @@ Feedback rules: ``feedback[d, i, j]`` is the singleton in [-1, 1] of the rule
 Feed-forward rules: ``feedforward[d, k]`` [Pa] is the singleton of "if the
 reference is near r_k and moves in direction d then add c_k". Directions: 0
 contracting, 1 extending; a muscle with hysteresis needs different pressures on
-the two branches. At small speed both are active in part. Motion rules:
+the two branches. Shortly after a reversal both are active in part. Motion rules:
 ``motion[m, n]`` [Pa] of "if the reference is near r_m and moves at about v_n then
 add c_mn"; the rates are dense about zero, where the muscle turns round.
 
@@ -42,10 +42,14 @@ DIRECTIONS = ('contracting', 'extending')
 
 
 @compiled
-def contracting_share(rate_m_per_s, blend_speed_m_per_s):
-    """Return the degree 0..1 of direction 'contracting' at a rate of the reference [m/s]."""
-    share = 0.5 + 0.5 * rate_m_per_s / blend_speed_m_per_s
-    return min(max(share, 0.0), 1.0)
+def contracting_share(share, way_m, blend_m):
+    """
+    Return the degree 0..1 of direction 'contracting' after a further way of the reference.
+
+    Like the friction it stands for, it changes over a way after a reversal, not with time: a
+    play operator. Standing still keeps the direction of before.
+    """
+    return min(max(share + way_m / blend_m, 0.0), 1.0)
 
 
 @compiled

@@ -50,6 +50,7 @@ def _start(par, inverse, values, kept, st, inp):
     st[:] = 0.0
     st[at.S_STARTED] = 1.0
     st[at.S_RATE_FACTOR] = 1.0
+    st[at.S_SHARE] = 0.5
     st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
     st[at.S_CONTRACTION] = x
     st[at.S_OUTPUT] = P_ATM_PA
@@ -219,12 +220,14 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     if st[at.S_STARTED] < 0.5:
         _start(par, inverse, values, kept, st, inp)
     jump, lead_jump = dynamics.jumps(par, st, inp)
-    to_go, extra_rate = dynamics.smooth_jump(par, st, jump, at.S_JUMP, at.S_JUMP_LEFT)
+    # A jump not seen ahead: the move can only begin one preview from now.
+    wait = par[at.P_LEAD] if lead_jump != 0.0 else 0.0
+    to_go, extra_rate = dynamics.smooth_jump(par, st, jump, wait, at.S_JUMP, at.S_JUMP_LEFT)
     lead_to_go, lead_extra_rate = dynamics.smooth_jump(
-        par, st, lead_jump, at.S_LEAD_JUMP, at.S_LEAD_JUMP_LEFT)
+        par, st, lead_jump, 0.0, at.S_LEAD_JUMP, at.S_LEAD_JUMP_LEFT)
     change = _update_rate(par, st, inp, inp[place.IN_REFERENCE_RATE] + extra_rate)
     lags = _valve_lags(par, ring, st, inp)
-    if jump != 0.0 or lead_jump != 0.0 or lags:
+    if lags or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
     offset = st[at.S_OFFSET]
     error = inp[place.IN_REFERENCE] - to_go - offset - inp[place.IN_CONTRACTION]
@@ -248,7 +251,10 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     m, wm = locate(lead, lower, upper, values[2].shape[0])
     n, wn = locate_signed_logarithmic(
         lead_rate, par[at.P_MOTION_RATE_FINE], par[at.P_MOTION_RATE_UPPER], values[2].shape[1])
-    share = contracting_share(lead_rate, par[at.P_DIRECTION_BLEND])
+    way = 0.0 if st[at.S_HISTORY] < 0.5 else lead - st[at.S_LEAD]
+    st[at.S_LEAD] = lead
+    share = contracting_share(st[at.S_SHARE], way, par[at.P_DIRECTION_BLEND])
+    st[at.S_SHARE] = share
     a_pass, motion_pass = _passes(par, st, k + wk, m + wm, n + wn)
 
     # Inference and trim.
@@ -379,7 +385,7 @@ def _guard(par, values, kept, st, inp, error, reason, out):
 
 def _entry(key):
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True)
+    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
     def sofc_step(par, inverse, values, initial, fired, kept, ring, st, inp, out):
         """
         Run one tick; return the pressure command [absolute Pa].

@@ -40,7 +40,11 @@ def metrics(named, key='metrics', title='Figures of merit'):
         ('RMSE of the first cycle', _mm(_cycle(m, 0) for _, m in named)),
         ('RMSE of the last cycle', _mm(_cycle(m, -1) for _, m in named)),
         ('Last cycle against the first', [_change(m) for _, m in named]),
-        ('Cycles', [len(m.cycle_rmse_m) or None for _, m in named]),
+        ('Force tracking RMSE', _n(m.rmse_n for _, m in named)),
+        ('Largest force error', _n(m.max_error_n for _, m in named)),
+        ('Force RMSE of the first cycle', _n(_at(m.cycle_rmse_n, 0) for _, m in named)),
+        ('Force RMSE of the last cycle', _n(_at(m.cycle_rmse_n, -1) for _, m in named)),
+        ('Cycles', [len(m.cycle_rmse_m) or len(m.cycle_rmse_n) or None for _, m in named]),
         ('Settling into 5 % after a step', [_settling(m) for _, m in named]),
         ('Overshoot of steps', _mm(max((s.overshoot_m for s in m.steps), default=None)
                                    for _, m in named)),
@@ -69,12 +73,20 @@ def _mm(values):
     return [None if v is None else f'{v * 1e3:.3f} mm' for v in values]
 
 
+def _n(values):
+    return [None if v is None else f'{v:.3f} N' for v in values]
+
+
 def _percent(value):
     return None if value is None else f'{100.0 * value:.1f} % of the messages'
 
 
 def _cycle(m, index):
-    return float(m.cycle_rmse_m[index]) if len(m.cycle_rmse_m) else None
+    return _at(m.cycle_rmse_m, index)
+
+
+def _at(values, index):
+    return float(values[index]) if len(values) else None
 
 
 def _change(m):

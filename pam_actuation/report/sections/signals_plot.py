@@ -17,7 +17,7 @@
 import numpy as np
 
 from pam_actuation.report import figures, signals
-from pam_actuation.report.metrics import tracking_error
+from pam_actuation.report.metrics import force_error, tracking_error
 from pam_actuation.report.page import plot, Section
 from pam_sim.units import P_ATM_PA
 
@@ -59,7 +59,10 @@ def _contraction(run, points):
 
 
 def _error(run, points):
-    tracked = tracking_error(run)
+    tracked, pulled = tracking_error(run), force_error(run)
+    if pulled is not None:
+        return 'force error [N]', [figures.line(
+            *pulled, 'reference − force', 'residual', width=1.1, max_points=points)]
     if tracked is None:
         return None
     return 'tracking error [mm]', [figures.line(
@@ -78,11 +81,13 @@ def _pressure(run, points):
 
 def _force(run, points):
     traces = []
-    for topic, name, role in (('force', 'load cell', 'measured'),
-                              ('external_force', 'external force', 'second')):
-        pair = signals.series(run, topic)
+    for topic, name, role, dash in (('force', 'load cell', 'measured', None),
+                                    ('external_force', 'external force', 'second', None),
+                                    ('reference', 'reference', 'reference', 'dash')):
+        pair = signals.series(run, topic, 'force_n')
         if pair is not None:
-            traces.append(figures.line(*pair, name, role, width=1.2, max_points=points))
+            traces.append(figures.line(
+                *pair, name, role, dash=dash, width=1.2, max_points=points))
     return ('force [N]', traces) if traces else None
 
 

@@ -35,7 +35,8 @@ def tuning_section(result, key='tuning', title='Offline tuning'):
     data = result if isinstance(result, dict) else result.to_dict()
     body = paragraph(
         'Settings of the controller were searched on the model, against simulated runs of '
-        'the same experiment; a run with other random numbers then checked the result.')
+        'the experiments; runs that were not searched, with other random numbers, then checked '
+        'the result.')
     plain = [[_words(name), _shown(value)] for name, value in data.items()
              if isinstance(value, (int, float, bool, str)) and value != '']
     if plain:

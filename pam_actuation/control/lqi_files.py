@@ -1,0 +1,107 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The LQI controller in YAML.
+
+::
+
+    controller: lqi
+    settings: {integral_weight: 20.0}
+    model:                        # optional: by default identified on the rig, in simulation
+      rate_hz: 200.0
+      delay_ticks: 7
+      denominator: [-2.7, 2.5, -0.8]
+      numerator: [1.1e-10, 4.0e-10, 0.9e-10]
+      contraction_m: 0.014
+      pressure_pa: 555000.0
+
+A recording also keeps ``gains``, what the Riccati equations gave, so that a replay on
+another machine has the same bits.
+"""
+
+import numpy as np
+from pam_actuation.control.lqi import LqiController
+from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
+from pam_actuation.control.settings import checked_settings
+from pam_sim.errors import InputError
+
+_NUMBERS = (
+    ('rate_hz', 20.0, 1000.0, 'Hz'), ('contraction_m', -0.1, 0.3, 'm'),
+    ('pressure_pa', 0.0, 1e7, 'Pa'))
+_LISTS = (('denominator', -1e3, 1e3, '-'), ('numerator', -1.0, 1.0, 'm/Pa'))
+_MOST = 10
+
+
+def lqi_from_tree(tree, rig, settings, rig_name, where):
+    """
+    Return the LqiController of a ``Located`` mapping.
+
+    Raises
+    ------
+    InputError
+        A number is missing or out of range, neither model nor rig is given, or the rig
+        cannot be identified.
+
+    """
+    if 'model' in tree:
+        model = _model(tree.require('model', dict))
+    elif rig is None:
+        raise InputError('without a rig the controller text must bring its `model`', tree.where())
+    else:
+        from pam_actuation.control.lqi import SETTINGS
+        model = identify_on_rig(rig, checked_settings(SETTINGS, settings, where)['rate_hz'])
+    controller = LqiController(model, settings, rig_name, where)
+    if 'gains' in tree:
+        controller.gains[:] = _floats(
+            tree, 'gains', -1e12, 1e12, '', len(controller.gains))
+    return controller
+
+
+def lqi_to_mapping(controller):
+    """Return what ``controller_to_yaml`` adds for an LQI controller."""
+    model = controller.model
+    return {
+        'model': {
+            'rate_hz': model.rate_hz, 'delay_ticks': model.delay_ticks,
+            'denominator': list(model.denominator), 'numerator': list(model.numerator),
+            'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa},
+        'gains': controller.gains.tolist()}
+
+
+def _model(table):
+    table.check_keys(('delay_ticks', *(name for name, *_ in _NUMBERS + _LISTS)))
+    values = {name: table.require(name, float, lower=lower, upper=upper, unit=unit)
+              for name, lower, upper, unit in _NUMBERS}
+    values['delay_ticks'] = table.require('delay_ticks', int, lower=0, upper=200)
+    order = len(table.require('denominator', list))
+    if not 1 <= order <= _MOST:
+        raise table.error(f'`denominator` has {order} numbers; allowed 1 to {_MOST}',
+                          'denominator')
+    for name, lower, upper, unit in _LISTS:
+        values[name] = tuple(_floats(table, name, lower, upper, unit, order))
+    model = LinearModel(**values)
+    if np.max(np.abs(np.roots(np.r_[1.0, model.denominator]))) >= 1.0:
+        raise table.error('`denominator` is of an unstable model', 'denominator')
+    if not model.gain_m_per_pa > 0.0:
+        raise table.error('`numerator` gives no contraction for more pressure', 'numerator')
+    return model
+
+
+def _floats(tree, key, lower, upper, unit, count):
+    """Return a list of exactly ``count`` numbers within bounds."""
+    table = tree.require(key, list)
+    if len(table) != count:
+        raise tree.error(f'`{key}` has {len(table)} numbers; expected {count}', key)
+    return [table.require(i, float, lower=lower, upper=upper, unit=unit) for i in range(count)]

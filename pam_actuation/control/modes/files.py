@@ -1,0 +1,71 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The mode of a controller file: which there are, what they add to the file."""
+
+from pam_actuation.control.modes.force import force_to_mapping, ForceMode
+from pam_actuation.control.modes.joint import joint_to_mapping, JointMode
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED, tracked_by
+from pam_sim.errors import InputError
+from pam_sim.load import LOADS
+
+KEYS = ('mode', 'force', 'joint')
+KINDS = ('sofc', 'pid')       # laws that can be wrapped
+_MODES = {FORCE.mode: ForceMode, JOINT.mode: JointMode}
+
+
+def preset_for(experiment, rig):
+    """Return the name of the self-organizing controller for an experiment's quantity."""
+    mode = 'force_' if experiment.domain == FORCE.topic else ''
+    return f'sofc_{mode}{rig.valve}'
+
+
+def read_mode(tree, rig):
+    """
+    Return the mode a controller file asks for, None for contraction.
+
+    Raises
+    ------
+    InputError
+        Unknown mode, a mode the law does not have, or keys of another mode.
+
+    """
+    name = tree.get('mode', str, default=CONTRACTION.mode, choices=tuple(TRACKED))
+    for key in _MODES:
+        if key in tree and key != name:
+            raise tree.error(f'`{key}` belongs to `mode: {key}`, the mode here is {name}', key)
+    if name == CONTRACTION.mode:
+        if hasattr(rig, 'flexor'):
+            raise InputError(
+                f'{rig.name} is a joint; its controller needs `mode: joint`', tree.where())
+        load = LOADS.get(getattr(rig, 'load', None))
+        if load is not None and not load.MOVES_FREELY and 'static_inverse' not in tree:
+            raise InputError(
+                f'the load `{rig.load}` of {rig.name} has its contraction prescribed; its '
+                'controller needs `mode: force`', tree.where())
+        return None
+    kind = tree.require('controller', str)
+    if kind not in KINDS:
+        raise tree.error(f'a {kind} controller has no `mode: {name}`', 'mode')
+    return _MODES[name](tree, rig)
+
+
+def mode_to_mapping(controller):
+    """Return what the mode of a controller adds to its file, as plain data."""
+    tracked = tracked_by(controller)
+    if tracked == FORCE:
+        return {'mode': FORCE.mode, **force_to_mapping(controller)}
+    if tracked == JOINT:
+        return {'mode': JOINT.mode, **joint_to_mapping(controller)}
+    return {}

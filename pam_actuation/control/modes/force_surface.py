@@ -1,0 +1,153 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Pressure that gives a force at a contraction, at rest, as a table in one vector.
+
+``[force step N, number of forces, contraction step m, number of contractions, Pa, Pa, ...]``,
+both from 0, absolute pressures, the forces of one contraction together: the form compiled
+code takes and a file keeps exactly.
+"""
+
+import numpy as np
+from pam_sim.compiled import compiled
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
+
+HEAD = 4                # entries before the pressures
+_FORCES = 25
+_CONTRACTIONS = 51
+_HIGHEST_GAUGE_PA = 1.2e6      # instead of a pressure that no valve of this kind gives
+
+
+@compiled
+def fill_inverse(surface, stiffness_n_per_m, contraction_m, table):
+    """
+    Write the static inverse of the present contraction into ``table``.
+
+    The table is that of ``static_inverse`` over the equivalent contraction F / K.
+
+    Parameters
+    ----------
+    surface : float64[:]
+        As ``tabulate_force_surface`` makes it.
+    stiffness_n_per_m : float
+        K: this force counts as one metre.
+    contraction_m : float
+        Contraction [m] for which pressures are wanted; beyond the table its edge.
+    table : float64[:]
+        Two entries and one per force, written.
+
+    """
+    forces = int(surface[1])
+    last = int(surface[3]) - 1
+    place = min(max(contraction_m / surface[2], 0.0), last)
+    row = min(int(place), last - 1)
+    part = place - row
+    below = HEAD + row * forces
+    above = below + forces
+    table[0] = 0.0
+    table[1] = surface[0] / stiffness_n_per_m
+    for i in range(forces):
+        table[2 + i] = (1.0 - part) * surface[below + i] + part * surface[above + i]
+
+
+def tabulate_force_surface(rig, upper_force_n=None):
+    """
+    Tabulate the pressure at rest over force and contraction of a rig's nominal muscle.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+        Gives ``static_pressure_pa(contraction_m, load_n)``.
+    upper_force_n : float, optional
+        Largest force [N]; by default what the muscle gives at 600 kPa, not contracted.
+
+    Returns
+    -------
+    numpy.ndarray
+        The vector of this module. Contractions reach to the stroke of the muscle.
+
+    """
+    if upper_force_n is None:
+        upper_force_n = highest_force_n(rig)
+    force_n = np.linspace(0.0, upper_force_n, _FORCES)
+    contraction_m = np.linspace(0.0, rig.muscle.stroke_m, _CONTRACTIONS)
+    pressure_pa = rig.static_pressure_pa(contraction_m[:, None], force_n[None, :])
+    pressure_pa = np.clip(pressure_pa, P_ATM_PA, P_ATM_PA + _HIGHEST_GAUGE_PA)
+    return np.concatenate([
+        [force_n[1], _FORCES, contraction_m[1], _CONTRACTIONS], pressure_pa.ravel()])
+
+
+def highest_force_n(rig, gauge_pa=6e5, contraction_m=0.0):
+    """Return the force [N] of the nominal muscle at a gauge pressure and contraction."""
+    strain = contraction_m / rig.muscle.length_m
+    return float(rig.muscle.law.law.force_n(gauge_pa, strain, 'allow')
+                 * rig.parameters['force_map_gain'])
+
+
+def nominal_stiffness_n_per_m(rig, gauge_pa=3e5):
+    """
+    Return how much the force falls with contraction at constant pressure [N/m].
+
+    Half way to the contraction at which the muscle pulls no more at that pressure.
+    """
+    law, length_m = rig.muscle.law.law, rig.muscle.length_m
+    middle = 0.5 * min(float(law.max_strain(gauge_pa)), rig.muscle.max_strain)
+    h = 1e-3
+    fall = (law.formula_n(gauge_pa, max(middle - h, 0.0))
+            - law.formula_n(gauge_pa, middle + h)) / (middle + h - max(middle - h, 0.0))
+    return float(fall) / length_m * rig.parameters['force_map_gain']
+
+
+def surface_to_mapping(surface):
+    """Return a surface as plain data for a controller file."""
+    forces, contractions = int(surface[1]), int(surface[3])
+    rows = np.asarray(surface[HEAD:]).reshape(contractions, forces)
+    return {'force_step_n': float(surface[0]), 'contraction_step_m': float(surface[2]),
+            'pressure_pa': [' '.join(map(repr, row)) for row in rows.tolist()]}
+
+
+def surface_from_tree(tree):
+    """
+    Return the surface of a ``Located`` mapping.
+
+    Raises
+    ------
+    InputError
+        A step out of range, rows of unequal length, a pressure that is no number.
+
+    """
+    tree.check_keys(('force_step_n', 'contraction_step_m', 'pressure_pa'))
+    force_step_n = tree.require('force_step_n', float, lower=1e-6, upper=1e4, unit='N')
+    contraction_step_m = tree.require(
+        'contraction_step_m', float, lower=1e-6, upper=0.1, unit='m')
+    located = tree.require('pressure_pa', list)
+    rows = [_row(located.require(i, str), located.where(i)) for i in range(len(located))]
+    if len(rows) < 2 or len(rows[0]) < 2 or len({len(row) for row in rows}) != 1:
+        raise tree.error(
+            '`pressure_pa` needs two rows or more of equally many pressures', 'pressure_pa')
+    return np.concatenate([
+        [force_step_n, len(rows[0]), contraction_step_m, len(rows)], np.concatenate(rows)])
+
+
+def _row(text, where):
+    """Return the pressures [Pa] of one line of text."""
+    try:
+        row = np.array([float(word) for word in text.split()])
+    except ValueError:
+        raise InputError(f'{text!r} is not a row of numbers', where) from None
+    if not np.all((row >= 0.0) & (row <= 1e7)):
+        raise InputError('a pressure is outside 0...1e7 Pa', where)
+    return row

@@ -1,0 +1,116 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Pressures that hold an antagonistic joint at an angle, as the static inverse of a law.
+
+A pair of pressures (gauge) is written as one: u = middle + difference, with
+p_flexor = p0 + difference and p_extensor = p0 - difference. The middle is half way between
+lowest and highest pressure, so that u has the limits of one muscle: at either of them one
+muscle is vented and the other one full. The co-contraction p0 gives way where both pressures
+could not be kept within limits otherwise.
+"""
+
+import numpy as np
+from pam_sim.compiled import compiled
+from pam_sim.units import P_ATM_PA
+
+NODES = 141
+_BISECTIONS = 40
+
+
+@compiled
+def room_for(co_contraction_pa, difference_pa, lowest_pa, highest_pa):
+    """Return the co-contraction [Pa] that leaves room for a difference, nearest to the wanted."""
+    size = abs(difference_pa)
+    return min(max(co_contraction_pa, lowest_pa + size), highest_pa - size)
+
+
+@compiled
+def pair_of(u_pa, co_contraction_pa, lowest_pa, highest_pa):
+    """
+    Return the pressures of flexor and extensor [absolute Pa].
+
+    Parameters
+    ----------
+    u_pa : float
+        The pair as one pressure, absolute.
+    co_contraction_pa, lowest_pa, highest_pa : float
+        Wanted mean pressure and limits, absolute.
+
+    """
+    highest_difference = 0.5 * (highest_pa - lowest_pa)
+    difference = u_pa - 0.5 * (lowest_pa + highest_pa)
+    difference = min(max(difference, -highest_difference), highest_difference)
+    mean = room_for(co_contraction_pa, difference, lowest_pa, highest_pa)
+    return mean + difference, mean - difference
+
+
+@compiled
+def as_one(flexor_pa, extensor_pa, lowest_pa, highest_pa):
+    """Return a pair of pressures [absolute Pa] as one, NaN where one of them is."""
+    return 0.5 * (lowest_pa + highest_pa) + 0.5 * (flexor_pa - extensor_pa)
+
+
+def tabulate_joint_inverse(joint, co_contraction_pa, lowest_pa, highest_pa, nodes=NODES):
+    """
+    Tabulate the pair, as one pressure, that holds each angle of a joint at rest.
+
+    Nominal muscles without effects, gravity included.
+
+    Parameters
+    ----------
+    joint : pam_sim.joint.JointRig
+        Muscles, pulleys and limb.
+    co_contraction_pa, lowest_pa, highest_pa : float
+        Mean pressure and limits of both muscles, absolute Pa.
+    nodes : int
+        Number of equidistant angles over the range of the joint.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``[lowest flexor contraction m, step m, pressures...]``, as ``static_inverse`` has it;
+        an angle out of reach gets the limit.
+
+    """
+    angle = np.linspace(*joint.range_rad, nodes)
+    low = np.full(nodes, lowest_pa)
+    high = np.full(nodes, highest_pa)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        short = _torque_n_m(joint, angle, middle, co_contraction_pa, lowest_pa, highest_pa) < 0.0
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    contraction_m = joint.contractions_m(angle)[0]
+    step_m = (contraction_m[-1] - contraction_m[0]) / (nodes - 1)
+    return np.concatenate([[contraction_m[0], step_m], 0.5 * (low + high)])
+
+
+def _torque_n_m(joint, angle, u_pa, co_contraction_pa, lowest_pa, highest_pa):
+    """Return the torque at rest [N m] of nominal muscles and gravity, arrays over the angle."""
+    value = joint.parameters
+    difference = u_pa - 0.5 * (lowest_pa + highest_pa)
+    size = np.abs(difference)
+    mean = np.clip(co_contraction_pa, lowest_pa + size, highest_pa - size)
+    weight_n_m = value['limb_mass_kg'] * value['gravity_m_per_s2'] * value['centre_of_mass_m']
+    torque = -weight_n_m * np.sin(angle - value['hanging_angle_rad'])
+    for rig, contraction, pressure, arm in zip(
+            (joint.flexor, joint.extensor), joint.contractions_m(angle),
+            (mean + difference, mean - difference),
+            (value['flexor_radius_m'], -value['extensor_radius_m'])):
+        strain = np.clip(contraction, 0.0, rig.muscle.stroke_m) / rig.muscle.length_m
+        force = rig.muscle.law.law.force_n(pressure - P_ATM_PA, strain, 'allow')
+        force = np.where(contraction > rig.muscle.stroke_m, 0.0, force)
+        torque = torque + arm * rig.parameters['force_map_gain'] * force
+    return torque

@@ -1,0 +1,112 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A control law, which works in metres of contraction, made to track something else."""
+
+
+def in_mode(rig_name, mode):
+    """Return the identity of rules: rig and mode, the mode stated once."""
+    return rig_name if rig_name.endswith(f'/{mode}') else f'{rig_name}/{mode}'
+
+
+class WrappedLaw:
+    """
+    What all modes share: the law is inside, rules and learning are its own.
+
+    Parameters
+    ----------
+    law : SelfOrganizingFuzzyController or PidController
+        In metres of an equivalent contraction.
+
+    """
+
+    tracked = None
+
+    def __init__(self, law):
+        self.law = law
+
+    @property
+    def kind(self):
+        """Which law it is, as in controller files."""
+        return self.law.kind
+
+    @property
+    def rig_name(self):
+        """Identity of the rig the rules belong to."""
+        return self.law.rig_name
+
+    @property
+    def static_inverse(self):
+        """Table of the law, over the equivalent contraction."""
+        return self.law.static_inverse
+
+    @property
+    def settings(self):
+        """Settings of the law, metres being those of the equivalent contraction."""
+        return self.law.settings
+
+    @property
+    def rate_hz(self):
+        """Rate [Hz] at which ``step`` is to be called."""
+        return self.law.rate_hz
+
+    @property
+    def lead_s(self):
+        """Preview [s]: how far ahead the lead reference is to be taken."""
+        return self.law.lead_s
+
+    @property
+    def rules(self):
+        """Rules of the law, None if it has none."""
+        return self.law.rules
+
+    @property
+    def rules_replaced(self):
+        """Times the rules were exchanged from outside."""
+        return self.law.rules_replaced
+
+    @property
+    def freeze_learning(self):
+        """Whether the rules are kept as they are."""
+        return self.law.freeze_learning
+
+    @freeze_learning.setter
+    def freeze_learning(self, value):
+        self.law.freeze_learning = value
+
+    def replace_rules(self, rules, where='rules'):
+        """Exchange the rules without a step in the command; as of the law."""
+        self.law.replace_rules(rules, where)
+
+    def reset_rules(self):
+        """Return to the initial rules without a step in the command."""
+        self.law.reset_rules()
+
+    def learning_reason(self):
+        """Return in words whether the last tick learned, or why not."""
+        return self.law.learning_reason()
+
+    def pause(self):
+        """Forget the motion, keep the rules: the next tick starts bumplessly."""
+        self.law.pause()
+
+    def reset(self):
+        """Return to the initial rules and forget the motion."""
+        self.law.reset()
+        self.pause()
+
+    def to_yaml(self):
+        """Return YAML text from which ``load_controller`` builds an identical controller."""
+        from pam_actuation.control.config import controller_to_yaml
+        return controller_to_yaml(self)

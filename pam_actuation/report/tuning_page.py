@@ -1,0 +1,97 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page of a tuning: what was searched, what came out, how the recordings judge it."""
+
+from pam_actuation.report import figures
+from pam_actuation.report.page import paragraph, plot, render, Section, table, write_text
+from pam_actuation.report.pages import FOOTER
+from pam_actuation.report.sections.provenance import provenance
+from pam_actuation.report.sections.rules import rules
+from pam_actuation.report.sections.tuning import tuning_section
+from pam_actuation.tuning.problem import rebuild
+
+LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
+        'rollouts of the compiled live code. The cost of a run is the root mean square error of '
+        'its last 30 %, plus a quarter of that of the whole run and a tenth of the worst late '
+        'error, in mm.')
+
+
+def tuning_report(out_path, result, recordings, rig, experiments, runs):
+    """
+    Write the page of a tuning.
+
+    Parameters
+    ----------
+    out_path : path
+        File to write, atomically.
+    result : TuneResult
+        What ``tune`` returned.
+    recordings : list of RecordingCheck
+        What the bags say, may be empty.
+    rig : pam_sim.rig.Rig
+        The model tuned on.
+    experiments : list of Experiment
+        Those of the search.
+    runs : list of pam_sim.run.Run
+        The bags, may be empty.
+
+    """
+    sections = [tuning_section(result), _tracking(result)]
+    if recordings:
+        sections.append(_recordings(recordings))
+    after = result.controller.rules
+    if after is not None:
+        untaught = rebuild(result.start, result.controller.settings).rules
+        sections.append(rules(untaught, after, title='The initial rules'))
+    sections.append(Section('setup', 'Set-up', table([], [
+        ['model', rig.name], ['valve', rig.valve.upper()],
+        ['controller', result.controller.kind],
+        ['experiments', ', '.join(one.name for one in experiments)],
+        ['closed loops of the search', len(result.problem.loops)]], 'facts')))
+    if runs:
+        sections.append(provenance([(str(run.path), run) for run in runs]))
+    numbers = [
+        (f'{result.held_out_before:.3f} mm', 'held-out cost before', '', ''),
+        (f'{result.held_out_after:.3f} mm', 'held-out cost after', '',
+         'good' if result.improved else 'bad'),
+        (f'{result.rollouts:,}', 'rollouts', result.ended, '')]
+    write_text(out_path, render('pam_actuation: offline tuning', LEAD, sections, numbers, FOOTER))
+
+
+def _tracking(result):
+    """Return the section with the error on one held-out run, before and after."""
+    loop = result.check.loops[0]
+    lines = []
+    for name, controller, role in (('before', result.start, 'before'),
+                                   ('after', result.controller, 'after')):
+        run = loop.run(rebuild(controller, {}))
+        lines.append(figures.line(run.time_s, run.error_m * 1e3, name, role))
+    wanted = figures.line(run.time_s, run.reference_m * 1e3, 'wanted', 'second')
+    return Section('tracking', 'A run that was not searched', paragraph(
+        f'Experiment {loop.experiment.name} on the model, with sensor noise of its own.') + plot(
+            figures.stack([('reference [mm]', [wanted]), ('error [mm]', lines)], 'time [s]')))
+
+
+def _recordings(recordings):
+    body = ''
+    for one in recordings:
+        body += ''.join(paragraph(text) for text in one.lines())
+        check = one.counterfactual
+        if check is not None:
+            body += plot(figures.stack([('command [kPa]', [
+                figures.line(check.time_s, check.recorded_pa * 1e-3, 'recorded', 'before'),
+                figures.line(check.time_s, check.tuned_pa * 1e-3, 'tuned', 'after')])],
+                'time [s]', row_px=240), f'Absolute pressure commands, {one.bag}')
+    return Section('recordings', 'What the recordings say', body)

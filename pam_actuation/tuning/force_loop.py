@@ -1,0 +1,155 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Closed-loop rollouts in force mode: the force of an isometric or driven muscle is tracked.
+
+The same compiled steps as in the live nodes, as in ``closed_loop``.
+"""
+
+import numpy as np
+from pam_actuation.control.modes.tracked import FORCE, tracked_by
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.mode_result import ModeResult
+from pam_actuation.tuning.modes_module import compiled_modes
+from pam_sim.errors import InputError
+from pam_sim.load import LOADS
+from pam_sim.rollout import layout
+
+
+class ForceLoop(ClosedLoop):
+    """
+    A rig with prescribed contraction, an experiment in force and one realisation of noise.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+        Load ``isometric`` or ``driven``.
+    experiment : Experiment
+        Domain ``force``.
+    contraction_m : float or callable, optional
+        Contraction [m], possibly as a function of time [s] (driven load only); by default
+        what an isometric rig states, 0 for a driven one.
+    **others
+        ``seed``, ``rate_hz``, ``latency_s``, ``driver`` of ``ClosedLoop``.
+
+    Raises
+    ------
+    InputError
+        As of ``ClosedLoop``; a load that moves freely; a moving isometric load; a contraction
+        beyond the stroke.
+
+    """
+
+    DOMAIN = FORCE.topic
+
+    def __init__(self, rig, experiment, contraction_m=None, **others):
+        if LOADS[rig.load].MOVES_FREELY:
+            raise InputError(
+                f'load `{rig.load}` of {rig.name} moves freely; a force can be tracked on a load '
+                'whose contraction is prescribed', 'rig')
+        self._made_of = (rig, experiment, contraction_m, others)
+        super().__init__(rig, experiment, **others)
+        if contraction_m is None:
+            contraction_m = rig.parameters.get('contraction_m', 0.0)
+        if callable(contraction_m) and rig.load != 'driven':
+            raise InputError(f'load `{rig.load}` of {rig.name} does not move', 'contraction_m')
+        times_s = np.arange(self.ticks + 1) / self.rate_hz
+        self._way_m = np.array([
+            contraction_m(t) if callable(contraction_m) else contraction_m for t in times_s],
+            dtype=float)
+        stroke_m = rig.muscle.stroke_m
+        if not ((self._way_m >= 0.0) & (self._way_m <= stroke_m)).all():
+            raise InputError(f'leaves 0 to {stroke_m:g} m, the stroke of {rig.muscle.name}',
+                             'contraction_m')
+        self._state, self._par = rig.pack(initial_contraction_m=float(self._way_m[0]))
+
+    def __reduce__(self):
+        """Pickle what it is made of."""
+        return _made_of, self._made_of
+
+    def run(self, controller, learn=True):
+        """
+        Track the experiment; the controller's rules change in place.
+
+        Parameters
+        ----------
+        controller : ForceController
+            Round a self-organizing law. Starts as after ``pause``.
+        learn : bool or callable
+            Whether the rules may change, possibly as a function of time [s].
+
+        Returns
+        -------
+        ModeResult
+            In N; signals ``contraction_m``, ``pressure_pa``, ``command_pa``.
+
+        Raises
+        ------
+        InputError
+            The controller is in another mode, of another kind, or runs at another rate.
+
+        """
+        log = self.run_raw(controller, learn)
+        module = compiled_modes()
+        return ModeResult(
+            'n', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
+            log[:, module.FORCE_LOG_FORCE],
+            {'contraction_m': log[:, module.FORCE_LOG_CONTRACTION],
+             'pressure_pa': log[:, module.FORCE_LOG_PRESSURE],
+             'command_pa': log[:, module.FORCE_LOG_COMMAND]}, self.experiment.cycles)
+
+    def run_raw(self, controller, learn=True):
+        """Return the log (ticks, FORCE_LOG_SIZE) of ``modes_template`` for a controller."""
+        check_controller(controller, FORCE, self.rate_hz)
+        module = compiled_modes()
+        controller.pause()
+        state = self._state.copy()
+        plant_inp, plant_out = np.zeros(layout.INP_SIZE), np.zeros(layout.OUT_SIZE)
+        plant_inp[layout.INP_CONTRACTION] = self._way_m[0]
+        from pam_sim.rollout.kernel import look
+        look(state, self._par, plant_inp, plant_out)
+        log = np.empty((self.ticks, module.FORCE_LOG_SIZE))
+        mode, law = controller.compiled_arguments()
+        module.force_rollout(
+            (state, self._par, plant_inp, plant_out), self.hsv, self._driver.fresh(),
+            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._noise, self._quantum, self._way_m,
+            learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
+            controller.law.input_array, log)
+        return log
+
+
+def _made_of(rig, experiment, contraction_m, others):
+    return ForceLoop(rig, experiment, contraction_m, **others)
+
+
+def check_controller(controller, tracked, rate_hz):
+    """Raise InputError unless a controller has a mode, a self-organizing law and a rate."""
+    if tracked_by(controller) != tracked:
+        raise InputError(
+            f'the controller tracks {tracked_by(controller).mode}, this loop {tracked.mode}')
+    if controller.kind != 'sofc':
+        raise InputError(f'this loop runs sofc controllers, not {controller.kind}')
+    if controller.rate_hz != rate_hz:
+        raise InputError(
+            f'the controller runs at {controller.rate_hz:g} Hz, this loop at {rate_hz:g} Hz')
+
+
+def learning_mask(controller, learn, ticks, rate_hz):
+    """Return 1.0 at every tick in which the rules may change, else 0.0."""
+    may = controller.freeze_learning is False
+    if callable(learn):
+        return np.array([float(may and learn(k / rate_hz)) for k in range(ticks)])
+    return np.full(ticks, float(may and learn))

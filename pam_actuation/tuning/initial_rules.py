@@ -1,0 +1,98 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The rules a tuned controller begins with: learned on the model, not drawn by hand.
+
+On every rig the controller tracks the experiments one after the other, the last
+one first, and keeps what it learns: list slow ones first, they then refine what
+fast ones taught roughly. Three tables are then compared by what the tuned settings cost
+when they start from them: the one from before, the one of the first (nominal)
+rig, and the mean over all rigs.
+"""
+
+import numpy as np
+from pam_actuation.tuning.problem import Problem, rebuild
+
+_PASSES = 3                     # times a rig's experiments are tracked
+
+
+def initial_rules(workers, problem, settings):
+    """
+    Return (name, rules, cost [mm]) of the best table for a start, and the rollouts it took.
+
+    Parameters
+    ----------
+    workers : Workers
+        Where the rollouts run.
+    problem : Problem
+        Its controller has rules; its first loop is one of the nominal rig.
+    settings : dict
+        Tuned settings.
+
+    """
+    rigs = list(dict.fromkeys(id(loop.rig) for loop in problem.loops))
+    groups = [[i for i, loop in enumerate(problem.loops) if id(loop.rig) == rig]
+              for rig in rigs]
+    learned = workers.map(_learn, problem, [(group, settings) for group in groups])
+    before = rebuild(problem.controller, settings).rules
+    tables = [('as before', before), ('learned on the nominal rig', as_initial(learned[0]))]
+    if len(learned) > 1:
+        tables.append((f'mean of {len(learned)} rigs', as_initial(mean_rules(learned))))
+    costs = workers.map(
+        _cost_from, problem, [(rules, settings, i) for _, rules in tables
+                              for i in range(len(problem.loops))])
+    means = np.mean(np.reshape(costs, (len(tables), -1)), axis=1)
+    best = int(np.argmin(means))
+    count = _PASSES * len(problem.loops) + len(costs)
+    return (*tables[best], float(means[best])), count
+
+
+def mean_rules(several):
+    """Return a rule base whose every rule is the mean of those of several."""
+    mean = several[0].copy()
+    for name in _bases(mean):
+        getattr(mean, name)[...] = np.mean([getattr(one, name) for one in several], axis=0)
+    return mean
+
+
+def as_initial(rules):
+    """Return a copy whose present rules are its initial ones and which never fired."""
+    fresh = rules.copy()
+    for name in _bases(fresh):
+        getattr(fresh, f'{name}_initial')[...] = getattr(fresh, name)
+        getattr(fresh, f'{name}_fired')[...] = 0.0
+    return fresh
+
+
+def _bases(rules):
+    """Return the names of the tables of a rule base."""
+    return [name.removesuffix('_initial') for name in vars(rules) if name.endswith('_initial')]
+
+
+def _learn(problem, task):
+    """Return the rules after tracking the experiments of one rig; run by workers."""
+    group, settings = task
+    controller = rebuild(problem.controller, settings)
+    for _ in range(_PASSES):
+        for i in reversed(group):
+            problem.loops[i].run_raw(controller)
+    return controller.rules
+
+
+def _cost_from(problem, task):
+    """Return the cost [mm] on one loop of settings that start from given rules."""
+    rules, settings, i = task
+    controller = rebuild(problem.controller, settings, rules)
+    return Problem([problem.loops[i]], controller).cost_mm({})

@@ -1,0 +1,151 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Closed-loop rollouts in joint mode: two muscles turn a limb, the angle is tracked.
+
+The same compiled steps as in the controller, drivers and joint, as in ``closed_loop``.
+"""
+
+import math
+
+import numpy as np
+from pam_actuation.control.modes.tracked import JOINT
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.tuning.force_loop import check_controller, learning_mask
+from pam_actuation.tuning.loop_setup import (
+    DriverLaw, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+from pam_actuation.tuning.mode_result import ModeResult
+from pam_actuation.tuning.modes_module import compiled_modes
+from pam_sim.errors import InputError
+
+ANGLE_NOISE_RAD = 5e-4                      # design value of an encoder on the joint
+ANGLE_STEP_RAD = 2.0 * math.pi / 2 ** 14    # of 14 bit a turn
+
+
+class JointLoop:
+    """
+    A joint, an experiment in its angle and one realisation of the sensor noise.
+
+    Parameters
+    ----------
+    joint : pam_sim.joint.JointRig
+        The valves of its muscles decide on the driver laws, their sensors on the noise of
+        pressures and forces.
+    experiment : Experiment
+        Domain ``joint_angle``.
+    seed : int
+        Seed of the sensor noise.
+    rate_hz : float
+        Controller rate; a whole number of milliseconds per period.
+    latency_s : float
+        From the measurement to the new valve signals, below one period.
+    external_torque_n_m : callable or None
+        Torque [N m] on the limb, flexion positive, as a function of time [s].
+    angle_noise_rad, angle_step_rad : float
+        Standard deviation and step of the measured angle.
+    drivers : pair of DriverConfig, optional
+        What the drivers of flexor and extensor know; by default the data sheets of the joint.
+
+    Raises
+    ------
+    InputError
+        The experiment is in something else, leaves the range of the joint, or the rate does
+        not fit.
+
+    """
+
+    def __init__(self, joint, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
+                 external_torque_n_m=None, angle_noise_rad=ANGLE_NOISE_RAD,
+                 angle_step_rad=ANGLE_STEP_RAD, drivers=None):
+        if experiment.domain != JOINT.topic:
+            raise InputError(
+                f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
+                f'{JOINT.topic}')
+        experiment.check_reachable(joint)
+        steps = steps_per_tick(rate_hz)
+        self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
+        self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
+        sides = (joint.flexor, joint.extensor)
+        noises = [sensor_noise(rig, self.ticks, (seed, k)) for k, rig in enumerate(sides)]
+        angle = np.random.default_rng((seed, len(sides))).standard_normal(self.ticks)
+        self._noise = np.column_stack(
+            [angle * angle_noise_rad, *(noise[:, 0] for noise, _ in noises),
+             *(noise[:, 2] for noise, _ in noises)])
+        self._quantum = np.array(
+            [angle_step_rad, *(step[0] for _, step in noises), *(step[2] for _, step in noises)])
+        self._torque = np.zeros(self.ticks)
+        if external_torque_n_m is not None:
+            self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
+        configs = drivers or [driver_config(rig) for rig in sides]
+        self._drivers = [DriverLaw(rig, config, rate_hz) for rig, config in zip(sides, configs)]
+        if self._drivers[0].every != self._drivers[1].every:
+            raise InputError('flexor and extensor need valves of one kind and period',
+                             f'joint {joint.name}')
+        self._plant = joint.plant(dt_s=PHYSICS_S)
+        latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
+        self._timing = (steps, self._drivers[0].every, latency)
+
+    def run(self, controller, learn=True):
+        """
+        Track the experiment; the controller's rules change in place.
+
+        Parameters
+        ----------
+        controller : JointController
+            Round a self-organizing law. Starts as after ``pause``.
+        learn : bool or callable
+            Whether the rules may change, possibly as a function of time [s].
+
+        Returns
+        -------
+        ModeResult
+            In rad; signals ``flexor_pressure_pa``, ``flexor_command_pa``, ``flexor_force_n``
+            and the same of the extensor.
+
+        Raises
+        ------
+        InputError
+            The controller is in another mode, of another kind, or runs at another rate.
+
+        """
+        log = self.run_raw(controller, learn)
+        module = compiled_modes()
+        return ModeResult(
+            'rad', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
+            log[:, module.JOINT_LOG_ANGLE],
+            {'flexor_pressure_pa': log[:, module.JOINT_LOG_FLEXOR_PRESSURE],
+             'extensor_pressure_pa': log[:, module.JOINT_LOG_EXTENSOR_PRESSURE],
+             'flexor_command_pa': log[:, module.JOINT_LOG_FLEXOR_COMMAND],
+             'extensor_command_pa': log[:, module.JOINT_LOG_EXTENSOR_COMMAND],
+             'flexor_force_n': log[:, module.JOINT_LOG_FLEXOR_FORCE],
+             'extensor_force_n': log[:, module.JOINT_LOG_EXTENSOR_FORCE]},
+            self.experiment.cycles)
+
+    def run_raw(self, controller, learn=True):
+        """Return the log (ticks, JOINT_LOG_SIZE) of ``modes_template`` for a controller."""
+        check_controller(controller, JOINT, self.rate_hz)
+        module = compiled_modes()
+        controller.pause()
+        self._plant.reset()
+        log = np.empty((self.ticks, module.JOINT_LOG_SIZE))
+        mode, law = controller.compiled_arguments()
+        module.joint_rollout(
+            self._plant.arrays, tuple(driver.hsv for driver in self._drivers),
+            tuple(driver.fresh() for driver in self._drivers), self._timing,
+            controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
+            self._quantum, self._torque,
+            learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
+            controller.law.input_array, log)
+        return log

@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the compiled closed loops share: reading a sensor, running a driver law."""
+
+import numpy as np
+from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
+from pam_actuation.drivers.ppr import ppr_step
+from pam_sim.compiled import compiled
+
+
+@compiled
+def read(value, step_size):
+    """Quantise a reading, 0 = no quantisation."""
+    if step_size > 0.0:
+        return np.rint(value / step_size) * step_size
+    return value
+
+
+@compiled
+def look_up(values, place):
+    """Return values at a fractional place, linear in between, the last one beyond the end."""
+    whole = min(int(place), values.shape[0] - 2)
+    part = min(place - whole, 1.0)
+    return (1.0 - part) * values[whole] + part * values[whole + 1]
+
+
+@compiled
+def drive(driver, hsv, command_pa, measured_pa):
+    """
+    Run a driver law once and return its two valve signals.
+
+    Parameters
+    ----------
+    driver : tuple
+        state, par, out of the driver law.
+    hsv : bool
+        Which law it is.
+    command_pa, measured_pa : float
+        Wanted and measured muscle pressure, absolute Pa.
+
+    """
+    state, par, out = driver
+    if hsv:
+        state[S_AGE] = 0.0
+        hsv_step(state, par, command_pa, measured_pa, np.nan, out)
+        return out[0], out[1]
+    ppr_step(state, par, command_pa, measured_pa, np.nan, out)
+    return out[0], 0.0

@@ -1,0 +1,84 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the compiled closed loops are given: timing, reference, sensor noise, driver laws."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+from pam_actuation.drivers import hsv_kernel, ppr
+from pam_actuation.drivers.hsv import initial_state
+from pam_sim.errors import InputError
+
+PHYSICS_S = 0.001
+_MAX_LEAD_S = 0.5
+_SENSORS = (('pressure_noise_pa', 'pressure_step_pa'),
+            ('contraction_noise_m', 'contraction_step_m'), ('force_noise_n', 'force_step_n'))
+
+
+def steps_per_tick(rate_hz):
+    """
+    Return the number of physics steps in a controller period.
+
+    Raises
+    ------
+    InputError
+        It is no whole number.
+
+    """
+    steps = round(1.0 / (rate_hz * PHYSICS_S))
+    if steps < 1 or abs(steps * PHYSICS_S * rate_hz - 1.0) > 1e-9:
+        raise InputError(
+            f'{rate_hz:g} Hz is no whole number of {PHYSICS_S * 1e3:g} ms steps per period')
+    return steps
+
+
+def sampled_reference(experiment, rate_hz):
+    """Return (ticks, values, rates) of an experiment; the arrays reach beyond by a preview."""
+    ticks = int(round(experiment.duration_s * rate_hz))
+    ahead = int(math.ceil(_MAX_LEAD_S * rate_hz)) + 2
+    wanted = [experiment.at(k * (1.0 / rate_hz)) for k in range(ticks + ahead)]
+    return (ticks, np.array([value for value, _ in wanted], dtype=float),
+            np.array([rate for _, rate in wanted], dtype=float))
+
+
+def sensor_noise(rig, ticks, seed):
+    """Return noise (ticks, 3) and steps (3) of a rig's pressure, contraction and force."""
+    sensors = dict(rig.sensors)
+    sigma = np.array([sensors.get(noise, 0.0) for noise, _ in _SENSORS])
+    steps = np.array([float(sensors.get(step, 0.0)) for _, step in _SENSORS])
+    return np.random.default_rng(seed).standard_normal((ticks, 3)) * sigma, steps
+
+
+class DriverLaw:
+    """
+    A driver law at a controller's rate.
+
+    Attributes: ``hsv`` tells which law it is, ``every`` the ticks per step of it.
+    """
+
+    def __init__(self, rig, config, rate_hz):
+        """Take the valve of ``rig`` and what the driver knows, a ``DriverConfig``."""
+        self.hsv = rig.valve == 'hsv'
+        self._hsv_config = config.hsv
+        self._ppr_config = replace(config.ppr, period_s=1.0 / rate_hz)
+        period_s = config.hsv.period_s if self.hsv else 1.0 / rate_hz
+        self.every = max(1, round(period_s * rate_hz))
+
+    def fresh(self):
+        """Return new state, par, out."""
+        if self.hsv:
+            return initial_state(), self._hsv_config.par(), np.zeros(hsv_kernel.OUT_SIZE)
+        return np.zeros(ppr.PPR_STATE_SIZE), self._ppr_config.par(), np.zeros(ppr.PPR_OUT_SIZE)

@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a closed loop of force mode or joint mode returns."""
+
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+from pam_sim.errors import InputError
+
+
+@dataclass
+class ModeResult:
+    """
+    One tracked experiment, sampled at the controller's ticks; SI, pressures absolute.
+
+    ``reference`` and ``value`` are in ``unit`` (``n`` or ``rad``); ``value`` is true, without
+    sensor noise. ``signals`` holds further arrays by name. ``cycle_s`` is (start, period,
+    count) of the periodic part or None.
+    """
+
+    unit: str
+    time_s: np.ndarray
+    reference: np.ndarray
+    value: np.ndarray
+    signals: dict = field(default_factory=dict)
+    cycle_s: tuple = None
+
+    @property
+    def error(self):
+        """Reference minus what was reached, in ``unit``."""
+        return self.reference - self.value
+
+    def rmse(self, start_s=0.0, end_s=math.inf):
+        """Return the root mean square error within a span of time."""
+        chosen = (self.time_s >= start_s) & (self.time_s < end_s)
+        if not chosen.any():
+            raise InputError(f'no samples between {start_s} and {end_s} s')
+        return float(np.sqrt(np.mean(self.error[chosen] ** 2)))
+
+    def cycle_rmse(self):
+        """Return the root mean square error of every cycle, shape (cycles,)."""
+        if self.cycle_s is None:
+            raise InputError('the experiment has no periodic part')
+        start_s, period_s, count = self.cycle_s
+        return np.array([
+            self.rmse(start_s + k * period_s, start_s + (k + 1) * period_s)
+            for k in range(count)])

@@ -1,0 +1,100 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Rigs that differ from a given one as real ones do: what a tuned controller has to stand.
+
+================  ==========================================  ==================
+what              drawn                                       valve
+================  ==========================================  ==================
+dry friction      factor 0.5 to 2, logarithmic                both
+valve speed       T_m, or C, times 0.7 to 1.3                 PPR, or HSV
+dead time         20 to 45 ms                                 both
+supply            0 to 10 % less gauge pressure               HSV (a PPR's model
+                                                              has no supply)
+load              4 to 5.5 kg                                 both
+force map         gain times 0.85 to 1.15                     both
+================  ==========================================  ==================
+
+The ranges are design values. Each is drawn evenly, independently of the others.
+"""
+
+import numpy as np
+from pam_sim.effects.registry import get_effect
+from pam_sim.units import P_ATM_PA
+
+FRICTION_FACTOR = (0.5, 2.0)
+VALVE_FACTOR = (0.7, 1.3)
+DEAD_TIME_S = (0.020, 0.045)
+SUPPLY_FACTOR = (0.9, 1.0)          # of the gauge pressure
+MASS_KG = (4.0, 5.5)
+FORCE_MAP_FACTOR = (0.85, 1.15)
+
+
+def random_rigs(rig, count, seed=0):
+    """
+    Return rigs drawn about a given one.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+        The nominal one; its valve, effects and sensors stay. Names stay as well, so that
+        rules learned on one rig may run on the others.
+    count : int
+        How many; the first ones do not depend on it.
+    seed : int
+        Same seed, same rigs.
+
+    Returns
+    -------
+    list of Rig
+
+    """
+    random = np.random.default_rng(seed)
+    return [_drawn(rig, random.uniform(size=6)) for _ in range(count)]
+
+
+def _drawn(rig, part):
+    """Return the rig at a point of the unit cube."""
+    friction = FRICTION_FACTOR[0] * (FRICTION_FACTOR[1] / FRICTION_FACTOR[0]) ** part[0]
+    valve = _between(VALVE_FACTOR, part[1])
+    values = rig.parameters
+    changed = {'force_map_gain': values['force_map_gain'] * _between(FORCE_MAP_FACTOR, part[5])}
+    if rig.valve == 'ppr':
+        changed['T_m'] = values['T_m'] * valve
+    else:
+        changed['C'] = values['C'] * valve
+        gauge_pa = values['supply_pa'] - P_ATM_PA
+        changed['supply_pa'] = P_ATM_PA + gauge_pa * _between(SUPPLY_FACTOR, part[3])
+    if 'mass_kg' in values:
+        changed['mass_kg'] = _between(MASS_KG, part[4])
+    effects = [_with_friction(setting, friction) for setting in rig.effects
+               if setting.name != 'valve_dead_time']
+    effects.append({'name': 'valve_dead_time',
+                    'parameters': {'delay_s': _between(DEAD_TIME_S, part[2])}})
+    return rig.with_(parameters=changed, effects=effects)
+
+
+def _between(ends, part):
+    return float(ends[0] + (ends[1] - ends[0]) * part)
+
+
+def _with_friction(setting, factor):
+    """Return an effect of dry friction with its level scaled, any other as it is."""
+    effect = get_effect(setting.name)
+    if effect.family != 'friction':
+        return setting
+    return {'name': setting.name, 'parameters': {
+        name: value * factor if name in effect.amplitude else value
+        for name, value in setting.parameters.items()}}

@@ -1,0 +1,199 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a recording says about a tuning: is the model good enough, what would have been commanded.
+
+Two checks. The model is run freely on the recorded valve signal; a tuning is
+worth no more than the model it was made on. The tuned controller is stepped
+over the recorded inputs, its rules frozen: the muscle did not follow *its*
+commands, so the comparison shows how differently it acts, not how well.
+"""
+
+from dataclasses import asdict, dataclass, field, replace
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.tick import RUNNING
+from pam_actuation.replay.controller import replay_controller
+from pam_actuation.replay.plant import replay_plant
+from pam_sim.errors import InputError
+
+# Error of the free run as a share of the recorded range; design values.
+TRUSTED_SHARE = 0.03
+DOUBTFUL_SHARE = 0.10
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """
+    How a model's free run compares with a recording.
+
+    ``share`` is the larger of pressure and contraction error (rms over recorded range),
+    ``signal`` the one it belongs to, ``rms`` its size in SI.
+    """
+
+    signal: str
+    share: float
+    rms: float
+
+    @property
+    def verdict(self):
+        """Return ``trusted``, ``doubtful`` or ``wrong``."""
+        if self.share <= TRUSTED_SHARE:
+            return 'trusted'
+        return 'doubtful' if self.share <= DOUBTFUL_SHARE else 'wrong'
+
+    def sentence(self):
+        """Return the outcome as one sentence."""
+        size = f'{self.rms * 1e-3:.3g} kPa' if self.signal == 'pressure' \
+            else f'{self.rms * 1e3:.3g} mm'
+        says = {
+            'trusted': 'trustworthy for tuning',
+            'doubtful': 'doubtful for tuning: tune on randomised rigs too, or correct the model '
+                        'with pam gap first',
+            'wrong': 'not trustworthy for tuning: correct it with pam gap first'}[self.verdict]
+        return (f'The model misses the recorded {self.signal} by {size} rms, '
+                f'{100 * self.share:.1f} % of its range: {says}.')
+
+    def to_dict(self):
+        """Return plain data."""
+        return {**asdict(self), 'verdict': self.verdict, 'sentence': self.sentence()}
+
+
+@dataclass(frozen=True)
+class Counterfactual:
+    """
+    Commands of the tuned controller on recorded inputs against the recorded commands.
+
+    Differences [Pa] over the ticks with usable inputs; ``saturated`` and
+    ``recorded_saturated`` are shares of ticks at a pressure limit. The arrays hold every tick.
+    """
+
+    ticks: int
+    rms_pa: float
+    largest_pa: float
+    at_s: float
+    saturated: float
+    recorded_saturated: float
+    time_s: np.ndarray = field(repr=False)
+    recorded_pa: np.ndarray = field(repr=False)
+    tuned_pa: np.ndarray = field(repr=False)
+
+    def sentence(self):
+        """Return the outcome as one sentence."""
+        return (
+            f'On the recorded inputs the tuned controller, rules frozen, would have commanded '
+            f'{self.rms_pa * 1e-3:.2f} kPa rms otherwise than the recorded one (largest '
+            f'{self.largest_pa * 1e-3:.1f} kPa at {self.at_s:.2f} s), at a limit in '
+            f'{100 * self.saturated:.1f} % of {self.ticks} ticks (recorded: '
+            f'{100 * self.recorded_saturated:.1f} %).')
+
+    def to_dict(self):
+        """Return plain data, without the arrays."""
+        plain = {name: value for name, value in vars(self).items() if np.ndim(value) == 0}
+        return {**plain, 'sentence': self.sentence()}
+
+
+@dataclass(frozen=True)
+class RecordingCheck:
+    """Both checks of one bag; one that was not possible is None and ``notes`` says why."""
+
+    bag: str
+    model: ModelCheck = None
+    counterfactual: Counterfactual = None
+    notes: tuple = ()
+
+    def lines(self):
+        """Return the outcome as sentences."""
+        done = [one.sentence() for one in (self.model, self.counterfactual) if one is not None]
+        return [f'{self.bag}: {text}' for text in (*done, *self.notes)]
+
+    def to_dict(self):
+        """Return plain data."""
+        return {'bag': self.bag, 'notes': list(self.notes), **{
+            name: None if one is None else one.to_dict() for name, one in (
+                ('model', self.model), ('counterfactual', self.counterfactual))}}
+
+
+def check_recordings(runs, rig, controller):
+    """Return a RecordingCheck of every run for a model and a tuned controller."""
+    checks = []
+    for run in runs:
+        found, notes = {}, []
+        for name, check, thing in (('model', check_model, rig),
+                                   ('counterfactual', counterfactual, controller)):
+            try:
+                found[name] = check(run, thing)
+            except InputError as error:
+                notes.append(f'No {name} check: {error.problem}.')
+        checks.append(RecordingCheck(str(run.path), notes=tuple(notes), **found))
+    return checks
+
+
+def check_model(run, rig):
+    """
+    Compare a model with a recording.
+
+    Raises
+    ------
+    InputError
+        The recording cannot be simulated with this rig (other valve, signals missing).
+
+    """
+    again = replay_plant(replace(run, metadata={**run.metadata, 'rig': rig.to_yaml()}))
+    worst = None
+    for one in again.differences:
+        if one.signal in ('pressure', 'contraction') and one.span > 0.0:
+            if worst is None or one.rms / one.span > worst.share:
+                worst = ModelCheck(one.signal, one.rms / one.span, one.rms)
+    if worst is None:
+        raise InputError('neither pressure nor contraction moves', str(run.path))
+    return worst
+
+
+def counterfactual(run, controller):
+    """
+    Step a controller over the inputs of a recording, its rules frozen.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        With ``controller_state`` and what the ticks used.
+    controller : object
+        As ``load_controller`` gives it; not changed.
+
+    Raises
+    ------
+    InputError
+        The recording has no complete controller ticks.
+
+    """
+    fresh = load_controller(controller.to_yaml())
+    fresh.freeze_learning = True
+    again = replay_controller(run, fresh, keep_states=True)
+    used = np.isin(again.states['input_reason'], RUNNING)
+    if not used.any():
+        raise InputError('no controller tick had usable inputs', str(run.path))
+    away = np.where(used, np.abs(again.replayed_pa - again.recorded_pa), 0.0)
+    worst = int(np.argmax(away))
+    limited = (again.states['saturated_low'] > 0.5) | (again.states['saturated_high'] > 0.5)
+    before = run.require('controller_state').values
+    recorded = sum(np.asarray(before[name]) > 0.5 for name in (
+        'saturated_low', 'saturated_high') if name in before)
+    return Counterfactual(
+        int(used.sum()), float(np.sqrt(np.mean(away[used] ** 2))),
+        float(away[worst]), (int(again.stamp_ns[worst]) - run.start_ns) * 1e-9,
+        float(np.mean(limited[used])), float(np.mean(np.asarray(recorded) > 0)),
+        (again.stamp_ns - run.start_ns) * 1e-9, again.recorded_pa, again.replayed_pa)

@@ -1,0 +1,148 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Closed loops of force and joint mode on realistic rigs: tracking, learning, limits."""
+
+import math
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.force_loop import ForceLoop
+from pam_actuation.tuning.joint_loop import JointLoop
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+from pam_sim.units import P_ATM_PA
+import pytest
+
+VALVES = ('ppr', 'hsv')
+SHORT = """
+name: short
+domain: {domain}
+segments:
+  - rest: {{duration_s: 0.3}}
+  - ramp: {{{values}, duration_s: 0.8}}
+  - hold: {{duration_s: 0.4}}
+"""
+
+
+def isometric(valve):
+    return load_rig('dmsp_5_300_isometric_realistic', valve=valve)
+
+
+@pytest.mark.parametrize('valve', VALVES)
+def test_a_force_is_tracked_and_learned_on_an_isometric_load(valve):
+    rig = isometric(valve)
+    controller = load_controller(f'sofc_force_{valve}', rig)
+    result = ForceLoop(rig, load_experiment('force_sine'), seed=1).run(controller)
+    rmse_n = result.cycle_rmse()
+    assert len(rmse_n) == 20 and rmse_n[-1] < 0.5 and rmse_n[-1] < 0.7 * rmse_n[0]
+    assert controller.rules.motion.any()
+    command_pa = result.signals['command_pa']
+    assert command_pa.min() >= P_ATM_PA and command_pa.max() <= P_ATM_PA + 6e5
+
+
+@pytest.mark.parametrize('valve', VALVES)
+def test_a_force_is_tracked_while_the_contraction_is_driven(valve):
+    rig = isometric(valve).with_(load='driven')
+    loop = ForceLoop(rig, load_experiment('force_sine'), seed=2, contraction_m=lambda t: (
+        0.006 + 0.004 * math.sin(2.0 * math.pi * 0.2 * t)))
+    result = loop.run(load_controller(f'sofc_force_{valve}', rig))
+    assert np.ptp(result.signals['contraction_m']) == pytest.approx(0.008, rel=1e-3)
+    assert result.cycle_rmse()[-5:].max() < 1.0
+
+
+@pytest.mark.parametrize('valve', VALVES)
+def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(valve):
+    joint = load_joint('joint_dmsp_5_300_realistic').with_(valve=valve)
+    controller = load_controller(f'sofc_joint_{valve}', joint)
+    loop = JointLoop(joint, load_experiment('joint_sine'), seed=3)
+    result = loop.run(controller)
+    rmse_deg = np.degrees(result.cycle_rmse())
+    assert rmse_deg[-1] < 0.5 and rmse_deg[-1] < 0.7 * rmse_deg[0]
+    commands = np.stack([result.signals[f'{side}_command_pa'] for side in ('flexor', 'extensor')])
+    assert commands.min() >= P_ATM_PA and commands.max() <= P_ATM_PA + 6e5
+    late = commands[:, result.time_s > 10.0].mean(axis=0)
+    assert late == pytest.approx(
+        np.full(len(late), P_ATM_PA + controller.co_contraction_gauge_pa), abs=1.0)
+    again = loop.run(load_controller(f'sofc_joint_{valve}', joint))
+    assert np.array_equal(again.value, result.value)
+
+
+def test_the_compiled_loop_of_force_mode_steps_the_live_class():
+    rig = load_rig('dmsp_5_300_driven')
+    experiment = load_experiment(SHORT.format(domain='force', values='to_n: 30.0'))
+    loop = ForceLoop(rig, experiment, contraction_m=lambda t: 0.005 + 0.002 * t)
+    result = loop.run(load_controller('sofc_force_ppr', rig))
+    controller = load_controller('sofc_force_ppr', rig)
+    lead = controller.lead_s
+    position, rate = loop._position, loop._rate
+    for k in range(loop.ticks):
+        ahead = k + lead * loop.rate_hz
+        wanted = (position[k], rate[k], *(
+            np.interp(ahead, np.arange(len(values)), values) for values in (position, rate)))
+        command_pa = controller.step(
+            result.signals['contraction_m'][k], *wanted, True, math.nan,
+            result.signals['pressure_pa'][k], result.value[k])
+        assert command_pa == pytest.approx(result.signals['command_pa'][k], abs=1e-6)
+
+
+def test_the_compiled_loop_of_joint_mode_steps_the_live_class():
+    joint = load_joint('joint_dmsp_5_300')
+    experiment = load_experiment(SHORT.format(domain='joint_angle', values='to_rad: 0.2'))
+    loop = JointLoop(joint, experiment, angle_noise_rad=0.0, angle_step_rad=0.0)
+    result = loop.run(load_controller('sofc_joint_ppr', joint))
+    controller = load_controller('sofc_joint_ppr', joint)
+    lead = controller.lead_s
+    position, rate = loop._position, loop._rate
+    for k in range(loop.ticks):
+        ahead = k + lead * loop.rate_hz
+        wanted = (position[k], rate[k], *(
+            np.interp(ahead, np.arange(len(values)), values) for values in (position, rate)))
+        commands_pa = controller.step(
+            result.value[k], *wanted, True, math.nan,
+            *([result.signals[f'{side}_{name}'][k] for side in ('flexor', 'extensor')]
+              for name in ('pressure_pa', 'force_n')))
+        assert commands_pa == pytest.approx(
+            [result.signals[f'{side}_command_pa'][k] for side in ('flexor', 'extensor')],
+            abs=1e-6)
+
+
+def test_frozen_rules_stay_as_they_are():
+    rig = isometric('ppr')
+    controller = load_controller('sofc_force_ppr', rig)
+    before = controller.rules.digest()
+    ForceLoop(rig, load_experiment('force_sine')).run(controller, learn=False)
+    assert controller.rules.digest() == before
+
+
+def test_what_cannot_be_tracked_is_refused():
+    rig = isometric('ppr')
+    sine = load_experiment('force_sine')
+    with pytest.raises(InputError, match='moves freely'):
+        ForceLoop(load_rig('dmsp_5_300_realistic'), sine)
+    with pytest.raises(InputError, match='does not move'):
+        ForceLoop(rig, sine, contraction_m=lambda t: 0.0)
+    with pytest.raises(InputError, match='stroke'):
+        ForceLoop(rig.with_(load='driven'), sine, contraction_m=0.2)
+    with pytest.raises(InputError, match='this loop tracks force'):
+        ForceLoop(rig, load_experiment('joint_sine'))
+    joint = load_joint('joint_dmsp_5_300')
+    with pytest.raises(InputError, match='tracks joint, this loop force'):
+        ForceLoop(rig, sine).run(load_controller('sofc_joint_ppr', joint))
+    with pytest.raises(InputError, match='not pid'):
+        ForceLoop(rig, sine).run(load_controller('controller: pid\nmode: force\n', rig))
+    with pytest.raises(InputError, match='rad'):
+        JointLoop(joint.with_(parameters={'upper_stop_rad': 0.2}), load_experiment('joint_sine'))

@@ -1,0 +1,61 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Random rigs: within their ranges, reproducible, the first ones whatever the count."""
+
+import numpy as np
+from pam_actuation.tuning.random_rigs import (
+    DEAD_TIME_S, FORCE_MAP_FACTOR, FRICTION_FACTOR, MASS_KG, random_rigs, SUPPLY_FACTOR,
+    VALVE_FACTOR)
+from pam_sim import load_rig
+from pam_sim.units import P_ATM_PA
+import pytest
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_every_number_stays_in_its_range_and_fills_it(valve):
+    nominal = load_rig('dmsp_5_300_realistic', valve=valve)
+    rigs = random_rigs(nominal, 200, seed=1)
+    speed = 'T_m' if valve == 'ppr' else 'C'
+    drawn = {
+        MASS_KG: [rig.parameters['mass_kg'] for rig in rigs],
+        VALVE_FACTOR: [rig.parameters[speed] / nominal.parameters[speed] for rig in rigs],
+        FORCE_MAP_FACTOR: [rig.parameters['force_map_gain'] for rig in rigs],
+        DEAD_TIME_S: [rig.effect('valve_dead_time').parameters['delay_s'] for rig in rigs],
+        FRICTION_FACTOR: [rig.effect('hysteresis').parameters['force_n'] / 0.5 for rig in rigs]}
+    if valve == 'hsv':
+        nominal_gauge = nominal.parameters['supply_pa'] - P_ATM_PA
+        drawn[SUPPLY_FACTOR] = [
+            (rig.parameters['supply_pa'] - P_ATM_PA) / nominal_gauge for rig in rigs]
+    for (lower, upper), values in drawn.items():
+        assert min(values) >= lower and max(values) <= upper
+        assert np.ptp(values) > 0.9 * (upper - lower)
+    assert np.median(drawn[FRICTION_FACTOR]) == pytest.approx(1.0, abs=0.15)
+    assert all(rig.name == nominal.name and rig.valve == valve for rig in rigs)
+    assert all(rig.effect('hysteresis').parameters['width_scale'] == 1.0 for rig in rigs)
+    assert rigs[0].effect('creep') == nominal.effect('creep')
+    assert rigs[0].sensors == nominal.sensors
+
+
+def test_same_seed_same_rigs_and_the_first_ones_do_not_depend_on_the_count():
+    nominal = load_rig('dmsp_5_300_realistic')
+    few, many = random_rigs(nominal, 3, seed=5), random_rigs(nominal, 9, seed=5)
+    assert [rig.to_yaml() for rig in few] == [rig.to_yaml() for rig in many[:3]]
+    assert few[0].to_yaml() != random_rigs(nominal, 1, seed=6)[0].to_yaml()
+    assert nominal.to_yaml() == load_rig('dmsp_5_300_realistic').to_yaml()
+
+
+def test_a_rig_without_dead_time_or_friction_gets_the_first_and_no_friction():
+    rig = random_rigs(load_rig('dmsp_5_300_hanging_mass'), 1)[0]
+    assert [setting.name for setting in rig.effects] == ['valve_dead_time']

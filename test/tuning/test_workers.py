@@ -1,0 +1,82 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where rollouts run: threads and a Dask cluster give the same bits, mistakes one sentence."""
+
+import sys
+
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.tuning.problem import cost_of
+from pam_actuation.tuning.tune import tune
+from pam_actuation.tuning.workers import Workers
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+import pytest
+
+BUDGET = 40
+
+
+@pytest.fixture(scope='module')
+def rig():
+    return load_rig('dmsp_5_300_realistic')
+
+
+def tuned(rig, **where):
+    return tune(rig, load_controller('sofc_untuned', rig), load_experiment('short_sine'),
+                budget=BUDGET, seed=4, **where)
+
+
+def test_same_bytes_with_any_number_of_threads_and_on_a_dask_cluster(rig):
+    distributed = pytest.importorskip(
+        'distributed', reason='Dask is not installed: pip install "pam_actuation[cluster]"')
+    one, two = tuned(rig), tuned(rig, jobs=2)
+    assert one.to_yaml() == two.to_yaml()
+    assert one.history == two.history
+    with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, host='127.0.0.1', dashboard_address=None,
+            worker_dashboard_address=None) as cluster:
+        cluster.wait_for_workers(2, timeout=60)
+        spread = tuned(rig, cluster=cluster.scheduler_address)
+    assert spread.to_yaml() == one.to_yaml()
+    assert spread.history == one.history
+    assert spread.held_out_after == one.held_out_after
+
+
+@pytest.mark.parametrize('address, says', [
+    ('http://somewhere', 'no address of a cluster'),
+    ('tcp://nonsense', 'no Dask scheduler')])
+def test_a_wrong_address_is_named(rig, address, says):
+    if address.startswith('tcp'):
+        pytest.importorskip('distributed')
+    with pytest.raises(InputError, match=says):
+        tuned(rig, cluster=address)
+
+
+@pytest.mark.parametrize('address, library, says', [
+    ('tcp://127.0.0.1:8786', 'dask.distributed', 'needs Dask'),
+    ('ray://127.0.0.1:10001', 'ray', 'needs Ray')])
+def test_a_missing_library_is_named(monkeypatch, address, library, says):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=says):
+        Workers(cluster=address).__enter__()
+
+
+def test_results_keep_the_order_of_the_items():
+    class Square:
+        def cost_mm(self, item):
+            return item * item
+
+    with Workers(jobs=2) as workers:
+        assert workers.map(cost_of, Square(), range(20)) == [i * i for i in range(20)]
