@@ -111,6 +111,7 @@ class _Chain:
         if topic in SENSORS:
             self._sense(time_ns, topic, message)
         elif topic == 'external_force':
+            self.plant.advance_to(message.stamp_ns)     # a force acts from its stamp on
             self.plant.set_external_force(message)
         elif topic in ('reference', 'reference_trajectory'):
             if self.control is not None:
