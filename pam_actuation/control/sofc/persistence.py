@@ -35,6 +35,7 @@ from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
 
 SCHEMA = 2
+VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
 _SHAPES = {
@@ -210,16 +211,25 @@ def check_fit(rules, expected, where):
                 f'{list(other)}', where)
 
 
+def identity_parts(identity):
+    """
+    Return (rig, valve, mode) of a rig identity: ``rig/valve``, or ``rig/valve/mode``.
+
+    The mode of a controller that tracks a contraction is 'contraction'; what is not known is ''.
+    """
+    parts = str(identity or '').split('/')
+    for k in range(len(parts) - 1, 0, -1):
+        if parts[k] in VALVES:
+            return '/'.join(parts[:k]), parts[k], '/'.join(parts[k + 1:]) or 'contraction'
+    return '/'.join(parts), '', ''
+
+
 def _rig_differences(mine, other):
-    """Return in words what differs between two rig identities ``name/valve``."""
-    found = []
-    if mine != other:
-        sides = [(str(one or '').rpartition('/')) for one in (mine, other)]
-        for what, place in (('rig', 0), ('valve', 2)):
-            first, second = (side[place] for side in sides)
-            if first != second:
-                found.append(f'{what} {first or "unknown"} (here {second or "unknown"})')
-    return found
+    """Return in words what differs between two rig identities."""
+    both = zip(('rig', 'valve', 'mode'), identity_parts(mine), identity_parts(other))
+    found = [f'{what} {first or "unknown"} (here {second or "unknown"})'
+             for what, first, second in both if first != second]
+    return found if found or mine == other else [f'rig {mine} (here {other})']
 
 
 def _stated(value):
