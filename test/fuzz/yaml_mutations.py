@@ -47,6 +47,7 @@ from pam_sim.muscle.muscle import read_muscle  # noqa: E402
 SLOWEST_S = 5.0
 MOST_MEMORY_KB = 300_000      # that the process may grow by
 RIG = 'dmsp_5_300_realistic'
+JOINT = 'joint_dmsp_5_300'
 BOMB = ('a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n' + ''.join(
     f'a{k}: &a{k} [{", ".join([f"*a{k - 1}"] * 10)}]\n' for k in range(1, 10)))
 NASTY = (
@@ -79,9 +80,13 @@ sensors: {pressure_noise_pa: 300.0, stamp_jitter_s: 0.0002}
 def sources():
     """Return (name, text, function that loads a path) of every file to start from."""
     rig = load_rig(RIG)
+    joint = load_joint(JOINT)
 
     def controller(path):
         return controller_from_tree(load_yaml(path), rig, str(path.parent))
+
+    def joint_controller(path):
+        return controller_from_tree(load_yaml(path), joint, str(path.parent))
 
     def muscle(path):
         return read_muscle(load_yaml(path))
@@ -93,8 +98,10 @@ def sources():
                          (ROOT / 'pam_sim' / 'muscle' / 'sizes', muscle),
                          (ROOT / 'config' / 'controllers', controller),
                          (ROOT / 'config' / 'experiments', load_experiment)):
-        found += [(path.stem, path.read_text(encoding='utf-8'), load)
-                  for path in sorted(folder.glob('*.yaml'))]
+        for path in sorted(folder.glob('*.yaml')):
+            text = path.read_text(encoding='utf-8')
+            turns_joint = load is controller and 'mode: joint' in text
+            found.append((path.stem, text, joint_controller if turns_joint else load))
     return found
 
 
