@@ -51,7 +51,8 @@ SEED = 3
 TEACHING = ((0.1, 3), (1.0, 30), (0.25, 8), (0.5, 20))      # frequency and cycles, in order
 SETTLED_M = 1e-4
 STEPS, STEP_HOLD_S = 6, 5.0
-DRIVER = {'ppr': {}, 'hsv': {'hsv.dead_time_s': 0.033, 'hsv.gain': 0.2}}
+DRIVER = {'ppr': {}, 'hsv': {
+    'hsv.dead_time_s': 0.036, 'hsv.gain': 0.2, 'hsv.correct': 0.3, 'hsv.correct_rate': 0.08}}
 
 
 @dataclass(frozen=True)
