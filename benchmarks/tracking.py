@@ -64,11 +64,16 @@ class Controller:
     learns: bool = False
 
 
+def preset(name):
+    """Return how to build the preset of a name, tuned for the valve of the rig."""
+    return lambda rig: load_controller(name if rig.valve == 'ppr' else f'{name}_hsv', rig)
+
+
 CONTROLLERS = (
     Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
-    Controller('PID + inverse, as shipped', lambda rig: load_controller('pid', rig)),
-    Controller('PID, as shipped', lambda rig: load_controller('pid_plain', rig)),
-    Controller('LQI, as shipped', lambda rig: load_controller('lqi', rig)),
+    Controller('LQI, tuned', preset('lqi')),
+    Controller('PID + inverse, tuned', preset('pid')),
+    Controller('PID, tuned', preset('pid_plain')),
 )
 
 
