@@ -15,7 +15,8 @@
 """
 How many closed-loop rollouts of 20 s a minute `pam tune` gets through.
 
-Run ``python benchmarks/tuning_speed.py``; about half a minute on a quiet machine. Every rollout
+Run ``OPENBLAS_NUM_THREADS=1 python benchmarks/tuning_speed.py`` (``pam`` sets that by itself);
+about a minute on a quiet machine. Every rollout
 builds a controller with other settings, tracks 0.5 Hz at 200 Hz on the realistic rig at
 1 ms (noise on) and yields a cost, as the search does it, on one thread and on all cores.
 
