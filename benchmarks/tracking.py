@@ -51,7 +51,8 @@ SEED = 3
 TEACHING = ((0.1, 3), (1.0, 30), (0.25, 8), (0.5, 20))      # frequency and cycles, in order
 SETTLED_M = 1e-4
 STEPS, STEP_HOLD_S = 6, 5.0
-DRIVER = {'ppr': {}, 'hsv': {'hsv.dead_time_s': 0.033, 'hsv.gain': 0.2}}
+DRIVER = {'ppr': {}, 'hsv': {
+    'hsv.dead_time_s': 0.036, 'hsv.gain': 0.2, 'hsv.correct': 0.3, 'hsv.correct_rate': 0.08}}
 
 
 @dataclass(frozen=True)
@@ -63,11 +64,16 @@ class Controller:
     learns: bool = False
 
 
+def preset(name):
+    """Return how to build the preset of a name, tuned for the valve of the rig."""
+    return lambda rig: load_controller(name if rig.valve == 'ppr' else f'{name}_hsv', rig)
+
+
 CONTROLLERS = (
     Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
-    Controller('PID + inverse, as shipped', lambda rig: load_controller('pid', rig)),
-    Controller('PID, as shipped', lambda rig: load_controller('pid_plain', rig)),
-    Controller('LQI, as shipped', lambda rig: load_controller('lqi', rig)),
+    Controller('LQI, tuned', preset('lqi')),
+    Controller('PID + inverse, tuned', preset('pid')),
+    Controller('PID, tuned', preset('pid_plain')),
 )
 
 

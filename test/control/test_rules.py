@@ -217,6 +217,58 @@ def test_learning_freezes_on_saturation_slack_valve_and_reference_jump():
     assert values['learning_reason'] == learning.FROZEN_JUMP
 
 
+def test_an_error_out_of_proportion_is_left_to_the_integral():
+    controller = sofc({**QUIET, 'surprise_ratio': 10.0, 'guard_window_s': 1.0})
+    for k in range(1200):
+        phase = 2.0 * np.pi * k / 200
+        r, v = 0.014 - 0.004 * np.cos(phase), 0.004 * np.sin(phase) * 2.0 * np.pi
+        controller.step(r - 5e-5, r, v, r, v)
+    before = controller.rules.motion.copy()
+    values = feed(controller, 20, 5e-3, reference_m=r, rate=v)
+    assert values['window_rms_error_m'] == pytest.approx(5e-5, rel=0.1)
+    assert values['learning_reason'] == learning.FROZEN_SURPRISE
+    assert np.array_equal(before, controller.rules.motion)
+
+
+def test_rules_take_over_what_the_integral_adds_within_a_movement():
+    taught = []
+    for share in (0.0, 0.5):
+        controller = sofc({**QUIET, 'integral_pa_per_m_s': 1e7, 'takeover': share})
+        for k in range(400):
+            phase = 2.0 * np.pi * k / 400
+            r, v = 0.014 - 0.004 * np.cos(phase), 0.004 * np.sin(phase) * np.pi
+            # A measured pressure lets it begin without slewing up from atmosphere.
+            controller.step(r - 1e-4, r, v, r, v, pressure_pa=101325.0 + 2e5 + 1e7 * r)
+        taught.append(controller.rules.motion.max())
+    assert taught[1] > 1.2 * taught[0] > 0.0
+
+
+def test_every_table_describes_itself():
+    controller = sofc()
+    tables = {table.name: table for table in controller.rules.tables()}
+    assert set(tables) == {'feedback', 'feedforward', 'motion'}
+    for name, table in tables.items():
+        assert table.values is getattr(controller.rules, name)
+        assert table.values.shape == tuple(len(a.knots) for a in table.antecedents)
+        assert table.initial.shape == table.fired.shape == table.values.shape
+    assert tables['feedforward'].antecedents[1].knots[-1] == 0.03
+    assert tables['motion'].antecedents[1].knots[0] == pytest.approx(-0.12)
+    assert tables['feedback'].scale == controller.settings['feedback_gain_pa']
+
+
+def test_gaussian_sets_change_the_output_between_the_peaks_only():
+    outputs = {}
+    for form in (0.0, 1.0):
+        controller = sofc({**QUIET, 'membership_form': form, 'proportional_pa_per_m': 0.0})
+        controller.rules.feedback[...] = np.arange(7.0)[None, :, None] ** 2 / 36.0 - 0.5
+        for error in (0.0, 2e-3 / 9.0):
+            controller.pause()
+            values = feed(controller, 40, error, learn=False, pressure_pa=4e5)
+            outputs[form, error] = values['feedback_rules_pa']
+    assert outputs[0.0, 0.0] == pytest.approx(outputs[1.0, 0.0])
+    assert abs(outputs[0.0, 2e-3 / 9.0] - outputs[1.0, 2e-3 / 9.0]) > 20.0
+
+
 def test_output_never_leaves_the_limits_and_the_slew():
     controller = sofc({'slew_pa_per_s': 1e6})
     former = 101325.0
