@@ -166,6 +166,11 @@ def _as_list(thing):
 
 def _loops(rigs, experiments, seed, controller, driver):
     """Return the closed loops of all pairs that can be reached, and how many cannot."""
+    for experiment in experiments:
+        if experiment.domain != 'contraction':
+            raise InputError(
+                f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
+                'be tracked')
     pairs = [(rig, experiment) for rig in rigs for experiment in experiments]
     kept = [pair for pair in pairs if reachable(*pair, controller)]
     if not kept:

@@ -1,0 +1,68 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam tune``: three files, the same bytes whatever the threads, one sentence for mistakes."""
+
+import json
+
+from pam_actuation.cli.main import main
+from pam_actuation.control.config import load_controller
+from pam_sim import load_rig
+import pytest
+
+QUICK = ('tune', '--model', 'dmsp_5_300_realistic', '--controller', 'sofc_untuned',
+         '--experiment', 'short_sine', '--check', 'short_sine', '--rollouts', '30',
+         '--randomise', '1', '--seed', '5', '--json')
+
+
+def test_controller_rules_and_report_are_the_same_bytes_with_any_number_of_threads(
+        tmp_path, capsys):
+    written = []
+    for jobs in ('1', '2'):
+        folder = tmp_path / jobs
+        folder.mkdir()
+        code = main([*QUICK, '--jobs', jobs, '--out', str(folder / 'tuned.yaml')])
+        found = json.loads(capsys.readouterr().out)
+        assert code == (0 if found['improved'] else 1)
+        assert found['improved'] and found['held_out_after_mm'] < found['held_out_before_mm']
+        assert {path.name for path in folder.iterdir()} == {
+            'tuned.yaml', 'tuned_rules.json', 'tuned.html'}
+        written.append([(folder / name).read_bytes() for name in (
+            'tuned.yaml', 'tuned_rules.json')])
+    assert written[0] == written[1]
+    rig = load_rig('dmsp_5_300_realistic')
+    tuned = load_controller(tmp_path / '1' / 'tuned.yaml', rig)
+    assert tuned.rig_name == 'dmsp_5_300_realistic/ppr'
+    assert 'rules: tuned_rules.json' in written[0][0].decode()
+    for name, change in found['changed'].items():
+        assert tuned.settings[name] == change['after']
+
+
+@pytest.mark.parametrize('options, says', [
+    (('--jobs', '0'), '--jobs'),
+    (('--randomise', '-1'), '--randomise'),
+    (('--cluster', 'http://x'), 'no address of a cluster'),
+    (('--experiment', 'pressure_identification'), 'only contraction'),
+    (('--out', '/nowhere/at/all.yaml'), 'does not exist')])
+def test_mistakes_get_one_sentence_and_nothing_is_written(tmp_path, capsys, options, says):
+    out = () if '--out' in options else ('--out', str(tmp_path / 'tuned.yaml'))
+    assert main([*QUICK, *out, *options]) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count('\n') == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_bag_and_model_there_is_nothing_to_tune_on(tmp_path, capsys):
+    assert main(['tune', '--out', str(tmp_path / 'tuned.yaml')]) == 2
+    assert '--model' in capsys.readouterr().err
