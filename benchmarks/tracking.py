@@ -67,6 +67,7 @@ CONTROLLERS = (
     Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
     Controller('PID + inverse, as shipped', lambda rig: load_controller('pid', rig)),
     Controller('PID, as shipped', lambda rig: load_controller('pid_plain', rig)),
+    Controller('LQI, as shipped', lambda rig: load_controller('lqi', rig)),
 )
 
 

@@ -46,11 +46,13 @@ class Problem:
         Settings without a controller (no solution of the Riccati equation) count as lost.
         """
         costs = np.full(len(self.loops), LOST_MM)
+        try:
+            controller = rebuild(self.controller, settings)
+        except InputError:
+            return costs
         for i, loop in enumerate(self.loops):
-            try:
-                controller = rebuild(self.controller, settings)
-            except InputError:
-                break
+            if i and controller.rules is not None:
+                controller = rebuild(self.controller, settings)      # none of what it learned
             log = loop.run_raw(controller)
             costs[i] = tracking_cost_mm(loop.reference_m - log[:, 0], loop.start_tick)
         return costs

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 SMALLEST = 5                    # members differential evolution needs
+MEMBERS = 24                    # fewer settle too early, also with few settings
 _NEAR = 0.12                    # spread of the cloud about the start, in widths of the box
 
 
@@ -38,9 +39,9 @@ class Found:
     reason: str
 
 
-def default_members(dimensions, evaluations):
-    """Return the size of a generation: twice the axes, ten generations at least if possible."""
-    return int(min(max(evaluations // 10, SMALLEST), max(2 * dimensions, 12)))
+def default_members(evaluations):
+    """Return the size of a generation: 24, less where that leaves no ten generations."""
+    return int(min(max(evaluations // 10, SMALLEST), MEMBERS))
 
 
 def minimise(costs_of, start, members, generations, seed, patience=0):

@@ -32,27 +32,33 @@ class Axis:
     whole: bool = False
 
 
+# Those a controller does not have are left out, so that its settings may change.
 SOFC_AXES = (
-    Axis('lead_s', 0.02, 0.2, log=False),
-    Axis('credit_delay_s', 0.02, 0.2, log=False),
-    Axis('credit_spread_s', 0.0, 0.04, log=False),
-    Axis('learning_rate', 0.2, 8.0),
+    Axis('lead_s', 0.0, 0.2, log=False),
+    Axis('valve_lag_s', 0.0, 0.12, log=False),
+    Axis('rate_feedforward_pa_s_per_m', 0.0, 4e5, log=False),
+    Axis('acceleration_feedforward_pa_s2_per_m', 0.0, 8e4, log=False),
+    Axis('credit_delay_s', 0.02, 0.25, log=False),
+    Axis('credit_spread_s', 0.0, 0.06, log=False),
+    Axis('learning_rate', 0.2, 5.0),
     Axis('feedback_learning_per_m_s', 50.0, 6e3),
-    Axis('feedforward_leak_per_m_s', 1.0, 200.0),
-    Axis('proportional_pa_per_m', 1e5, 3e6),
-    Axis('integral_pa_per_m_s', 1e6, 4e7),
-    Axis('derivative_pa_s_per_m', 5e3, 5e5),
+    Axis('feedforward_learning', 0.02, 1.0),
+    Axis('motion_learning', 0.05, 1.5),
+    Axis('feedforward_leak_per_m_s', 0.0, 50.0, log=False),
+    Axis('feedback_gain_pa', 1e2, 2e4),
+    Axis('proportional_pa_per_m', 3e4, 3e6),
+    Axis('integral_pa_per_m_s', 3e5, 4e7),
+    Axis('derivative_pa_s_per_m', 3e3, 5e5),
     Axis('change_filter_s', 0.005, 0.06),
     Axis('direction_blend_m', 2e-4, 5e-3),
-    Axis('index_tau_s', 0.01, 0.3),
-    Axis('feedback_gain_pa', 5e2, 2e4),
+    Axis('index_tau_s', 0.001, 0.3),
     Axis('reference_knots', 13, 61, log=False, whole=True),
 )
 PID_AXES = (
-    Axis('proportional_pa_per_m', 1e5, 1e7),
-    Axis('integral_pa_per_m_s', 1e6, 1e8),
-    Axis('derivative_pa_s_per_m', 5e3, 1e6),
-    Axis('change_filter_s', 0.005, 0.06),
+    Axis('proportional_pa_per_m', 1e5, 3e7),
+    Axis('integral_pa_per_m_s', 1e6, 6e8),
+    Axis('derivative_pa_s_per_m', 1e3, 3e6),
+    Axis('change_filter_s', 0.001, 0.06),
 )
 PID_INVERSE_AXES = PID_AXES + (Axis('lead_s', 0.0, 0.2, log=False),)
 LQI_AXES = (

@@ -202,7 +202,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     held_out : Experiment or list, optional
         Judges the result, with other noise; the training experiments by default.
     population : int, optional
-        Members of a generation; chosen from the axes and the budget by default.
+        Members of a generation; chosen from the budget by default.
     patience : int
         Stop after so many generations without improvement; 0 = never.
     cluster : str, optional
@@ -231,7 +231,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     train, left_out = _loops(rigs, experiments, seed, controller, driver)
     test, _ = _loops(held_out_rigs or rigs, _as_list(held_out or experiments),
                      seed + HELD_OUT_SEED, controller, driver)
-    members = population or default_members(len(axes), budget // len(train))
+    members = population or default_members(budget // len(train))
     generations = budget // (members * len(train))
     if members < SMALLEST or generations < 2:
         raise InputError(

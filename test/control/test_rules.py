@@ -83,7 +83,7 @@ def test_credit_goes_to_the_rules_active_the_delay_ago():
         row = credit.row_of(ring, tick, 0)
         credit.push_feedback(ring, row, tick % 6, 0.1, 0, 0.0, 1.0)
         credit.push_feedforward(ring, row, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
-        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 1.0, 1e5 + tick)
+        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 0.0, 1.0, 1e5 + tick)
         if tick >= 5:
             row = credit.row_of(ring, tick, 5)
             assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6
@@ -137,17 +137,51 @@ QUIET = {'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05, 'start_time_s': 0.0
          'feedback_leak_per_m_s': 0.0}
 
 
+def ramp(controller, start_m, rate, ticks, error_m, learn=True):
+    """Run ticks along a ramp of the reference at a standing error."""
+    for tick in range(ticks):
+        r = start_m + rate * tick * 0.005
+        controller.step(r - error_m, r, rate, r, rate, learn)
+
+
 def test_a_standing_positive_error_raises_the_rules_that_fired():
-    controller = sofc(QUIET)
-    controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
-    feed(controller, 60, 5e-4)
+    controller = sofc({**QUIET, 'pass_time_s': 100.0})
+    controller.step(0.008, 0.008, 0.01, 0.008, 0.01)
+    ramp(controller, 0.008, 0.01, 100, 5e-4)
     assert controller.rules.feedforward[0].max() > 0.0
-    assert not controller.rules.feedforward[1].any()
     moved = np.flatnonzero(controller.rules.feedforward[0])
-    knots = controller.rules.knots_m()[moved]
-    assert np.all(np.abs(knots - 0.01) < 0.00125)
+    knots = controller.rules.tables()[1].antecedents[1].knots[moved]
+    assert np.all((knots > 0.008 - 0.00125) & (knots < 0.013 + 0.00125))
+    positions, rates = np.nonzero(controller.rules.motion)
+    knots = controller.rules.tables()[2].antecedents
+    assert np.all(np.abs(knots[0].knots[positions] - 0.0105) < 0.0045)
+    assert np.all(np.abs(knots[1].knots[rates] - 0.01) < 0.006)
+    assert controller.rules.motion.min() >= 0.0
     assert (controller.rules.feedback >= controller.rules.feedback_initial).all()
-    assert controller.rules.feedback_fired.sum() == pytest.approx(61.0)
+    assert controller.rules.feedback_fired.sum() == pytest.approx(101.0)
+    assert controller.rules.motion_fired.sum() == pytest.approx(101.0)
+
+
+def test_a_pass_teaches_the_same_fast_or_slowly():
+    taught = []
+    for rate in (0.005, 0.02):
+        controller = sofc({**QUIET, 'pass_time_s': 100.0, 'motion_learning': 0.0,
+                           'guard_ratio': 0.0})
+        controller.step(0.004, 0.004, rate, 0.004, rate)
+        ramp(controller, 0.004, rate, round(0.02 / rate / 0.005), 1e-4)
+        taught.append(controller.rules.feedforward[0, 10])
+    assert taught[0] == pytest.approx(taught[1], rel=0.15)
+    # 0.2 of 0.1 mm at 10 kPa/mm, less what the neighbouring knots take.
+    assert taught[0] == pytest.approx(0.2 * 1e-4 * 1e7, rel=0.2)
+
+
+def test_direction_survives_standing_still():
+    controller = sofc({**QUIET, 'direction_blend_m': 1e-3})
+    ramp(controller, 0.008, 0.01, 60, 0.0, learn=False)
+    for _ in range(50):
+        controller.step(0.011, 0.011, 0.0, 0.011, 0.0, False)
+    values = dict(zip(controller.state_names, controller.state_values()))
+    assert values['contracting_share'] == 1.0
 
 
 def test_dead_zone_freeze_and_start_leave_the_rules_alone():

@@ -57,7 +57,7 @@ def test_other_knots_start_untaught_and_equal_ones_keep_the_rules(problem):
     controller = rebuild(problem.controller, {})
     controller.rules.feedforward[0, 2] = 500.0
     assert rebuild(controller, {'learning_rate': 0.5}).rules.feedforward[0, 2] == 500.0
-    assert not rebuild(controller, {'reference_knots': 31.0}).rules.feedforward.any()
+    assert not rebuild(controller, {'reference_knots': 45.0}).rules.feedforward.any()
 
 
 def test_mean_and_initial_rules_change_nothing_they_are_given(problem):

@@ -76,7 +76,7 @@ def test_axes_are_clipped_scaled_and_checked(rig):
     assert np.allclose(point, 1.0)
     assert from_unit(SOFC_AXES, point)['reference_knots'] == 61
     middle = from_unit(PID_INVERSE_AXES, [0.5] * len(PID_INVERSE_AXES))
-    assert middle['proportional_pa_per_m'] == pytest.approx(1e6)
+    assert middle['proportional_pa_per_m'] == pytest.approx(1.732e6, rel=1e-3)
     with pytest.raises(InputError, match='no such setting'):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), axes=(Axis('speed', 1.0, 2.0),))
     with pytest.raises(InputError, match='too small'):

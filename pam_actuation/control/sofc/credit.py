@@ -19,7 +19,10 @@ A pneumatic muscle answers a command after dead time, valve lag and filter
 delay. A ring buffer keeps the firing strengths of the last ticks; the
 performance index of now belongs to the rules of ``delay`` ticks ago, or, when
 the delay is not known well, to those of ``delay - spread .. delay + spread``
-ticks ago with triangular weights that sum to 1.
+ticks ago with triangular weights that sum to 1. Each set of active rules is
+judged once, when all of the indices that belong to it are known: ``delay +
+spread`` ticks later. A spread also keeps fast swings of the error out of the
+rules, without a shift in phase.
 """
 
 from pam_sim.compiled import compiled
@@ -40,7 +43,9 @@ ENTRY_MOTION_PASS = 12    # the same for the motion rules
 ENTRY_CORRECTION = 13     # pressure that mends an index of 1 m there [Pa/m]
 ENTRY_VALID = 14          # 1 = neither saturated nor disturbed when it was active
 ENTRY_OUTPUT = 15         # command [Pa] of that tick
-ENTRY_SIZE = 16
+ENTRY_INDEX = 16          # performance index [m] of that tick, 0 where nothing was learned
+ENTRY_MOVING = 17         # what the integral [Pa] added then beyond its mean
+ENTRY_SIZE = 18
 
 
 def ring_rows(delay, spread, answer=0):
@@ -75,11 +80,13 @@ def push_feedforward(ring, row, k, wk, m, wm, n, wn):
 
 
 @compiled
-def push_outcome(ring, row, a_pass, motion_pass, correction_pa_per_m, valid, output_pa):
+def push_outcome(
+        ring, row, a_pass, motion_pass, correction_pa_per_m, moving_pa, valid, output_pa):
     """Write how far the reference passed the rules, what an error is worth, and the command."""
     ring[row, ENTRY_PASS] = a_pass
     ring[row, ENTRY_MOTION_PASS] = motion_pass
     ring[row, ENTRY_CORRECTION] = correction_pa_per_m
+    ring[row, ENTRY_MOVING] = moving_pa
     ring[row, ENTRY_VALID] = valid
     ring[row, ENTRY_OUTPUT] = output_pa
 
@@ -95,3 +102,16 @@ def kernel_weight(offset, spread):
     """Return the triangular weight of the entry ``offset`` ticks off the credit delay."""
     side = spread + 1
     return (side - abs(offset)) / (side * side)
+
+
+@compiled
+def credited_index(ring, tick, spread):
+    """Return the index [m] that belongs to the rules of ``delay + spread`` ticks ago."""
+    row = row_of(ring, tick, 2 * spread)
+    total = 0.0
+    for offset in range(-spread, spread + 1):
+        total += kernel_weight(offset, spread) * ring[row, ENTRY_INDEX]
+        row += 1
+        if row == ring.shape[0]:
+            row = 0
+    return total

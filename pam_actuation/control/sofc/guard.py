@@ -13,15 +13,19 @@
 # limitations under the License.
 
 """
-Roll-back: back to the last good rules when learning makes things worse.
+How fast to learn: slower once the error no longer falls, and back when it grows.
 
-The squared error is collected over windows of whole movements to and fro. The
-best window so far keeps a copy of the rules. Two windows in a row beyond
-``guard_ratio`` times the best, the second no better than the first, mean that
-learning spoils the rules (after a change of the load the error falls from window
-to window instead): the copy comes back and the learning rate is halved. A new
-best window doubles it again, up to its setting. Movements of another mean speed
-start a new comparison.
+The squared error is collected over windows of whole movements to and fro; windows
+of about the same mean speed are compared with the best one, which keeps a copy of
+the rules.
+
+* A window that is no better anneals the learning rate, so that the noise of single
+  passes averages out; one beyond ``guard_ratio`` times the best brings the full rate
+  back, for then the plant has changed.
+* Two such windows in a row, the second clearly worse than the first, mean that
+  learning itself spoils the rules (after a change of the plant the error falls from
+  window to window): the copy comes back and the full rate is halved until there is a
+  new best. So do five of them that grow slowly; five without growth are the new normal.
 """
 
 import math
@@ -30,7 +34,9 @@ from pam_actuation.control.sofc import layout as at
 from pam_sim.compiled import compiled
 
 _SAME_SPEED = 0.25        # windows whose mean speeds differ by more are not compared
-_BAD_WINDOWS = 2
+_NEW_NORMAL = 5
+_FALLING = 0.97           # error of a window over the best one that still counts as falling
+_GROWING = 1.1            # error of a bad window over the former one that counts as growing
 _STILL_M_PER_S = 1e-4
 _LEAST_FACTOR = 1.0 / 64.0
 
@@ -70,6 +76,14 @@ def _turned(st, rate_m_per_s):
 
 
 @compiled
+def _new_best(st, rms, values, kept):
+    """Take a window as the one to compare with."""
+    st[at.S_BEST] = rms
+    st[at.S_BAD_WINDOWS] = 0.0
+    keep(values, kept)
+
+
+@compiled
 def _judge(par, st, values, kept):
     """Compare a full window with the best one; return whether to roll back."""
     rms = math.sqrt(st[at.S_WINDOW_SQUARES] / st[at.S_WINDOW_TICKS])
@@ -78,22 +92,31 @@ def _judge(par, st, values, kept):
     st[at.S_FORMER] = rms
     best = st[at.S_BEST]
     if best <= 0.0 or abs(speed - st[at.S_BEST_SPEED]) > _SAME_SPEED * st[at.S_BEST_SPEED]:
-        st[at.S_BEST] = rms
         st[at.S_BEST_SPEED] = speed
-        st[at.S_BAD_WINDOWS] = 0.0
-        keep(values, kept)
-        return False
-    if rms <= best:
-        st[at.S_BEST] = rms
-        st[at.S_BAD_WINDOWS] = 0.0
-        st[at.S_RATE_FACTOR] = min(1.0, 2.0 * st[at.S_RATE_FACTOR])
-        keep(values, kept)
+        st[at.S_RATE_FACTOR] = 1.0
+        _new_best(st, rms, values, kept)
         return False
     if rms <= par[at.P_GUARD_RATIO] * best + par[at.P_DEAD_ZONE]:
         st[at.S_BAD_WINDOWS] = 0.0
+        if rms < best:
+            st[at.S_RATE_CEILING] = min(1.0, 2.0 * st[at.S_RATE_CEILING])
+            _new_best(st, rms, values, kept)
+        if rms > _FALLING * best:
+            st[at.S_RATE_FACTOR] = max(
+                par[at.P_ANNEAL_FLOOR], par[at.P_ANNEAL] * st[at.S_RATE_FACTOR])
         return False
+    st[at.S_RATE_FACTOR] = 1.0
     st[at.S_BAD_WINDOWS] += 1.0
-    return st[at.S_BAD_WINDOWS] >= _BAD_WINDOWS and rms >= former
+    if st[at.S_BAD_WINDOWS] <= 1.0:
+        st[at.S_FIRST_BAD] = rms
+        return False
+    if rms > _GROWING * former:
+        return True
+    if st[at.S_BAD_WINDOWS] >= _NEW_NORMAL:
+        if rms > _GROWING * st[at.S_FIRST_BAD]:
+            return True
+        _new_best(st, rms, values, kept)
+    return False
 
 
 @compiled
@@ -121,7 +144,7 @@ def watch(par, st, error_m, rate_m_per_s, values, kept):
     restart_window(st)
     if worse:
         keep(kept, values)
-        st[at.S_RATE_FACTOR] = max(_LEAST_FACTOR, 0.5 * st[at.S_RATE_FACTOR])
+        st[at.S_RATE_CEILING] = max(_LEAST_FACTOR, 0.5 * st[at.S_RATE_CEILING])
         st[at.S_BEST] = 0.0          # the restored rules are judged anew
         st[at.S_BAD_WINDOWS] = 0.0
         st[at.S_ROLLED_BACK] += 1.0

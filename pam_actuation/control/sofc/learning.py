@@ -38,10 +38,11 @@ FROZEN_DEAD_ZONE = 5      # the error is within noise
 FROZEN_SLACK = 6          # the muscle is slack
 FROZEN_VALVE = 7          # the pressure does not follow: supply or valve
 FROZEN_ROLLED_BACK = 8    # learning had made it worse: the rules are those from before
+FROZEN_SURPRISE = 9       # the error is out of proportion: a disturbance, left to the integral
 REASONS = (
     'learning', 'learning is off', 'starting', 'settling after a jump', 'command at a limit',
     'error within the dead zone', 'muscle slack', 'pressure does not follow the command',
-    'rolled back, learning had made it worse')
+    'rolled back, learning had made it worse', 'error out of proportion, a disturbance')
 
 
 @compiled

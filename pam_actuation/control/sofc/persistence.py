@@ -23,13 +23,14 @@ file is used before all of it has been checked.
 
 import hashlib
 import json
+import math
 import os
 
 import numpy as np
 from pam_actuation.control.files import write_atomically
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
-from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
 
@@ -130,7 +131,9 @@ def _checked_scaling(scaling, where):
         raise InputError(f'scaling lacks {", ".join(missing)}', where)
     if not isinstance(scaling['rig'], str):
         raise InputError(f'the rig is {_short(scaling["rig"])}, not a name', where)
-    numbers = {name: value for name, value in scaling.items() if name != 'rig'}
+    _check_tracked({name: scaling[name] for name in TRACKED_SCALING if name in scaling}, where)
+    numbers = {name: value for name, value in scaling.items()
+               if name != 'rig' and name not in TRACKED_SCALING}
     foreign = [_short(name) for name in numbers if name not in SCALING]
     if foreign:
         raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
@@ -138,6 +141,23 @@ def _checked_scaling(scaling, where):
     if scaling['reference_upper_m'] <= scaling['reference_lower_m']:
         raise InputError('reference_upper_m is not larger than reference_lower_m', where)
     return dict(scaling)
+
+
+def _check_tracked(given, where):
+    """Raise InputError unless the rules are of contraction or say all of what they track."""
+    if not given:
+        return
+    missing = [name for name in TRACKED_SCALING if name not in given]
+    if missing:
+        raise InputError(f'scaling lacks {", ".join(missing)}', where)
+    unit, per_m, zero_m = (given[name] for name in TRACKED_SCALING)
+    if unit not in TRACKED_UNITS:
+        raise InputError(f'the tracked unit is {_short(unit)}; allowed: '
+                         f'{", ".join(TRACKED_UNITS)}', where)
+    for name, value in (('tracked_per_m', per_m), ('tracked_zero_m', zero_m)):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) \
+                or not math.isfinite(value) or (name == 'tracked_per_m' and value <= 0.0):
+            raise InputError(f'{name} is {_short(value)}, no usable number', where)
 
 
 def _checked_array(mapping, name, scaling, where):

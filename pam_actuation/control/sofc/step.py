@@ -50,6 +50,7 @@ def _start(par, inverse, values, kept, st, inp):
     st[:] = 0.0
     st[at.S_STARTED] = 1.0
     st[at.S_RATE_FACTOR] = 1.0
+    st[at.S_RATE_CEILING] = 1.0
     st[at.S_SHARE] = 0.5
     st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
     st[at.S_CONTRACTION] = x
@@ -65,6 +66,7 @@ def _start(par, inverse, values, kept, st, inp):
         if x > _LIFTED_M:
             trim = pressure - inverse_pressure_pa(inverse, x)
             st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
+            st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
 
 
 @compiled
@@ -126,51 +128,48 @@ def _reason(par, ring, st, inp, error, limited, lags):
     then = credit.row_of(ring, tick, delay)
     if limited or ring[then, credit.ENTRY_VALID] < 0.5:
         return learning.FROZEN_SATURATED
+    if st[at.S_FORMER] > 0.0 and abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0:
+        return learning.FROZEN_SURPRISE
     if abs(error) <= par[at.P_DEAD_ZONE]:
         return learning.FROZEN_DEAD_ZONE
     return learning.LEARNING
 
 
 @compiled
-def _learn(par, values, initial, ring, st, index):
-    """Modify the rules active one credit delay ago; return the squared norms of the change."""
+def _learn(par, values, initial, ring, st):
+    """Modify the rules whose indices are now all known; return the squares of the changes."""
     tick = int(st[at.S_TICK])
-    delay = int(par[at.P_DELAY])
     spread = int(par[at.P_SPREAD])
-    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR]
-    dose = rate * index * par[at.P_PERIOD]
+    row = credit.row_of(ring, tick, int(par[at.P_DELAY]) + spread)
+    index = credit.credited_index(ring, tick, spread)
+    if index == 0.0 or ring[row, credit.ENTRY_VALID] < 0.5:
+        return 0.0, 0.0, 0.0
+    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
     leak = abs(index) * par[at.P_PERIOD]
-    fb_squares = 0.0
-    ff_squares = 0.0
-    motion_squares = 0.0
-    for offset in range(-spread, spread + 1):
-        row = credit.row_of(ring, tick, delay + offset)
-        if ring[row, credit.ENTRY_VALID] < 0.5:
-            continue
-        weight = credit.kernel_weight(offset, spread)
-        share = ring[row, credit.ENTRY_SHARE]
-        fb_squares += learning.modify_feedback(
-            values[0], initial[0], share,
-            int(ring[row, credit.ENTRY_ERROR_SET]), ring[row, credit.ENTRY_ERROR_DEGREE],
-            int(ring[row, credit.ENTRY_CHANGE_SET]), ring[row, credit.ENTRY_CHANGE_DEGREE],
-            weight * dose * par[at.P_FEEDBACK_LEARNING],
-            weight * leak * par[at.P_FEEDBACK_LEAK],
-            weight * par[at.P_FEEDBACK_STEP_LIMIT])
-        # What the index asks for in pressure, for one pass.
-        wanted = weight * rate * index * ring[row, credit.ENTRY_CORRECTION]
-        ff_squares += learning.modify_feedforward(
-            values[1], initial[1], share,
-            int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
-            wanted * ring[row, credit.ENTRY_PASS] * par[at.P_FEEDFORWARD_LEARNING],
-            weight * leak * par[at.P_FEEDFORWARD_LEAK],
-            weight * par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
-        motion_squares += learning.modify_motion(
-            values[2], initial[2],
-            int(ring[row, credit.ENTRY_MOTION_KNOT]), ring[row, credit.ENTRY_MOTION_KNOT_DEGREE],
-            int(ring[row, credit.ENTRY_RATE_KNOT]), ring[row, credit.ENTRY_RATE_KNOT_DEGREE],
-            wanted * ring[row, credit.ENTRY_MOTION_PASS] * par[at.P_MOTION_LEARNING],
-            weight * leak * par[at.P_FEEDFORWARD_LEAK],
-            weight * par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+    share = ring[row, credit.ENTRY_SHARE]
+    fb_squares = learning.modify_feedback(
+        values[0], initial[0], share,
+        int(ring[row, credit.ENTRY_ERROR_SET]), ring[row, credit.ENTRY_ERROR_DEGREE],
+        int(ring[row, credit.ENTRY_CHANGE_SET]), ring[row, credit.ENTRY_CHANGE_DEGREE],
+        rate * index * par[at.P_PERIOD] * par[at.P_FEEDBACK_LEARNING],
+        leak * par[at.P_FEEDBACK_LEAK], par[at.P_FEEDBACK_STEP_LIMIT])
+    # What the index asks for in pressure, for one pass.
+    wanted_pa = rate * (
+        index * ring[row, credit.ENTRY_CORRECTION]
+        + par[at.P_TAKEOVER] * ring[row, credit.ENTRY_MOVING])
+    ff_squares = learning.modify_feedforward(
+        values[1], initial[1], share,
+        int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
+        wanted_pa * ring[row, credit.ENTRY_PASS] * par[at.P_FEEDFORWARD_LEARNING],
+        leak * par[at.P_FEEDFORWARD_LEAK],
+        par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+    motion_squares = learning.modify_motion(
+        values[2], initial[2],
+        int(ring[row, credit.ENTRY_MOTION_KNOT]), ring[row, credit.ENTRY_MOTION_KNOT_DEGREE],
+        int(ring[row, credit.ENTRY_RATE_KNOT]), ring[row, credit.ENTRY_RATE_KNOT_DEGREE],
+        wanted_pa * ring[row, credit.ENTRY_MOTION_PASS] * par[at.P_MOTION_LEARNING],
+        leak * par[at.P_FEEDFORWARD_LEAK],
+        par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
     return fb_squares, ff_squares, motion_squares
 
 
@@ -294,12 +293,14 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     # Credit memory and rule modification.
     undisturbed = st[at.S_FREEZE_LEFT] <= 0.0 and abs(offset) <= _START_BAND_M
     row = credit.row_of(ring, int(st[at.S_TICK]), 0)
+    mean = st[at.S_INTEGRAL_MEAN]
+    st[at.S_INTEGRAL_MEAN] += period / (par[at.P_TAKEOVER_TIME] + period) * (integral - mean)
     credit.push_feedback(ring, row, i, wi, j, wj, share)
     credit.push_feedforward(ring, row, k, wk, m, wm, n, wn)
     correction = par[at.P_CORRECTION]
     if not correction > 0.0:
         correction = dynamics.slope_pa_per_m(inverse, lead)
-    credit.push_outcome(ring, row, a_pass, motion_pass, correction,
+    credit.push_outcome(ring, row, a_pass, motion_pass, correction, integral - mean,
                         0.0 if limited or not undisturbed else 1.0, command)
     if par[at.P_INDEX_FORM] < 0.5:
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
@@ -309,8 +310,9 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     fb_squares = 0.0
     ff_squares = 0.0
     motion_squares = 0.0
-    if reason == learning.LEARNING:
-        fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st, index)
+    ring[row, credit.ENTRY_INDEX] = index if reason == learning.LEARNING else 0.0
+    if reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE:
+        fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
     _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
     out[at.O_COMMAND] = command
@@ -379,7 +381,7 @@ def _guard(par, values, kept, st, inp, error, reason, out):
         st[at.S_HISTORY] = 1.0        # no credit for rules that are gone
     out[at.O_WINDOW] = st[at.S_FORMER]
     out[at.O_BEST] = st[at.S_BEST]
-    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR]
+    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
     out[at.O_ROLLED_BACK] = st[at.S_ROLLED_BACK]
 
 

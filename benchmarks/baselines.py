@@ -1,0 +1,127 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The baseline controllers, each tuned by the same search with the same budget as any other.
+
+Run ``python benchmarks/baselines.py`` for the table of their errors: sines of +-10 mm about
+14 mm, last of 20 cycles, noise on. ``--tune`` searches the settings anew, from the defaults
+of each controller, and writes the presets of ``config/controllers``.
+"""
+
+import argparse
+
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.files import write_atomically
+from pam_actuation.experiments import load_experiment
+from pam_actuation.resources import config_dir
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.tune import tune
+from pam_sim import load_rig
+from pam_sim.located_yaml import dump_yaml
+
+RIG = 'dmsp_5_300_realistic'
+KINDS = {'pid_plain': 'PID', 'pid': 'PID + inverse, preview', 'lqi': 'LQI'}
+# What a search begins with, beside the defaults.
+STARTS = {'pid_plain': {}, 'pid': {'use_static_inverse': 1, 'lead_s': 0.1}, 'lqi': {}}
+WORDS = {
+    'pid_plain': 'PID with anti-windup and without static inverse: knows nothing of the muscle.',
+    'pid': 'PID with anti-windup on top of the static inverse with preview.',
+    'lqi': 'LQI on a linear model that is identified on the rig when this is loaded.'}
+SOURCE = """#
+# Only what differs from the defaults; every setting with its unit and range is listed in
+# pam_actuation/control/{module}.py. Found by `python benchmarks/baselines.py --tune`: rig
+# {rig}, {valve}, {experiments},
+# {rollouts} rollouts from the defaults, seed {seed}; held-out cost {before:.3f} -> {after:.3f} mm.
+"""
+FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
+SEARCHED = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
+CHECK = 'tuning_check'
+ROLLOUTS, SEED = 3000, 1
+CYCLES = 20
+
+
+def preset(kind, valve):
+    """Return the name of the preset of a kind of baseline for a valve."""
+    return kind if valve == 'ppr' else f'{kind}_{valve}'
+
+
+def baselines():
+    """Return (name, function of a rig that builds the controller) of every baseline."""
+    return [(f'{name}, tuned', lambda rig, kind=kind: load_controller(
+        preset(kind, rig.valve), rig)) for kind, name in KINDS.items()]
+
+
+def sine(frequency_hz):
+    """Return the experiment of one frequency."""
+    return load_experiment(f"""
+name: sine
+segments:
+  - rest: {{duration_s: 1.0}}
+  - ramp: {{to_m: 0.004, duration_s: 2.0}}
+  - hold: {{duration_s: 2.0}}
+  - sine: {{center_m: 0.014, amplitude_m: 0.010, frequency_hz: {frequency_hz}, cycles: {CYCLES}}}
+""")
+
+
+def show_errors(valve):
+    """Print the error of the last cycle per frequency."""
+    rig = load_rig(RIG, valve=valve)
+    loops = [ClosedLoop(rig, sine(frequency), seed=3) for frequency in FREQUENCIES_HZ]
+    print(f'\n### Baselines, {valve}: RMSE of cycle {CYCLES} [mm]\n')
+    print('| controller | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
+    print('|---|' + '---|' * len(FREQUENCIES_HZ))
+    for name, build in baselines():
+        errors = [1e3 * loop.run(build(rig)).cycle_rmse_m()[-1] for loop in loops]
+        print(f'| {name} | ' + ' | '.join(f'{error:.3f}' for error in errors) + ' |', flush=True)
+
+
+def tune_presets(valve, jobs):
+    """Search the settings of every baseline and write the presets."""
+    rig = load_rig(RIG, valve=valve)
+    experiments = [load_experiment(name) for name in SEARCHED]
+    check = [load_experiment(CHECK), *experiments]
+    for kind in KINDS:
+        start = load_controller(dump_yaml({
+            'controller': kind.split('_')[0], 'settings': STARTS[kind]}), rig)
+        result = tune(rig, start, experiments, budget=ROLLOUTS, seed=SEED, jobs=jobs,
+                      held_out=check)
+        settings = {**STARTS[kind], **{
+            axis.name: result.controller.settings[axis.name] for axis in result.axes}}
+        head = f'# {WORDS[kind]}\n' + SOURCE.format(
+            module=start.kind, rig=RIG, valve=valve, experiments=', '.join(SEARCHED),
+            rollouts=result.rollouts, seed=SEED, before=result.held_out_before,
+            after=result.held_out_after)
+        path = config_dir() / 'controllers' / f'{preset(kind, valve)}.yaml'
+        write_atomically(path, head + dump_yaml({
+            'controller': start.kind, 'settings': settings}))
+        print(f'{path}: {result.text()}', flush=True)
+
+
+def main():
+    """Print the tables, or tune."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
+    parser.add_argument('--tune', action='store_true', help='search the presets anew')
+    parser.add_argument('--jobs', type=int, default=-1, help='threads; -1 = one a core')
+    args = parser.parse_args()
+    for valve in args.valve.split(','):
+        if args.tune:
+            tune_presets(valve, args.jobs)
+        else:
+            show_errors(valve)
+
+
+if __name__ == '__main__':
+    main()

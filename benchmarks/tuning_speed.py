@@ -1,0 +1,129 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How many closed-loop rollouts of 20 s a minute `pam tune` gets through.
+
+Run ``python benchmarks/tuning_speed.py``; about half a minute on a quiet machine. Every rollout
+builds a controller with other settings, tracks 0.5 Hz at 200 Hz on the realistic rig at
+1 ms (noise on) and yields a cost, as the search does it, on one thread and on all cores.
+
+Beside it the same loop as one would write it with SciPy: a PID, the nominal rig's three
+differential equations, ``scipy.integrate.solve_ivp`` from one change of the valve signal to
+the next. The force law it calls is the compiled one, everything else is Python.
+"""
+
+import os
+import time
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.problem import cost_of, Problem
+from pam_actuation.tuning.space import default_axes, from_unit
+from pam_actuation.tuning.workers import Workers
+from pam_sim import load_rig
+from pam_sim.muscle.laws.sarosi import tension_n
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from scipy.integrate import solve_ivp
+
+EXPERIMENT = 'tuning_half_hz'
+ROLLOUTS = 200
+REPEATS = 3
+LATENCY_S = 0.003
+
+
+def per_minute(problem, jobs):
+    """Return the rollouts a minute of the best of several runs, each with other settings."""
+    axes = default_axes(problem.controller)
+    points = np.random.default_rng(1).uniform(0.3, 0.7, (ROLLOUTS, len(axes)))
+    settings = [from_unit(axes, point) for point in points]
+    best = 0.0
+    with Workers(jobs) as workers:
+        workers.map(cost_of, problem, settings[:4])
+        for _ in range(REPEATS):
+            began = time.perf_counter()
+            workers.map(cost_of, problem, settings)
+            best = max(best, 60.0 * ROLLOUTS / (time.perf_counter() - began))
+    return best
+
+
+def with_solve_ivp(rig, controller, experiment, rtol=1e-6):
+    """Track with ``solve_ivp`` between changes of the signal; return (contraction [m], s)."""
+    number = rig.parameters
+    law = rig.muscle.law.law.pack()
+    gain, lag, mass = number['K_m'], number['T_m'], number['mass_kg']
+    damping, length_m = number['damping_n_s_per_m'], rig.muscle.length_m
+
+    def slopes(_, state, volts):
+        gauge, x, v = state
+        net = tension_n(gauge, x / length_m, law, 0) - damping * v - mass * GRAVITY_M_PER_S2
+        held = x <= 0.0 and v <= 0.0 and net < 0.0
+        return (gain * volts - gauge) / lag, v, 0.0 if held else net / mass
+
+    period_s = 1.0 / controller.rate_hz
+    ticks = int(round(experiment.duration_s * controller.rate_hz))
+    state, volts, contraction = np.zeros(3), 0.0, np.empty(ticks)
+    controller.pause()
+    began = time.perf_counter()
+    for k in range(ticks):
+        contraction[k] = state[1]
+        wanted = experiment.at(k * period_s)
+        ahead = experiment.at(k * period_s + controller.lead_s)
+        command = controller.step(state[1], *wanted, *ahead, pressure_pa=state[0] + P_ATM_PA)
+        for span_s, signal in ((LATENCY_S, volts), (period_s - LATENCY_S, None)):
+            if signal is None:
+                signal = volts = min(max((command - P_ATM_PA) / gain, 0.0), 6.0)
+            state = solve_ivp(slopes, (0.0, span_s), state, args=(signal,), rtol=rtol,
+                              atol=(1e-1, 1e-9, 1e-7)).y[:, -1]
+    return contraction, time.perf_counter() - began
+
+
+def main():
+    """Print the tables as Markdown."""
+    cores = os.cpu_count()
+    experiment = load_experiment(EXPERIMENT)
+    print(f'### Rollouts of {experiment.duration_s:g} s a minute, realistic rig\n')
+    print(f'| controller | valve | 1 thread | {cores} threads | ms of one core each |')
+    print('|---|---|---|---|---|')
+    for valve in ('ppr', 'hsv'):
+        rig = load_rig('dmsp_5_300_realistic', valve=valve)
+        loop = ClosedLoop(rig, experiment, seed=1)
+        for name in (f'sofc_{valve}', 'pid', 'lqi'):
+            problem = Problem([loop], load_controller(name, rig))
+            one, all_cores = per_minute(problem, 1), per_minute(problem, cores)
+            print(f'| {problem.controller.kind} | {valve} | {one:,.0f} | {all_cores:,.0f} '
+                  f'| {6e4 / one:.2f} |', flush=True)
+
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(sensors={
+        name: 0.0 for name in ('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n')})
+    controller = load_controller('pid', rig)
+    loop = ClosedLoop(rig, experiment, latency_s=LATENCY_S)
+    problem = Problem([loop], controller)
+    own = per_minute(problem, 1)
+    compiled = loop.run(controller).contraction_m
+    contraction, seconds = with_solve_ivp(rig, controller, experiment)
+    away = 1e6 * float(np.max(np.abs(contraction - compiled)))
+    print('\n### The same PID loop on the nominal rig, without noise, one thread\n')
+    print('| who | rollouts a minute | largest difference of the contraction |')
+    print('|---|---|---|')
+    print(f'| pam_actuation | {own:,.0f} | – |')
+    print(f'| scipy.integrate.solve_ivp in a Python loop | {60.0 / seconds:,.1f} '
+          f'| {away:.2f} um |')
+    print(f'\nRatio {own * seconds / 60.0:,.0f}.')
+
+
+if __name__ == '__main__':
+    main()

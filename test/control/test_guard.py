@@ -1,0 +1,139 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The guard over learning: slower at the floor, back when the plant changed, roll-back when worse."""
+
+import numpy as np
+from pam_actuation.control.sofc import guard, layout as at
+import pytest
+from straight_rig import sofc
+
+PERIOD_TICKS = 400         # 2 s to and fro at 200 Hz
+
+
+class Watched:
+    """A guard fed with windows of a chosen error."""
+
+    def __init__(self, **settings):
+        self.controller = sofc(settings)
+        arguments = self.controller.compiled_arguments()
+        self.parameters, self.values, self.kept = arguments[0], arguments[2], arguments[5]
+        self.state = np.zeros(at.STATE_COUNT)
+        self.state[at.S_RATE_FACTOR] = self.state[at.S_RATE_CEILING] = 1.0
+        self.window(1.0)             # up to the first turn the window is not a whole one
+
+    def window(self, error_m, speed=0.02):
+        """Feed one movement to and fro; return whether it was rolled back."""
+        rolled = False
+        for k in range(PERIOD_TICKS):
+            rate = speed if k < PERIOD_TICKS // 2 else -speed
+            rolled |= guard.watch(
+                self.parameters, self.state, error_m, rate, self.values, self.kept)
+        return rolled
+
+    def learn(self, change_pa):
+        """Change a rule as learning would."""
+        self.values[1][0, 3] += change_pa
+
+
+def test_growing_error_brings_the_rules_of_the_best_window_back():
+    watched = Watched()
+    watched.learn(1000.0)
+    for error in (4e-4, 2e-4, 1e-4):
+        assert not watched.window(error)
+    assert not watched.window(1e-4)            # its end is judged with the next turn
+    watched.learn(700.0)
+    assert not any(watched.window(0.8e-4) for _ in range(2))
+    outcome = [watched.window(error) for error in (3e-4, 6e-4, 1.2e-3)]
+    assert any(outcome)
+    assert watched.values[1][0, 3] == pytest.approx(1700.0)
+    assert watched.state[at.S_ROLLED_BACK] == 1.0
+    assert watched.state[at.S_RATE_CEILING] == 0.5
+
+
+def test_error_that_creeps_up_is_rolled_back_too():
+    watched = Watched()
+    for _ in range(3):
+        watched.window(1e-4)
+    watched.learn(500.0)
+    assert any(watched.window(2e-4 * 1.05 ** k) for k in range(8))
+    assert watched.values[1][0, 3] == 0.0
+
+
+def test_a_new_best_window_gives_the_learning_rate_back():
+    watched = Watched()
+    for error in (1e-4, 1e-4, 1e-4, 3e-4, 6e-4, 1.2e-3):
+        watched.window(error)
+    assert watched.state[at.S_RATE_CEILING] == 0.5
+    for error in (4e-4, 3e-4, 2e-4, 1e-4):
+        watched.window(error)
+    assert watched.state[at.S_RATE_CEILING] == 1.0
+
+
+def test_an_error_that_falls_after_a_jump_is_a_changed_plant():
+    watched = Watched()
+    for _ in range(4):
+        watched.window(1e-4)
+    before = watched.state[at.S_RATE_FACTOR]
+    watched.learn(500.0)
+    assert not any(watched.window(error) for error in (2e-3, 1e-3, 5e-4, 3e-4, 2.5e-4))
+    assert watched.values[1][0, 3] == 500.0
+    assert before < 1.0
+    assert watched.state[at.S_RATE_FACTOR] == 1.0
+    for _ in range(6):                         # the new floor is higher and becomes the normal
+        assert not watched.window(2.4e-4)
+    assert watched.state[at.S_BEST] == pytest.approx(2.4e-4)
+
+
+def test_rate_falls_to_its_floor_while_the_error_stays():
+    watched = Watched(anneal=0.5, anneal_floor=0.2)
+    for _ in range(8):
+        watched.window(1e-4)
+    assert watched.state[at.S_RATE_FACTOR] == 0.2
+
+
+def test_another_movement_is_another_comparison():
+    watched = Watched()
+    for _ in range(3):
+        watched.window(1e-4, speed=0.005)
+    assert not any(watched.window(1e-3, speed=0.05) for _ in range(4))
+    assert watched.state[at.S_ROLLED_BACK] == 0.0
+    assert watched.state[at.S_BEST] == pytest.approx(1e-3)
+
+
+def spoiled(guard_ratio):
+    """Learn with a sign that is wrong (correction below zero is not allowed: a mirrored muscle)."""
+    controller = sofc({
+        'guard_ratio': guard_ratio, 'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05,
+        'feedback_gain_pa': 0.0, 'proportional_pa_per_m': 0.0, 'derivative_pa_s_per_m': 0.0,
+        'start_time_s': 0.01, 'motion_learning': 0.0, 'lead_s': 0.0})
+    errors, rolled = [], 0.0
+    for k in range(400 * 25):
+        phase = 2.0 * np.pi * k / 400
+        r, v = 0.014 - 0.008 * np.cos(phase), 0.008 * np.sin(phase) * np.pi
+        values = dict(zip(controller.state_names, controller.state_values()))
+        # The muscle answers the learned rules the wrong way round.
+        error = 5e-5 + 1.5e-7 * values['feedforward_rules_pa']
+        controller.step(r - error, r, v, r, v)
+        errors.append(error)
+        rolled = max(rolled, values['times_rolled_back'])
+    return np.abs(errors).max(), rolled
+
+
+def test_spoiled_rules_are_rolled_back_in_the_running_controller():
+    free, never = spoiled(0.0)
+    guarded, rolled = spoiled(1.5)
+    assert never == 0.0
+    assert rolled >= 1.0
+    assert guarded < 0.5 * free
