@@ -22,8 +22,8 @@ Tracking error of force mode and joint mode on realistic rigs, sensor noise on.
 
 Force: 20 to 80 N at 0.5 Hz, on the isometric load held at 10 mm and on a driven load that
 moves 4 mm about 6 mm at 0.2 Hz, which no reference tells the controller. Joint: 20 degrees to
-either side at 0.5 Hz on the small joint. Printed is the root mean square
-error of the first and of the last of 20 cycles, rules untaught at the start, the worst of the
+either side at 0.5 Hz on the small joint and, bent by 57 degrees, on the knee with the shank of a
+person. Printed is the root mean square error of the first and of the last of 20 cycles, rules untaught at the start, the worst of the
 seeds.
 """
 
@@ -58,11 +58,11 @@ def force(valve, seed, driven):
     return loop.run(load_controller(f'sofc_force_{valve}', rig)).cycle_rmse()
 
 
-def angle(valve, seed):
-    """Return the RMSE [deg] of every cycle."""
-    joint = load_joint('joint_dmsp_5_300_realistic').with_(valve=valve)
-    loop = JointLoop(joint, load_experiment('joint_sine'), seed=seed)
-    result = loop.run(load_controller(f'sofc_joint_{valve}', joint))
+def angle(joint, name, valve, seed):
+    """Return the RMSE [deg] of every cycle; ``name`` is joint or knee."""
+    joint = load_joint(joint).with_(valve=valve)
+    loop = JointLoop(joint, load_experiment(f'{name}_sine'), seed=seed)
+    result = loop.run(load_controller(f'sofc_{name}_{valve}', joint))
     return np.degrees(result.cycle_rmse())
 
 
@@ -70,7 +70,10 @@ def rows(seeds):
     """Yield (name, valve, unit, first and last cycle, the worst of the seeds)."""
     cases = (('force, isometric', 'N', lambda valve, seed: force(valve, seed, False)),
              ('force, driven', 'N', lambda valve, seed: force(valve, seed, True)),
-             ('joint angle', 'deg', angle))
+             ('joint angle', 'deg', lambda valve, seed: angle(
+                 'joint_dmsp_5_300_realistic', 'joint', valve, seed)),
+             ('knee angle', 'deg', lambda valve, seed: angle(
+                 'knee_dmsp_20_300_realistic', 'knee', valve, seed)))
     for name, unit, run in cases:
         for valve in ('ppr', 'hsv'):
             cycles = np.array([run(valve, seed) for seed in seeds])

@@ -106,12 +106,21 @@ def decode(topic, raw):
         values = {
             key: math.nan if offset is None else struct.unpack_from('<d', raw, offset)[0]
             for key, offset in columns.items()}
-        return _FROM_VALUES[short](stamp_ns, values)
+        return from_values(short, stamp_ns, values)
     except (cdr.CdrError, SerdeError, struct.error, ValueError, IndexError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(
             f'{len(raw)} bytes are not a {TOPIC_TYPES[short]}: {error}', topic) from None
+
+
+def from_values(short, stamp_ns, values):
+    """
+    Return the plain message made of a stamp and the SI values that ``value_layout`` names.
+
+    For the topics that ``value_layout`` is for; a value that is missing is NaN.
+    """
+    return _FROM_VALUES[short](stamp_ns, values)
 
 
 def little_endian(topic, raw):

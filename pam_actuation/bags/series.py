@@ -43,7 +43,7 @@ VALUES = {
 _MAX_LAYOUTS = 8
 
 
-def table(short, payloads):
+def table(short, payloads, only=None):
     """
     Return (stamps, values, bad) of the messages of one topic.
 
@@ -53,6 +53,8 @@ def table(short, payloads):
         Short topic name, a key of VALUES.
     payloads : Payloads or list of bytes
         CDR bytes, N messages.
+    only : collection of str, optional
+        Names of the values wanted, of topics with named entries; by default all.
 
     Returns
     -------
@@ -72,9 +74,10 @@ def table(short, payloads):
     for indices, rows in payloads.tables():
         for _ in range(_MAX_LAYOUTS):
             if len(indices):
-                indices, rows = _read_alike(short, indices, rows, stamp_ns, values, bad)
+                indices, rows = _read_alike(short, indices, rows, stamp_ns, values, bad, only)
         for i in range(len(indices)):
-            _read_alike(short, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad)
+            _read_alike(
+                short, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad, only)
     return stamp_ns, values, bad
 
 
@@ -98,7 +101,7 @@ def _payloads(messages):
     return messages if isinstance(messages, Payloads) else Payloads(messages)
 
 
-def _read_alike(short, indices, rows, stamp_ns, values, bad):
+def _read_alike(short, indices, rows, stamp_ns, values, bad, only):
     """Read the messages that have the layout of the first one; return the others."""
     first = rows[0].tobytes()
     try:
@@ -107,6 +110,9 @@ def _read_alike(short, indices, rows, stamp_ns, values, bad):
     except (cdr.CdrError, SerdeError):
         bad[indices[0]] = True
         return indices[1:], rows[1:]
+    if only is not None:
+        wanted = {name: at for name, at in layout.columns.items() if name in only}
+        layout = cdr.Layout(wanted, layout.fixed)
     if raw is not first:
         # Re-encoded from big-endian: its bytes compare with no other's.
         swapped = np.frombuffer(raw, dtype=np.uint8).reshape(1, -1)

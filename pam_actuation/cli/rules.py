@@ -74,12 +74,20 @@ def run(args):
 def _find(args, name):
     """Return the rules an argument names, with a bar while a recording is stepped through."""
     from pam_actuation.rules.source import find_rules
-    from pam_sim import load_rig
     with progress(args, 100, description='rules') as bar:
         def done(share):
             bar.update(round(100 * share) - bar.n)
-        return find_rules(name, lambda: load_rig(args.rig, valve=args.valve), args.namespace,
-                          args.recover, done)
+        return find_rules(
+            name, lambda: _rig(args), args.namespace, args.recover, done)
+
+
+def _rig(args):
+    """Return the rig or joint that the options name."""
+    from pam_sim import load_rig
+    from pam_sim.joint import load_joint
+    from pam_sim.joint.model_file import joint_preset_names
+    load = load_joint if args.rig in joint_preset_names() else load_rig
+    return load(args.rig, valve=args.valve)
 
 
 def _terminal():

@@ -64,17 +64,22 @@ def run(args):
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.control.config import load_controller
+    from pam_actuation.control.modes.tracked import CONTRACTION, tracked_by
     from pam_actuation.report.tuning_page import tuning_report
     from pam_actuation.tuning.random_rigs import random_rigs
     from pam_actuation.tuning.recording import check_recordings
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
     from pam_sim import load_rig
+    from pam_sim.errors import InputError
     stem = _checked(args)
     runs = [load_run(bag) for bag in args.bag]
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
         args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
         rig, rules_file=args.rules)
+    if tracked_by(controller) != CONTRACTION:
+        raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
+                         'contraction can be tuned', 'controller')
     controller.freeze_learning = args.freeze
     experiments, check = _experiments(args, runs)
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]

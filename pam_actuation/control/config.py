@@ -126,6 +126,8 @@ def controller_from_tree(tree, rig=None, folder='.'):
         return controller if mode is None else mode.wrap(controller)
     controller = SelfOrganizingFuzzyController(
         inverse, settings, rig_name=identity, where=where)
+    if mode is not None:
+        controller.rules.scaling.update(mode.rule_scaling())
     if 'rules' in tree and 'initial_rules' in tree:
         raise tree.error('give either `rules` or `initial_rules`, not both', 'rules')
     rules = None

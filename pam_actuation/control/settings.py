@@ -65,11 +65,17 @@ def checked_settings(specification, given, where=None):
         value = given.get(setting.name, setting.default)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError(
-                f'{setting.name} must be a number, not {value!r}', place(setting.name))
+                f'{setting.name} must be a number, not {_short(value)}', place(setting.name))
         # Also refuses what is not finite, and whole numbers beyond all floats.
         if not setting.lower <= value <= setting.upper:
             raise InputError(
-                f'{setting.name} = {value} {setting.unit} is outside '
+                f'{setting.name} = {_short(value)} {setting.unit} is outside '
                 f'{setting.lower:g}...{setting.upper:g} {setting.unit}', place(setting.name))
         values[setting.name] = float(value)
     return values
+
+
+def _short(value):
+    """Return a value of any size as a short piece of one sentence."""
+    text = repr(value)
+    return text if len(text) <= 60 else f'{text[:60]}...'

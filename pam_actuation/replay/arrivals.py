@@ -24,8 +24,8 @@ one it is another process's receive time, near that of the node but not the same
 from typing import NamedTuple
 
 import numpy as np
-from pam_actuation.bags import codecs
-from pam_actuation.bags.load import topics_of
+from pam_actuation.bags import codecs, series
+from pam_actuation.bags.load import is_read, topics_of
 from pam_actuation.bags.source import read_bag
 from pam_sim.errors import InputError
 
@@ -37,6 +37,9 @@ ORDER = (
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000
+# Of many internals of a tick only these matter to anything that is replayed in this order.
+ONLY = {'controller_state': ('learning',)}
+_BLOCK = 8192             # messages made at a time
 
 
 class Arrival(NamedTuple):
@@ -45,6 +48,74 @@ class Arrival(NamedTuple):
     time_ns: int
     topic: str
     message: object
+
+
+class _Topic:
+    """The messages of one topic in the order of arrival, made when they are asked for."""
+
+    def __init__(self, short, topic, by_stamp, path):
+        self.short = short
+        if short == 'reference_trajectory':
+            self._messages = [codecs.decode(short, raw) for raw in topic.payloads]
+            self._columns = {}
+            stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
+        else:
+            self._messages = None
+            stamp_ns, self._columns, bad = series.table(short, topic.payloads, ONLY.get(short))
+            if bad.any():
+                raise InputError(
+                    f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}',
+                    str(path))
+        received_ns = np.asarray(topic.log_time_ns, dtype=np.int64)
+        _check_clocks(stamp_ns, received_ns, topic, path)
+        time_ns = stamp_ns if by_stamp else received_ns
+        self._order = np.argsort(time_ns, kind='stable')
+        self.time_ns = time_ns[self._order]
+        self._stamp_ns = stamp_ns
+
+    def __iter__(self):
+        """Return an iterator over the plain messages."""
+        for begin in range(0, len(self._order), _BLOCK):
+            places = self._order[begin:begin + _BLOCK]
+            if self._messages is not None:
+                yield from (self._messages[i] for i in places.tolist())
+                continue
+            names = tuple(self._columns)
+            columns = [self._columns[name][places].tolist() for name in names]
+            for stamp_ns, *values in zip(self._stamp_ns[places].tolist(), *columns):
+                yield codecs.from_values(self.short, stamp_ns, dict(zip(names, values)))
+
+
+class Arrivals:
+    """
+    The messages of some topics in the order of their arrival; iterating gives ``Arrival``.
+
+    They are read as arrays; a plain message is made when its turn comes, so that an
+    hour takes no more memory than its numbers.
+    """
+
+    def __init__(self, topics):
+        self._topics = topics
+        self.topics = {topic.short for topic in topics if len(topic.time_ns)}
+        rank = {name: place for place, name in enumerate(ORDER)}
+        which = np.repeat(np.arange(len(topics)), [len(topic.time_ns) for topic in topics])
+        ranks = np.array([rank[topic.short] for topic in topics], dtype=np.int64)
+        time_ns = np.concatenate([np.zeros(0, dtype=np.int64)] + [t.time_ns for t in topics])
+        order = np.lexsort((ranks[which], time_ns))
+        self._time_ns, self._which = time_ns[order], which[order]
+
+    def __len__(self):
+        """Return the number of messages."""
+        return len(self._time_ns)
+
+    def __iter__(self):
+        """Return an iterator over the arrivals."""
+        names = [topic.short for topic in self._topics]
+        messages = [iter(topic) for topic in self._topics]
+        for begin in range(0, len(self), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            for time_ns, k in zip(self._time_ns[block].tolist(), self._which[block].tolist()):
+                yield Arrival(time_ns, names[k], next(messages[k]))
 
 
 def arrivals(run, topics, ticks=TICKED):
@@ -61,6 +132,10 @@ def arrivals(run, topics, ticks=TICKED):
         Topics whose messages mark a tick: they are placed at their header stamp, all others
         at their receive time.
 
+    Returns
+    -------
+    Arrivals
+
     Raises
     ------
     InputError
@@ -68,27 +143,22 @@ def arrivals(run, topics, ticks=TICKED):
         receive times come from different clocks.
 
     """
-    bag = read_bag(run.path, recover=True)
+    topics = set(topics)
+    bag = read_bag(run.path, recover=True, wanted=lambda name, *kind: (
+        name.rsplit('/', 1)[-1] in topics and is_read(name, *kind)))
     found = []
     for short, topic in topics_of(bag, run.namespace).items():
-        if short not in topics:
-            continue
-        messages = [codecs.decode(short, raw) for raw in topic.payloads]
-        _check_clocks(messages, topic, run.path)
-        for message, received_ns in zip(messages, topic.log_time_ns):
-            time_ns = message.stamp_ns if short in ticks else int(received_ns)
-            found.append(Arrival(time_ns, short, message))
-    rank = {name: place for place, name in enumerate(ORDER)}
-    found.sort(key=lambda one: (one.time_ns, rank[one.topic]))
-    return found
+        if short in topics:
+            found.append(_Topic(short, topic, short in ticks, run.path))
+        bag.topics.pop(topic.name)            # its bytes are not needed any more
+    return Arrivals(found)
 
 
-def _check_clocks(messages, topic, path):
+def _check_clocks(stamp_ns, received_ns, topic, path):
     """Raise InputError where header stamps are of another clock than the receive times."""
-    if not messages:
+    if not len(stamp_ns):
         return
-    late_ns = np.median(np.array(topic.log_time_ns, dtype=np.int64)
-                        - np.array([m.stamp_ns for m in messages], dtype=np.int64))
+    late_ns = np.median(received_ns - stamp_ns)
     if abs(late_ns) > CLOCKS_AGREE_NS:
         raise InputError(
             f'{topic.name}: header stamps and receive times are {1e-9 * abs(late_ns):.1f} s '

@@ -22,6 +22,7 @@ bit; with another controller it is the experiment as it would have gone with tha
 model.
 """
 
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,8 @@ _UNITS = {'pressure_pa': 'Pa', 'contraction_m': 'm', 'force_n': 'N', 'ppr_voltag
           'fill_duty': '1', 'vent_duty': '1'}
 _FIELD = {'pressure': 'pressure_pa', 'supply_pressure': 'pressure_pa', 'force': 'force_n',
           'contraction': 'contraction_m', 'pressure_command': 'pressure_pa'}
+# Readings of one sample arrive close together; those of older samples are forgotten.
+_SAMPLES = 20_000
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,7 @@ class _Chain:
         if topic in SENSORS:
             self._sense(time_ns, topic, message)
         elif topic == 'external_force':
+            self.plant.advance_to(message.stamp_ns)     # a force acts from its stamp on
             self.plant.set_external_force(message)
         elif topic in ('reference', 'reference_trajectory'):
             if self.control is not None:
@@ -128,6 +132,8 @@ class _Chain:
         if message.stamp_ns not in self.samples:
             self.plant.advance_to(time_ns)
             self.samples[message.stamp_ns] = sample = self.plant.sample(time_ns)
+            if len(self.samples) > _SAMPLES:
+                del self.samples[next(iter(self.samples))]
             self.driver.on_pressure(sample['pressure'])
             if 'supply_pressure' in sample:
                 self.driver.on_supply(sample['supply_pressure'])
@@ -160,7 +166,9 @@ class _Chain:
                        effort)
 
     def _note(self, name, stamp_ns, recorded, replayed):
-        self.rows.setdefault(name, []).append((stamp_ns, recorded, replayed))
+        columns = self.rows.setdefault(name, (array('q'), array('d'), array('d')))
+        for column, value in zip(columns, (stamp_ns, recorded, replayed)):
+            column.append(value)
 
 
 def replay_chain(run, controller=None):
@@ -199,13 +207,9 @@ def replay_chain(run, controller=None):
     for arrival in arrivals(run, ORDER):
         if arrival.topic != 'controller_state' or chain.control is not None:
             chain.take(*arrival)
-    columns = {name: list(zip(*rows)) for name, rows in chain.rows.items()}
-    return ChainReplay(
-        rig.name,
-        {name: np.array(stamps, dtype=np.int64) for name, (stamps, _, _) in columns.items()},
-        {name: np.array(old, dtype=float) for name, (_, old, _) in columns.items()},
-        {name: np.array(new, dtype=float) for name, (_, _, new) in columns.items()},
-        run.start_ns)
+    stamp_ns, recorded, replayed = (
+        {name: np.array(columns[k]) for name, columns in chain.rows.items()} for k in range(3))
+    return ChainReplay(rig.name, stamp_ns, recorded, replayed, run.start_ns)
 
 
 def _controller(run, rig, controller):

@@ -22,6 +22,7 @@ receive time stands in for it, so that near a tick a message may count one tick 
 calls of the services emergency_stop and reset, and the signal that vents when the node stops.
 """
 
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,23 +107,24 @@ def replay_driver(run):
     """
     signals = run.require('valve_signal')
     driver, note = _driver(run, signals)
-    rows = []
+    stamps, told, sent = array('q'), {}, {}
     found = arrivals(run, (*_TAKEN_BY, 'valve_signal'), ticks=('valve_signal',))
-    if not any(one.topic in COMMANDS for one in found):
+    if not found.topics & set(COMMANDS):
         run.require('pressure_command')
     for _, topic, message in found:
         if topic in _TAKEN_BY:
             getattr(driver, _TAKEN_BY[topic])(message)
         else:
             signal, _ = driver.tick(message.stamp_ns)
-            rows.append((message.stamp_ns, dict(zip(message.names, message.efforts)),
-                         dict(zip(signal.names, signal.efforts))))
-    names = [name for name in UNITS if name in rows[0][2]]
+            stamps.append(message.stamp_ns)
+            recorded = dict(zip(message.names, message.efforts))
+            for name, effort in zip(signal.names, signal.efforts):
+                told.setdefault(name, array('d')).append(recorded.get(name, np.nan))
+                sent.setdefault(name, array('d')).append(effort)
+    names = [name for name in UNITS if name in sent]
     return DriverReplay(
-        np.array([stamp for stamp, _, _ in rows], dtype=np.int64),
-        {name: np.array([old.get(name, np.nan) for _, old, _ in rows]) for name in names},
-        {name: np.array([new[name] for _, _, new in rows]) for name in names},
-        note, run.start_ns)
+        np.array(stamps, dtype=np.int64), {name: np.array(told[name]) for name in names},
+        {name: np.array(sent[name]) for name in names}, note, run.start_ns)
 
 
 def _driver(run, signals):

@@ -17,6 +17,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from pam_actuation.control.sofc.persistence import identity_parts
 from pam_actuation.control.sofc.words import ranked
 from pam_actuation.rules.grids import check_comparable, grids
 from pam_sim.errors import InputError
@@ -89,6 +90,10 @@ def view_of(found, against=None):
 
     """
     before, since, remarks = found.before, found.since, []
+    mode = identity_parts(found.rules.scaling.get('rig'))[2]
+    if mode not in ('', 'contraction'):
+        remarks.append(f'What is tracked is not a contraction ({mode}): places, rates and errors '
+                       'are those of the contraction it counts as.')
     if against is not None:
         try:
             check_comparable(found.rules, against.rules)

@@ -21,6 +21,7 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.modes.force_surface import nominal_stiffness_n_per_m
 from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.sofc.words import ranked
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_actuation.messages import (
     Contraction, Force, Pressure, Reference, ReferenceTrajectory)
@@ -100,7 +101,7 @@ def test_rules_of_another_mode_or_stiffness_do_not_fit(rig):
     controller = load_controller(TEXT, rig)
     other = load_controller(TEXT + 'force: {stiffness_n_per_m: 900}\n', rig)
     for rules in (contraction.rules, other.rules):
-        with pytest.raises(InputError, match='learned with rig'):
+        with pytest.raises(InputError, match='learned with .*mode'):
             controller.replace_rules(rules)
 
 
@@ -182,3 +183,30 @@ def test_a_joint_has_no_place_in_the_loop_of_one_muscle():
     controller = load_controller('controller: sofc\nmode: joint\n', load_joint('joint_dmsp_5_300'))
     with pytest.raises(InputError, match='one muscle'):
         ControllerLoop(controller)
+
+
+def test_rules_read_in_newtons(rig):
+    rules = load_controller('sofc_force_ppr', rig).rules
+    reference = rules.tables()[1].antecedents[1]
+    assert reference.unit == 'N' and reference.knots[-1] == pytest.approx(0.08 * 1769.5)
+    rules.motion[5, -1] = 3e3
+    rules.motion_fired[5, -1] = 10.0
+    assert rules.tables()[1].antecedents[0].words == ('rising', 'falling')
+    assert any('N' in one.sentence and 'rising at' in one.sentence for one in ranked(rules))
+
+
+def test_rule_files_keep_what_is_tracked(rig, tmp_path):
+    rules = load_controller('sofc_force_ppr', rig).rules
+    rules.motion[5, 3] = 3e3
+    path = tmp_path / 'rules.json'
+    rules.save(path)
+    again = load_controller('sofc_force_ppr', rig, rules_file=path)
+    assert again.rules.digest() == rules.digest() and again.rules.scaling == rules.scaling
+    for name, value in (('tracked_unit', 'lbf'), ('tracked_per_m', -1.0), ('tracked_zero_m', None)):
+        spoiled = rules.copy()
+        spoiled.scaling[name] = value
+        if value is None:
+            del spoiled.scaling[name]
+        spoiled.save(path)
+        with pytest.raises(InputError, match='tracked'):
+            load_controller('sofc_force_ppr', rig, rules_file=path)

@@ -111,3 +111,9 @@ def test_mistakes_are_refused_with_their_place(joint, text, words):
     with pytest.raises(InputError) as caught:
         load_controller(text, joint)
     assert words in str(caught.value) and 'controller text:' in str(caught.value)
+
+
+def test_rules_read_in_degrees(joint):
+    reference = load_controller(TEXT, joint).rules.tables()[1].antecedents[1]
+    assert reference.unit == 'rad'
+    assert joint.contractions_m(reference.knots[3])[0] == pytest.approx(3 * 0.03 / 24)

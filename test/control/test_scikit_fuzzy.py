@@ -20,6 +20,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.filterwarnings(        # raised inside scikit-fuzzy
+    'ignore:Passing more than 2 positional arguments:DeprecationWarning')
 FOLDER = Path(__file__).resolve().parents[2] / 'benchmarks'
 
 

@@ -38,6 +38,13 @@ segments:
   - hold: {duration_s: 0.5}
 """
 LONG = SHORT.replace('hold: {duration_s: 0.5}', 'hold: {duration_s: 60.0}')
+PULL = """\
+name: pull
+domain: force
+segments:
+  - ramp: {to_n: 30.0, duration_s: 1.0}
+  - hold: {duration_s: 1.0}
+"""
 PRESSURE = """\
 name: pressure
 domain: pressure
@@ -66,6 +73,19 @@ def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
     assert replayed.identical, replayed.max_abs_difference_pa
     volts = run.topics['valve_signal'].values['ppr_voltage']
     assert volts.max() > 1.0 and volts[-1] == 0.0
+
+
+def test_a_force_is_tracked_live_and_replayed_to_the_bit(tmp_path):
+    result = session.run_experiment(
+        PULL, rig='dmsp_5_300_isometric_realistic', out_dir=tmp_path / 'bag', seed=3)
+    assert result.complete and result.findings == [], result
+    run = load_run(result.bag)
+    force, reference = run.topics['force'], run.topics['reference']
+    assert reference.values['force_n'][-1] == 30.0
+    since_s = (force.stamp_ns - reference.stamp_ns[0]) * 1e-9
+    held_n = force.values['force_n'][(since_s > 1.6) & (since_s < 2.0)]
+    assert len(held_n) > 50 and abs(held_n.mean() - 30.0) < 2.0
+    assert replay_controller(run).identical
 
 
 def test_pressure_experiments_need_no_controller(tmp_path):

@@ -21,6 +21,9 @@ import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.source import read_bag
 from pam_actuation.cli.main import main
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.replay.arrivals import arrivals
 from pam_actuation.replay.chain import replay_chain
 from pam_actuation.replay.compare import replay_run
@@ -28,6 +31,7 @@ from pam_actuation.replay.difference import difference
 from pam_actuation.replay.driver import replay_driver
 from pam_actuation.replay.plant import replay_plant
 from pam_actuation.replay.settings import changed_controller
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
 from process_replay import bag_of, CASES
@@ -58,6 +62,28 @@ def test_the_chain_repeats_a_simulated_experiment_to_the_bit(runs, case):
     assert {'pressure.pressure_pa', 'contraction.contraction_m', 'force.force_n',
             'pressure_command.pressure_pa'} < names
     assert len(result.recorded['pressure.pressure_pa']) == len(runs[case].topics['pressure'])
+
+
+DISTURBED = """
+name: disturbed
+domain: contraction
+segments:
+  - ramp: {to_m: 0.012, duration_s: 0.8}
+  - hold: {duration_s: 1.3}
+disturbance:
+  - rest: {duration_s: 1.0}
+  - pulses: {height_n: 8.0, width_s: 0.31, every_s: 0.53, count: 2}
+"""
+
+
+def test_the_chain_repeats_a_disturbed_experiment_to_the_bit(tmp_path):
+    rig = load_rig('dmsp_5_300_hanging_mass')
+    (tmp_path / 'disturbed.yaml').write_text(DISTURBED)
+    simulate_experiment(load_experiment(tmp_path / 'disturbed.yaml'), rig,
+                        load_controller('pid', rig), tmp_path / 'run')
+    run = load_run(tmp_path / 'run')
+    assert run.topics['external_force'].values['force_n'].max() == 8.0
+    assert replay_chain(run).identical
 
 
 @pytest.mark.parametrize('options', [(), ('--chain',), ('--only', 'driver')])
@@ -112,8 +138,8 @@ def test_clocks_that_disagree_are_noted_beside_other_parts_and_refused_alone(
         runs, monkeypatch):
     run = runs['pid_ppr']
 
-    def shifted(path, recover=False):
-        bag = read_bag(path, recover=recover)
+    def shifted(path, **options):
+        bag = read_bag(path, **options)
         for topic in bag.topics.values():
             topic.log_time_ns = [int(t) + 7_000_000_000 for t in topic.log_time_ns]
         return bag

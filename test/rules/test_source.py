@@ -120,6 +120,14 @@ def test_saved_rules_start_another_run(learned, tmp_path):
     assert again.rules.digest() == learned[1].digest()
 
 
+@pytest.mark.parametrize('preset, rig, mode', [
+    ('sofc_force_ppr', RIG, 'force at 1769.5 N/m'),
+    ('sofc_joint_ppr', 'joint_dmsp_5_300', 'joint at 300 kPa')])
+def test_other_modes_say_what_their_places_are(preset, rig, mode, capsys):
+    code, shown, _ = pam(capsys, preset, '--rig', rig)
+    assert code == 0 and f'not a contraction ({mode})' in shown
+
+
 def test_presets_and_controller_files(tmp_path, capsys):
     code, shown, _ = pam(capsys, 'sofc_untuned', '--rig', RIG)
     assert code == 0 and 'No rule has fired yet' in shown

@@ -65,10 +65,12 @@ def test_a_force_is_tracked_while_the_contraction_is_driven(valve):
 
 
 @pytest.mark.parametrize('valve', VALVES)
-def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(valve):
-    joint = load_joint('joint_dmsp_5_300_realistic').with_(valve=valve)
-    controller = load_controller(f'sofc_joint_{valve}', joint)
-    loop = JointLoop(joint, load_experiment('joint_sine'), seed=3)
+@pytest.mark.parametrize('name, limb', [
+    ('joint', 'joint_dmsp_5_300_realistic'), ('knee', 'knee_dmsp_20_300_realistic')])
+def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(name, limb, valve):
+    joint = load_joint(limb).with_(valve=valve)
+    controller = load_controller(f'sofc_{name}_{valve}', joint)
+    loop = JointLoop(joint, load_experiment(f'{name}_sine'), seed=3)
     result = loop.run(controller)
     rmse_deg = np.degrees(result.cycle_rmse())
     assert rmse_deg[-1] < 0.5 and rmse_deg[-1] < 0.7 * rmse_deg[0]
@@ -77,7 +79,7 @@ def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(valve):
     late = commands[:, result.time_s > 10.0].mean(axis=0)
     assert late == pytest.approx(
         np.full(len(late), P_ATM_PA + controller.co_contraction_gauge_pa), abs=1.0)
-    again = loop.run(load_controller(f'sofc_joint_{valve}', joint))
+    again = loop.run(load_controller(f'sofc_{name}_{valve}', joint))
     assert np.array_equal(again.value, result.value)
 
 

@@ -32,7 +32,7 @@ from pam_actuation.control.modes.force_surface import (
     fill_inverse, nominal_stiffness_n_per_m, surface_from_tree, surface_to_mapping,
     tabulate_force_surface)
 from pam_actuation.control.modes.tracked import FORCE
-from pam_actuation.control.modes.wrapped import in_mode, WrappedLaw
+from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 
@@ -267,7 +267,12 @@ class ForceMode:
 
     def blank_inverse(self):
         """Return a table of the right size; every tick fills it."""
-        return np.zeros(2 + int(self.surface[1]))
+        return blank_inverse(int(self.surface[1]))
+
+    def rule_scaling(self):
+        """Return what turns the metres of the rules into newtons, as part of their scaling."""
+        return {'tracked_unit': 'N', 'tracked_per_m': self.stiffness_n_per_m,
+                'tracked_zero_m': 0.0}
 
     def wrap(self, law):
         """Return the law in this mode."""

@@ -30,7 +30,7 @@ from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
-from pam_actuation.control.modes.wrapped import in_mode, WrappedLaw
+from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
@@ -290,7 +290,12 @@ class JointMode:
         if self._joint is None:
             raise InputError('without a joint the text must bring its `static_inverse`',
                              self._where)
-        return np.zeros(2 + NODES)
+        return blank_inverse(NODES)
+
+    def rule_scaling(self):
+        """Return what turns the metres of the rules into radians, as part of their scaling."""
+        return {'tracked_unit': 'rad', 'tracked_per_m': 1.0 / self.values['flexor_radius_m'],
+                'tracked_zero_m': self.values['flexor_contraction_at_zero_m']}
 
     def wrap(self, law):
         """Return the law in this mode, with the static inverse of the joint if it had none."""

@@ -14,6 +14,14 @@
 
 """A control law, which works in metres of contraction, made to track something else."""
 
+import numpy as np
+from pam_sim.units import P_ATM_PA
+
+
+def blank_inverse(nodes):
+    """Return a static inverse of so many nodes that is to be filled: atmosphere everywhere."""
+    return np.concatenate([[0.0, 1.0], np.full(nodes, P_ATM_PA)])
+
 
 def in_mode(rig_name, mode):
     """Return the identity of rules: rig and mode, the mode stated once."""

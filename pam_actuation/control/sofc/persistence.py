@@ -23,17 +23,19 @@ file is used before all of it has been checked.
 
 import hashlib
 import json
+import math
 import os
 
 import numpy as np
 from pam_actuation.control.files import write_atomically
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
-from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
 
 SCHEMA = 2
+VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
 _SHAPES = {
@@ -129,7 +131,9 @@ def _checked_scaling(scaling, where):
         raise InputError(f'scaling lacks {", ".join(missing)}', where)
     if not isinstance(scaling['rig'], str):
         raise InputError(f'the rig is {_short(scaling["rig"])}, not a name', where)
-    numbers = {name: value for name, value in scaling.items() if name != 'rig'}
+    _check_tracked({name: scaling[name] for name in TRACKED_SCALING if name in scaling}, where)
+    numbers = {name: value for name, value in scaling.items()
+               if name != 'rig' and name not in TRACKED_SCALING}
     foreign = [_short(name) for name in numbers if name not in SCALING]
     if foreign:
         raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
@@ -137,6 +141,23 @@ def _checked_scaling(scaling, where):
     if scaling['reference_upper_m'] <= scaling['reference_lower_m']:
         raise InputError('reference_upper_m is not larger than reference_lower_m', where)
     return dict(scaling)
+
+
+def _check_tracked(given, where):
+    """Raise InputError unless the rules are of contraction or say all of what they track."""
+    if not given:
+        return
+    missing = [name for name in TRACKED_SCALING if name not in given]
+    if missing:
+        raise InputError(f'scaling lacks {", ".join(missing)}', where)
+    unit, per_m, zero_m = (given[name] for name in TRACKED_SCALING)
+    if unit not in TRACKED_UNITS:
+        raise InputError(f'the tracked unit is {_short(unit)}; allowed: '
+                         f'{", ".join(TRACKED_UNITS)}', where)
+    for name, value in (('tracked_per_m', per_m), ('tracked_zero_m', zero_m)):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) \
+                or not math.isfinite(value) or (name == 'tracked_per_m' and value <= 0.0):
+            raise InputError(f'{name} is {_short(value)}, no usable number', where)
 
 
 def _checked_array(mapping, name, scaling, where):
@@ -190,16 +211,25 @@ def check_fit(rules, expected, where):
                 f'{list(other)}', where)
 
 
+def identity_parts(identity):
+    """
+    Return (rig, valve, mode) of a rig identity: ``rig/valve``, or ``rig/valve/mode``.
+
+    The mode of a controller that tracks a contraction is 'contraction'; what is not known is ''.
+    """
+    parts = str(identity or '').split('/')
+    for k in range(len(parts) - 1, 0, -1):
+        if parts[k] in VALVES:
+            return '/'.join(parts[:k]), parts[k], '/'.join(parts[k + 1:]) or 'contraction'
+    return '/'.join(parts), '', ''
+
+
 def _rig_differences(mine, other):
-    """Return in words what differs between two rig identities ``name/valve``."""
-    found = []
-    if mine != other:
-        sides = [(str(one or '').rpartition('/')) for one in (mine, other)]
-        for what, place in (('rig', 0), ('valve', 2)):
-            first, second = (side[place] for side in sides)
-            if first != second:
-                found.append(f'{what} {first or "unknown"} (here {second or "unknown"})')
-    return found
+    """Return in words what differs between two rig identities."""
+    both = zip(('rig', 'valve', 'mode'), identity_parts(mine), identity_parts(other))
+    found = [f'{what} {first or "unknown"} (here {second or "unknown"})'
+             for what, first, second in both if first != second]
+    return found if found or mine == other else [f'rig {mine} (here {other})']
 
 
 def _stated(value):

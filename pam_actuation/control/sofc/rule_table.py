@@ -117,6 +117,13 @@ class RuleTable:
     unit: str
 
 
+# Entries of the scaling of rules that track something else than contraction: the unit, how
+# much of it one metre of equivalent contraction is, the metres at its zero.
+TRACKED_SCALING = ('tracked_unit', 'tracked_per_m', 'tracked_zero_m')
+TRACKED_UNITS = ('N', 'rad')
+_WAYS = {'N': ('rising', 'falling'), 'rad': ('flexing', 'extending')}
+
+
 @dataclass
 class RuleBase:
     """
@@ -169,25 +176,29 @@ class RuleBase:
         Whoever lists, draws, saves or compares rules goes through these.
         """
         scaling = self.scaling
-        direction = Antecedent('direction', '', np.arange(2.0), DIRECTIONS)
-        grid = np.linspace(-1.0, 1.0, SET_COUNT)
+        # What is tracked per metre the law counts in, and the metres at its zero.
+        unit, per_m = scaling.get('tracked_unit', 'm'), scaling.get('tracked_per_m', 1.0)
+        zero_m = scaling.get('tracked_zero_m', 0.0)
+        direction = Antecedent('direction', '', np.arange(2.0), _WAYS.get(unit, DIRECTIONS))
+        grid = np.linspace(-1.0, 1.0, SET_COUNT) * per_m
         error = Antecedent(
-            'error', 'm', grid * scaling.get('error_universe_m', 1.0), SET_WORDS)
+            'error', unit, grid * scaling.get('error_universe_m', 1.0), SET_WORDS)
         change = Antecedent(
-            'change of error', 'm/s', grid * scaling.get('change_universe_m_per_s', 1.0),
+            'change of error', f'{unit}/s', grid * scaling.get('change_universe_m_per_s', 1.0),
             SET_WORDS)
         limit_pa = scaling.get('feedforward_limit_pa', np.inf)
-        span = (scaling.get('reference_lower_m', 0.0), scaling.get('reference_upper_m', 1.0))
-        rates = signed_logarithmic_knots(
+        span = [per_m * (scaling.get(name, default) - zero_m) for name, default in (
+            ('reference_lower_m', 0.0), ('reference_upper_m', 1.0))]
+        rates = per_m * signed_logarithmic_knots(
             scaling.get('motion_rate_fine_m_per_s', 1.0),
             scaling.get('motion_rate_upper_m_per_s', 1.0), self.motion.shape[1])
         described = (
             ('feedback', (direction, error, change), 1.0, scaling.get('feedback_gain_pa', 1.0)),
             ('feedforward', (direction, Antecedent(
-                'reference', 'm', np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0),
+                'reference', unit, np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0),
             ('motion', (
-                Antecedent('reference', 'm', np.linspace(*span, self.motion.shape[0])),
-                Antecedent('rate of the reference', 'm/s', rates)), limit_pa, 1.0))
+                Antecedent('reference', unit, np.linspace(*span, self.motion.shape[0])),
+                Antecedent('rate of the reference', f'{unit}/s', rates)), limit_pa, 1.0))
         return tuple(
             RuleTable(name, antecedents, getattr(self, name), getattr(self, name + '_initial'),
                       getattr(self, name + '_fired'), limit, scale, 'Pa')

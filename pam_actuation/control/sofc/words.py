@@ -41,6 +41,7 @@ DIRECTION = 'direction'
 # SI unit -> factor and unit for people.
 SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'm/s': (1e3, 'mm/s'),
          'rad': (180.0 / math.pi, 'deg'), 'rad/s': (180.0 / math.pi, 'deg/s')}
+WAYS = {'m/s': ('contracting', 'extending'), 'rad/s': ('flexing', 'extending')}
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,8 @@ def _near(antecedent, index):
         return f'near {number(value)} {unit}'.rstrip()
     if number(value) == '0':
         return 'at rest'
-    return f'{"contracting" if value > 0 else "extending"} at {number(abs(value))} {unit}'
+    up, down = WAYS.get(antecedent.unit, ('rising', 'falling'))
+    return f'{up if value > 0 else down} at {number(abs(value))} {unit}'
 
 
 def _action(size_kpa):

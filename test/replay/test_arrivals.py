@@ -1,0 +1,122 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Arrivals read as arrays: message by message those that decoding one by one gives."""
+
+import math
+
+import numpy as np
+from pam_actuation import messages
+from pam_actuation.bags import codecs, series
+from pam_actuation.bags.load import load_run, topics_of
+from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.replay.arrivals import Arrival, arrivals, ORDER, TICKED
+from pam_sim.errors import InputError
+from process_replay import bag_of
+import pytest
+
+START_NS = 1_000_000_000_000
+
+
+def one_by_one(run, topics):
+    """Return the arrivals of some topics, each message decoded by itself, sorted as a list."""
+    found = []
+    for short, topic in topics_of(read_bag(run.path), run.namespace).items():
+        for raw, received_ns in zip(topic.payloads, topic.log_time_ns.tolist()):
+            if short in topics:
+                message = codecs.decode(short, raw)
+                time_ns = message.stamp_ns if short in TICKED else received_ns
+                found.append(Arrival(time_ns, short, message))
+    return sorted(found, key=lambda one: (one.time_ns, ORDER.index(one.topic)))
+
+
+def plain(arrival):
+    """Return an arrival as values that compare, internals of a tick left out."""
+    time_ns, topic, message = arrival
+    if topic == 'controller_state':
+        return time_ns, topic, message.stamp_ns, dict(
+            zip(message.names, message.values)).get('learning')
+    return time_ns, topic, repr(message)
+
+
+def write(path, sample):
+    """Write (short name, receive time, message) in this order; return the run."""
+    with BagWriter(path, {'valve': 'ppr'}) as writer:
+        for short in {short for short, _, _ in sample}:
+            writer.add_topic(f'/muscle/{short}', codecs.TOPIC_TYPES[short])
+        for short, time_ns, message in sample:
+            writer.write(f'/muscle/{short}', codecs.encode(short, message), time_ns, time_ns)
+    return load_run(path)
+
+
+def messy(count=300):
+    """Return messages of several topics out of order, doubled, with missing numbers."""
+    random = np.random.default_rng(5)
+    sample = []
+    for i in range(count):
+        stamp_ns = START_NS + i * 4_000_000
+        late_ns = int(random.integers(0, 12)) * 1_000_000
+        missing = math.nan if i % 7 == 0 else 0.01
+        sample += [
+            ('pressure', stamp_ns + late_ns, messages.Pressure(stamp_ns, 1e5 + i)),
+            ('contraction', stamp_ns + late_ns,
+             messages.Contraction(stamp_ns, 0.01 + 1e-5 * i, missing)),
+            ('valve_signal', stamp_ns, messages.ValveSignal(
+                stamp_ns - stamp_ns % 8_000_000, ('ppr_voltage',), (float(i),))),
+            ('controller_state', stamp_ns, messages.ControllerState(
+                stamp_ns, ('tick', 'learning')[:1 + i % 3], (float(i), 0.0)[:1 + i % 3]))]
+        if i % 50 == 0:
+            sample.append(('reference_trajectory', stamp_ns, messages.ReferenceTrajectory(
+                stamp_ns, (0, 20_000_000), (0.01, 0.02), (0.0, 0.1))))
+    return sample
+
+
+def test_messy_arrivals_are_those_of_decoding_one_by_one(tmp_path):
+    run = write(tmp_path / 'run', messy())
+    found, expected = arrivals(run, ORDER), one_by_one(run, ORDER)
+    assert len(found) == len(expected) == 4 * 300 + 6
+    assert found.topics == {'pressure', 'contraction', 'valve_signal', 'controller_state',
+                            'reference_trajectory'}
+    for mine, theirs in zip(found, expected):
+        mine, theirs = plain(mine), plain(theirs)
+        if theirs[1] == 'controller_state' and theirs[3] is None:
+            mine = (*mine[:3], None if math.isnan(mine[3]) else mine[3])
+        assert mine == theirs
+    assert [one.time_ns for one in found] == [one.time_ns for one in found]      # again
+
+
+def test_arrivals_of_a_recording_are_those_of_decoding_one_by_one():
+    run = load_run(bag_of('pid_ppr'))
+    topics = set(ORDER) - {'controller_state'}
+    found = list(map(plain, arrivals(run, topics)))
+    assert found == list(map(plain, one_by_one(run, topics))) and len(found) > 1000
+
+
+def test_a_message_that_is_none_is_refused(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+        for i in range(3):
+            raw = codecs.encode('pressure', messages.Pressure(START_NS + i, 1e5))
+            writer.write('/muscle/pressure', raw[:9] if i == 1 else raw, START_NS, START_NS)
+    with pytest.raises(InputError, match='1 messages are not sensor_msgs/msg/FluidPressure'):
+        arrivals(load_run(tmp_path / 'run'), ORDER)
+
+
+def test_only_the_named_values_are_read():
+    raws = [codecs.encode('controller_state', messages.ControllerState(
+        i, ('tick', 'learning'), (float(i), 1.0))) for i in range(20)]
+    stamp_ns, values, bad = series.table('controller_state', raws, only=('learning', 'other'))
+    assert list(stamp_ns) == list(range(20)) and not bad.any()
+    assert set(values) == {'learning'} and np.all(values['learning'] == 1.0)
