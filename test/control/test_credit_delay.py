@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The credit delay is found in recordings whose delay is known, and refused where there is none."""
+"""The credit delay is found where it is known, and refused where nothing tells it."""
 
 import numpy as np
 from pam_actuation.control.sofc.delay import estimate_credit

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The guard over learning: slower at the floor, back when the plant changed, roll-back when worse."""
+"""The guard over learning: slower at the floor, full for a changed plant, roll-back if worse."""
 
 import numpy as np
 from pam_actuation.control.sofc import guard, layout as at
@@ -113,7 +113,7 @@ def test_another_movement_is_another_comparison():
 
 
 def spoiled(guard_ratio):
-    """Learn with a sign that is wrong (correction below zero is not allowed: a mirrored muscle)."""
+    """Learn on a muscle that answers the wrong way round; return largest error, roll-backs."""
     controller = sofc({
         'guard_ratio': guard_ratio, 'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05,
         'feedback_gain_pa': 0.0, 'proportional_pa_per_m': 0.0, 'derivative_pa_s_per_m': 0.0,

@@ -43,17 +43,22 @@ def test_untaught_rules_learn_a_sine_of_one_hertz_in_twenty_cycles(valve, limit_
     assert np.abs(controller.rules.motion).max() > 1e3
 
 
-def test_a_step_neither_overshoots_nor_swings():
+def test_repeated_steps_settle_without_overshoot():
     rig = load_rig('dmsp_5_300_realistic', valve='ppr')
     controller = load_controller('sofc_ppr', rig)
     ClosedLoop(rig, load_experiment(SINE), seed=3).run(controller)
-    loop = ClosedLoop(rig, load_experiment('step_10mm'), seed=3)
-    for _ in range(3):
-        loop.run(controller)
-    result = loop.run(controller)
-    # The step down: before the one up the rubber still creeps from the start.
-    down = (result.time_s >= 10.0) & (result.time_s < 15.0)
-    error_m = -result.error_m[down]
-    assert error_m.min() > -0.3e-3
-    assert abs(error_m[-200:].mean()) < 0.03e-3
-    assert abs(error_m[120]) < 0.3e-3
+    steps = ''.join(f'  - step: {{to_m: {to_m}, duration_s: 5.0}}\n'
+                    for _ in range(6) for to_m in (0.018, 0.008))
+    result = ClosedLoop(rig, load_experiment(f"""
+name: steps
+segments:
+  - ramp: {{to_m: 0.008, duration_s: 3.0}}
+  - hold: {{duration_s: 2.0}}
+{steps}"""), seed=3).run(controller)
+    for start_s, sign in ((55.0, 1.0), (60.0, -1.0)):
+        inside = (result.time_s >= start_s) & (result.time_s < start_s + 5.0)
+        error_m = sign * result.error_m[inside]
+        assert error_m[0] == pytest.approx(0.01, abs=1e-4)
+        assert error_m.min() > -0.02 * 0.01
+        assert abs(error_m[-200:].mean()) < 0.03e-3
+        assert np.abs(error_m[120:]).max() < 0.15e-3
