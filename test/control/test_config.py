@@ -23,7 +23,7 @@ from straight_rig import StraightRig
 
 @pytest.mark.parametrize('name, kind', [
     ('sofc_ppr', 'sofc'), ('sofc_hsv', 'sofc'), ('sofc_untuned', 'sofc'), ('pid', 'pid'),
-    ('pid_plain', 'pid')])
+    ('pid_plain', 'pid'), ('pid_hsv', 'pid'), ('pid_plain_hsv', 'pid')])
 def test_presets_load(name, kind):
     controller = load_controller(name, StraightRig())
     assert controller.kind == kind

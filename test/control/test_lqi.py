@@ -159,8 +159,8 @@ def test_yaml_keeps_model_and_gains_and_names_mistakes():
         load_controller(dump_yaml(tree))
 
 
-@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
-def test_preset_tracks_on_the_rig_it_identified(valve):
+@pytest.mark.parametrize('valve, preset', [('ppr', 'lqi'), ('hsv', 'lqi_hsv')])
+def test_preset_tracks_on_the_rig_it_identified(valve, preset):
     rig = load_rig('dmsp_5_300_realistic', valve=valve)
     loop = ClosedLoop(rig, load_experiment('sine_half_hz'), seed=2)
-    assert loop.run(load_controller('lqi', rig)).cycle_rmse_m()[-1] < 1.5e-3
+    assert loop.run(load_controller(preset, rig)).cycle_rmse_m()[-1] < 1e-3
