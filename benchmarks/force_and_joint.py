@@ -23,8 +23,8 @@ Tracking error of force mode and joint mode on realistic rigs, sensor noise on.
 Force: 20 to 80 N at 0.5 Hz, on the isometric load held at 10 mm and on a driven load that
 moves 4 mm about 6 mm at 0.2 Hz, which no reference tells the controller. Joint: 20 degrees to
 either side at 0.5 Hz on the small joint and, bent by 57 degrees, on the knee with the shank of a
-person. Printed is the root mean square error of the first and of the last of 20 cycles, rules untaught at the start, the worst of the
-seeds.
+person. Printed is the root mean square error of the first and of the last of 20 cycles, rules
+untaught at the start, the worst of the seeds.
 """
 
 import argparse

@@ -304,7 +304,8 @@ def step_times(preset):
 def main():
     """Print what is compared; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--count', type=int, default=100, help='inferences of scikit-fuzzy in a round')
+    parser.add_argument(
+        '--count', type=int, default=100, help='inferences of scikit-fuzzy in a round')
     args = parser.parse_args()
     print(f'{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}\n')
     print('| whole step: inference, limits, learning | median | 99.9 % | longest | learned in |\n'

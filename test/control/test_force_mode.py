@@ -202,7 +202,8 @@ def test_rule_files_keep_what_is_tracked(rig, tmp_path):
     rules.save(path)
     again = load_controller('sofc_force_ppr', rig, rules_file=path)
     assert again.rules.digest() == rules.digest() and again.rules.scaling == rules.scaling
-    for name, value in (('tracked_unit', 'lbf'), ('tracked_per_m', -1.0), ('tracked_zero_m', None)):
+    for name, value in (
+            ('tracked_unit', 'lbf'), ('tracked_per_m', -1.0), ('tracked_zero_m', None)):
         spoiled = rules.copy()
         spoiled.scaling[name] = value
         if value is None:
