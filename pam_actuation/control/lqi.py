@@ -26,9 +26,9 @@ rules to learn.
 import math
 
 from numba import njit
-import numpy as np
 from pam_actuation.control import inputs as place
 from pam_actuation.control.compiled_entry import source_key
+from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.lqi_gains import (
     M_CONTRACTION, M_DELAY, M_HEAD, M_INTEGRAL_GAIN, M_ORDER, M_PA_PER_M, M_PRESSURE, pack)
 from pam_actuation.control.settings import checked_settings, Setting
@@ -51,7 +51,6 @@ SETTINGS = (
     Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
     Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
-NAMES = tuple(setting.name for setting in SETTINGS)
 STATE_NAMES = (
     'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'feedforward_pa',
     'state_feedback_pa', 'integral_pa', 'unlimited_command_pa', 'saturated_low',
@@ -204,7 +203,7 @@ SOURCES = ('inputs.py', 'lqi_gains.py', 'lqi.py')
 lqi_step = _entry(source_key(*SOURCES))
 
 
-class LqiController:
+class LqiController(FixedLawController):
     """
     LQI controller in the interface of all controllers.
 
@@ -229,67 +228,15 @@ class LqiController:
 
     kind = 'lqi'
     state_names = STATE_NAMES
-    rules = None
-    rules_replaced = 0
 
     def __init__(self, model, settings=None, rig_name='', where=None):
-        self.settings = checked_settings(SETTINGS, settings or {}, where)
-        if model.rate_hz != self.settings['rate_hz']:
+        settings = checked_settings(SETTINGS, settings or {}, where)
+        if model.rate_hz != settings['rate_hz']:
             raise InputError(
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '
-                f'{self.settings["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
+                f'{settings["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
         self.model = model
-        self.rig_name = rig_name
-        self.freeze_learning = False
-        self.parameters = np.array([self.settings[name] for name in NAMES])
-        self.gains = pack(model, self.settings)
-        self._state = np.zeros(S_HEAD + len(model.numerator) + 2 * model.delay_ticks)
-        self._inputs = np.zeros(place.INPUT_COUNT)
-        self._outputs = np.zeros(len(STATE_NAMES))
-        self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
-        self.pause()
-
-    @property
-    def rate_hz(self):
-        """Rate [Hz] at which ``step`` is to be called."""
-        return self.settings['rate_hz']
-
-    @property
-    def lead_s(self):
-        """Preview [s] of the feed-forward."""
-        return self.settings['lead_s']
-
-    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
-        """Run one tick as ``SelfOrganizingFuzzyController.step``; ``learn`` is ignored."""
-        self._inputs[:] = (
-            x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, 0.0, elapsed_s,
-            pressure_pa, force_n)
-        return lqi_step(
-            self.parameters, self.gains, self._state, self._inputs, self._outputs)
-
-    def compiled_arguments(self):
-        """Return the arrays ``lqi_step`` takes, for compiled closed loops."""
-        return self.parameters, self.gains, self._state, self._inputs, self._outputs
-
-    def state_values(self):
-        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return tuple(self._outputs.tolist())
-
-    def learning_reason(self):
-        """Return why nothing is learned."""
-        return 'this controller has no rules'
-
-    def pause(self):
-        """Forget the motion: the next tick starts bumplessly."""
-        self._state[:] = 0.0
-        self._outputs[:] = 0.0
-
-    def reset(self):
-        """Forget the motion."""
-        self.pause()
-
-    def to_yaml(self):
-        """Return YAML text from which ``load_controller`` builds an identical controller."""
-        from pam_actuation.control.config import controller_to_yaml
-        return controller_to_yaml(self)
+        self.gains = pack(model, settings)
+        super().__init__(
+            lqi_step, settings, self.gains,
+            S_HEAD + len(model.numerator) + 2 * model.delay_ticks, rig_name)

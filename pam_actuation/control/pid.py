@@ -26,6 +26,7 @@ from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
 from pam_actuation.control.compiled_entry import source_key
+from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.settings import checked_settings, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.compiled import compiled
@@ -45,7 +46,6 @@ SETTINGS = (
     Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
     Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
-NAMES = tuple(setting.name for setting in SETTINGS)
 
 (P_RATE, P_LEAD, P_INVERSE, P_PROPORTIONAL, P_INTEGRAL, P_DERIVATIVE, P_ANTI_WINDUP_TIME,
  P_CHANGE_FILTER, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
@@ -147,7 +147,7 @@ SOURCES = ('inputs.py', 'static_inverse.py', 'pid.py')
 pid_step = _entry(source_key(*SOURCES))
 
 
-class PidController:
+class PidController(FixedLawController):
     """
     PID controller in the interface of all controllers.
 
@@ -171,62 +171,9 @@ class PidController:
 
     kind = 'pid'
     state_names = STATE_NAMES
-    rules = None
-    rules_replaced = 0
 
     def __init__(self, static_inverse, settings=None, rig_name='', where=None):
-        self.settings = checked_settings(SETTINGS, settings or {}, where)
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self.rig_name = rig_name
-        self.freeze_learning = False
-        self.parameters = np.array([self.settings[name] for name in NAMES])
-        self._state = np.zeros(STATE_COUNT)
-        self._inputs = np.zeros(place.INPUT_COUNT)
-        self._outputs = np.zeros(len(STATE_NAMES))
-        self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
-        self.pause()
-
-    @property
-    def rate_hz(self):
-        """Rate [Hz] at which ``step`` is to be called."""
-        return self.settings['rate_hz']
-
-    @property
-    def lead_s(self):
-        """Preview [s] of the static inverse."""
-        return self.settings['lead_s']
-
-    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
-        """Run one tick as ``SelfOrganizingFuzzyController.step``; ``learn`` is ignored."""
-        self._inputs[:] = (
-            x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, 0.0, elapsed_s,
-            pressure_pa, force_n)
-        return pid_step(
-            self.parameters, self.static_inverse, self._state, self._inputs, self._outputs)
-
-    def compiled_arguments(self):
-        """Return the arrays ``pid_step`` takes, for compiled closed loops."""
-        return self.parameters, self.static_inverse, self._state, self._inputs, self._outputs
-
-    def state_values(self):
-        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return tuple(self._outputs.tolist())
-
-    def learning_reason(self):
-        """Return why nothing is learned."""
-        return 'this controller has no rules'
-
-    def pause(self):
-        """Forget the motion: the next tick starts bumplessly."""
-        self._state[:] = 0.0
-        self._outputs[:] = 0.0
-
-    def reset(self):
-        """Forget the motion."""
-        self.pause()
-
-    def to_yaml(self):
-        """Return YAML text from which ``load_controller`` builds an identical controller."""
-        from pam_actuation.control.config import controller_to_yaml
-        return controller_to_yaml(self)
+        super().__init__(
+            pid_step, checked_settings(SETTINGS, settings or {}, where), self.static_inverse,
+            STATE_COUNT, rig_name)
