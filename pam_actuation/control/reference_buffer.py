@@ -20,7 +20,9 @@ is interpolated (cubic through positions and rates). Rules:
 
 * A trajectory counts while its stamp is at most ``TRAJECTORY_LIFE_S`` old and its end
   has not passed; then its times are absolute and each message replaces the former.
-  Beyond its end the last point goes on with its rate.
+  Beyond its end the last point goes on with its rate. Where it moves faster, by
+  ``JUMP_M_PER_S``, than both its points say, it jumps: the first point goes on until the
+  second one's time, so that the controller sees a jump and not a steep ramp.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, after
   that the position stands still; the preview fades out until ``LOST_S``.
 * After ``LOST_S`` without either the reference is lost: the last position is held with
@@ -32,6 +34,7 @@ from bisect import bisect_right
 import math
 
 TRAJECTORY_LIFE_S = 1.0
+JUMP_M_PER_S = 0.2
 TRUST_S = 0.2
 LOST_S = 0.5
 HOLD_S = 2.0
@@ -156,6 +159,8 @@ class ReferenceBuffer:
         v0, v1 = self._rate(i, None), self._rate(after, None)
         if v0 is None or v1 is None:
             return x0 + (x1 - x0) * part, (x1 - x0) / span_s
+        if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > JUMP_M_PER_S:
+            return x0 + v0 * part * span_s, v0
         a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
         bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)
         slope = ((1.0 - 2.0 * part) * ((1.0 - part) * a + part * b)

@@ -134,6 +134,18 @@ def test_trajectory_is_interpolated_in_absolute_time():
         assert rate == pytest.approx(expected[1], abs=2e-5)
 
 
+def test_a_jump_between_two_points_stays_a_jump_and_a_slow_move_a_move():
+    buffer = ReferenceBuffer()
+    offsets = (0, 20 * MS, 40 * MS)
+    buffer.set_trajectory(
+        ReferenceTrajectory(START, offsets, (0.008, 0.018, 0.018), (0.0, 0.0, 0.0)))
+    assert [buffer.at(START, START + k * MS) for k in (0, 10, 19)] == [(0.008, 0.0)] * 3
+    assert buffer.at(START, START + 20 * MS) == (0.018, 0.0)
+    buffer.set_trajectory(ReferenceTrajectory(START, (0, 500 * MS), (0.008, 0.018), (0.0, 0.0)))
+    position, rate = buffer.at(START, START + 250 * MS)
+    assert position == pytest.approx(0.013) and rate == pytest.approx(0.03)
+
+
 def test_newest_trajectory_replaces_and_beyond_its_end_the_reference_counts():
     buffer = ReferenceBuffer()
     buffer.set_reference(Reference(START + 700 * MS, 0.02, 0.0))
