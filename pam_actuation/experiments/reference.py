@@ -123,13 +123,19 @@ class ReferenceLoop:
         return ValveSignal(now_ns, ('ppr_voltage',), (0.0,))
 
     def trajectory(self, now_ns):
-        """Return the next 0.6 s of the reference as one message."""
+        """
+        Return the next 0.6 s of the reference as one message.
+
+        Its points lie on the grid of the experiment, its stamp is the one before now: a jump
+        has the same time in every message, however late the tick is.
+        """
+        begin_ns = now_ns - (now_ns - self.start_ns) % POINT_NS
         offsets = tuple(k * POINT_NS for k in range(POINTS))
-        points = [self.experiment.at(self.elapsed_s(now_ns + o)) for o in offsets]
+        points = [self.experiment.at(self.elapsed_s(begin_ns + o)) for o in offsets]
         if self._force:
-            return ReferenceTrajectory(now_ns, offsets, force_n=tuple(p[0] for p in points))
+            return ReferenceTrajectory(begin_ns, offsets, force_n=tuple(p[0] for p in points))
         return ReferenceTrajectory(
-            now_ns, offsets, tuple(p[0] for p in points), tuple(p[1] for p in points))
+            begin_ns, offsets, tuple(p[0] for p in points), tuple(p[1] for p in points))
 
 
 def _duty_command(now_ns, duty):

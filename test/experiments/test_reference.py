@@ -39,6 +39,23 @@ def test_trajectory_keeps_the_rules_of_the_wire():
         assert offsets[-1] - offsets[0] >= 500_000_000
 
 
+def test_late_ticks_do_not_move_the_points_of_the_trajectory():
+    loop = ReferenceLoop(load_experiment('step_10mm'))
+    jumps = set()
+    for tick in range(530):
+        late_ns = 7_654_321 * tick % 9_000_000
+        now_ns = T0 + tick * 10_000_000 + late_ns
+        message = loop.tick(now_ns).get('reference_trajectory')
+        if message is not None:
+            times = [message.stamp_ns + o for o in message.time_from_start_ns]
+            assert 0 <= now_ns - message.stamp_ns < 20_000_000
+            assert {(t - T0) % 20_000_000 for t in times} == {0}
+            assert times[-1] - now_ns >= 500_000_000
+            x = message.contraction_m
+            jumps |= {times[k + 1] for k in range(len(x) - 1) if x[k + 1] - x[k] > 5e-3}
+    assert jumps == {T0 + 5_000_000_000}
+
+
 def test_trajectory_announces_the_later_reference():
     _, ticks = run('sine_quarter_hz', 8)
     later = {now: m['reference'].contraction_m for now, m in ticks}
