@@ -34,7 +34,7 @@ from bisect import bisect_right
 import math
 
 TRAJECTORY_LIFE_S = 1.0
-JUMP_M_PER_S = 0.2
+JUMP_M_PER_S = 0.05
 TRUST_S = 0.2
 LOST_S = 0.5
 HOLD_S = 2.0
