@@ -23,9 +23,9 @@ import math
 import numpy as np
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning.force_loop import check_controller, learning_mask
+from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError

@@ -26,12 +26,11 @@ import math
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
@@ -121,8 +120,7 @@ def _entries(key):
     return inputs, outputs
 
 
-SOURCES = ('inputs.py', 'modes/joint_statics.py', 'modes/joint.py')
-_joint_inputs, _joint_outputs = _entries(source_key(*SOURCES))
+_joint_inputs, _joint_outputs = _entries(source_key(joint_inputs, joint_outputs))
 
 
 class JointController(WrappedLaw):
