@@ -123,6 +123,7 @@ setup(
             'sofc_controller = pam_actuation.nodes.sofc_controller:main',
             'pid_controller = pam_actuation.nodes.pid_controller:main',
             'reference_generator = pam_actuation.nodes.reference_generator:main',
+            'hardware_sensors = pam_actuation.nodes.hardware_sensors:main',
             'experiment_recorder = pam_actuation.nodes.experiment_recorder:main',
             'pam = pam_actuation.cli.main:main',
         ],

@@ -13,11 +13,13 @@
 # limitations under the License.
 
 """
-The whole rig: plant, valve driver, controller, reference and recorder.
+The whole rig: plant or real sensors, valve driver, controller, reference and recorder.
 
     ros2 launch pam_actuation rig.launch.py valve:=hsv experiment:=sine_quarter_hz
+    ros2 launch pam_actuation rig.launch.py hardware:=my_rig.yaml
 
-Ends by itself when the experiment is over, and when the driver, the plant or the recorder ends.
+Ends by itself when the experiment is over, and when the driver, the plant, the
+sensors or the recorder ends.
 """
 
 from datetime import datetime
@@ -25,18 +27,23 @@ from datetime import datetime
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import EmitEvent
+from launch.actions import OpaqueFunction
 from launch.actions import RegisterEventHandler
+from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import IfElseSubstitution
 from launch.substitutions import LaunchConfiguration
+from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.resources import find_config
 
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
+HARDWARE_FILE = 'hardware_file'
 
 
 def _arguments():
@@ -49,6 +56,9 @@ def _arguments():
         DeclareLaunchArgument(
             'rig', default_value='dmsp_5_300_realistic',
             description='Rig preset, or path of a model file.'),
+        DeclareLaunchArgument(
+            'hardware', default_value='sim',
+            description='sim, another name in config/hardware, or a parameter file of your own.'),
         DeclareLaunchArgument(
             'controller', default_value='sofc', choices=['sofc', 'pid'],
             description='Self-organizing fuzzy controller or PID.'),
@@ -111,14 +121,21 @@ def generate_launch_description():
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
          'controller': ParameterValue(_controller_name(), value_type=str)},
         condition=IfCondition(LaunchConfiguration('record')))
-    plant = _node('plant_simulator', valve, seed, {'rig': _text('rig')})
-    driver = _node('valve_driver', valve, {'rig': _text('rig')})
+    hardware = LaunchConfiguration('hardware')
+    plant = _node(
+        'plant_simulator', valve, seed, {'rig': _text('rig')},
+        condition=IfCondition(EqualsSubstitution(hardware, 'sim')))
+    sensors = _node(
+        'hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
+        condition=IfCondition(NotEqualsSubstitution(hardware, 'sim')))
+    driver = _node(
+        'valve_driver', valve, {'rig': _text('rig')}, LaunchConfiguration(HARDWARE_FILE))
     reference = _node(
         'reference_generator',
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
          'exit_when_finished': True})
     nodes = [
-        recorder, plant, driver,
+        recorder, plant, sensors, driver,
         _node('sofc_controller', valve, control, learning, condition=chosen('sofc')),
         _node('pid_controller', valve, control, condition=chosen('pid')),
         reference,
@@ -127,8 +144,16 @@ def generate_launch_description():
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
             (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
-            (plant, 'the plant ended'), (recorder, 'the recorder ended'))]
-    return LaunchDescription([*_arguments(), *nodes, *ends])
+            (plant, 'the plant ended'), (sensors, 'the sensors ended'),
+            (recorder, 'the recorder ended'))]
+    return LaunchDescription(
+        [*_arguments(), OpaqueFunction(function=_find_hardware), *nodes, *ends])
+
+
+def _find_hardware(context):
+    """Return the action that notes which parameter file the argument ``hardware`` means."""
+    name = LaunchConfiguration('hardware').perform(context)
+    return [SetLaunchConfiguration(HARDWARE_FILE, str(find_config('hardware', name)))]
 
 
 def _shut_down(reason):

@@ -104,12 +104,12 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class DriverParameter:
-    """One parameter of the driver: name, default, allowed range, meaning."""
+    """One parameter: name, default, allowed range (None: not a number), meaning."""
 
     name: str
-    default: float
-    lower: float
-    upper: float
+    default: object
+    lower: float | None
+    upper: float | None
     description: str
 
 

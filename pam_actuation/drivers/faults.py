@@ -52,6 +52,10 @@ FAULT_TABLE = (
     Fault('over_pressure', 'Over-pressure',
           'one valid reading above 1.05 times the pressure limit plus 10 kPa', VENT, True,
           'service ~/reset, refused while the reading is above the limit; ' + _RAMP),
+    Fault('device_refuses', 'Valve device refuses its signal',
+          'writing to the analog output or the PWM failed (hardware back ends)', VENT, True,
+          'the safe signal is tried again with every tick; service ~/reset, refused while '
+          'that fails; ' + _RAMP),
     Fault('no_command', 'No command yet',
           'no valid pressure_command since start or reset', VENT, False,
           'first valid command, ' + _RAMP),

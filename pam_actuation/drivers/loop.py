@@ -107,6 +107,10 @@ class DriverLoop:
         """Take a measured supply pressure."""
         self.safety.on_supply(message.stamp_ns, message.pressure_pa)
 
+    def on_device(self, problem):
+        """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
+        self.safety.on_device(problem)
+
     def set_command_publishers(self, count):
         """Tell how many publishers of pressure_command the graph shows."""
         self.safety.publishers = count

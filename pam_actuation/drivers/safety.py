@@ -37,7 +37,7 @@ EMERGENCY_STOP = 'emergency_stop'
 
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
 
-LATCHING = ('emergency_stop', 'over_pressure', 'valve_command_interrupted')
+LATCHING = ('emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses')
 
 _NS = 1_000_000_000
 _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause
@@ -124,6 +124,7 @@ class SafetySupervisor:
         self.vents = 0
         self._pending = {name: deque(maxlen=_QUEUE) for name in ('command', 'pressure', 'supply')}
         self._latched = None
+        self._device_problem = ''
         self._seen_command = False
         self._seen_pressure = False
         self._command_problem = ''
@@ -160,15 +161,23 @@ class SafetySupervisor:
         if self._latched is None:
             self._latch('emergency_stop', f'emergency stop: {why}')
 
+    def on_device(self, problem):
+        """Tell how the device took the last signal: a problem latches, '' is all right."""
+        self._device_problem = problem
+        if problem and self._latched is None:
+            self._latch('device_refuses', f'the valve did not take its signal: {problem}')
+
     def reset(self):
         """
         End a latched stop; return (done, sentence).
 
-        Refused while the measured pressure is above the limit. Afterwards the driver
-        waits for a new command.
+        Refused while the measured pressure is above the limit or the device refuses the
+        signal that vents. Afterwards the driver waits for a new command.
         """
         if self._latched is None:
             return True, 'Nothing was latched.'
+        if self._device_problem:
+            return False, f'Not reset: the valve does not take a signal: {self._device_problem}.'
         measured = self.pressure.pressure_pa
         limit = self.limits.max_pressure_gauge_pa
         if math.isfinite(measured) and measured - P_ATM_PA > limit:

@@ -81,6 +81,12 @@ class NodeParameter:
         return descriptor
 
 
+def node_parameters(parameters):
+    """Return node parameters for those of plain classes: name, default, range, description."""
+    return tuple(NodeParameter(one.name, one.default, one.description, one.lower, one.upper)
+                 for one in parameters)
+
+
 def _check_overrides(node, table):
     """Raise InputError on a wrong given value; warn of one no parameter is declared for."""
     for name, override in node._parameter_overrides.items():

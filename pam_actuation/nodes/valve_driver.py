@@ -17,10 +17,16 @@
 import sys
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
+from pam_actuation.hardware.back_ends import open_valve
+from pam_actuation.hardware.back_ends import parameters_of
+from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
+from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from std_srvs.srv import Trigger
@@ -50,18 +56,27 @@ class ValveDriver(ManagedNode):
         NodeParameter(
             'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
             'pressure_command; supervised alike.'),
-        *(NodeParameter(p.name, p.default, p.description, p.lower, p.upper)
-          for p in DRIVER_PARAMETERS),
+        NodeParameter(
+            'backend', 'sim', 'What the valve hangs on: the plant that listens to valve_signal, '
+            'nothing, an analog output, two PWM channels.', choices=tuple(VALVE_OUTPUTS)),
+        *node_parameters((*DRIVER_PARAMETERS, *parameters_of(VALVE_OUTPUTS))),
     )
 
     loop = None
+    output = None
+    _safety_services = ()
 
     def setup(self):
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
         config = self._config()
         _warm_up(DriverLoop(self.value('valve_type'), config))
-        self.loop = DriverLoop(self.value('valve_type'), config)
+        loop = DriverLoop(self.value('valve_type'), config)
+        self.output = open_valve(
+            self.value('backend'), self.value('valve_type'),
+            {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
+            loop.safe_signal(0).efforts)
+        self.loop = loop
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
         self.raw_commands = None
@@ -95,7 +110,16 @@ class ValveDriver(ManagedNode):
         """Take the services back."""
         for service in self._safety_services:
             self.destroy_service(service)
-        self.loop = None
+        if self.output is not None:
+            self.output.close()
+        self.loop = self.output = None
+
+    def diagnostic_values(self):
+        """Add what the valve hangs on and how often it refused its signal."""
+        values = (*super().diagnostic_values(), ('backend', self.value('backend')))
+        if self.output is None:
+            return values
+        return (*values, ('device_failures', self.output.failures))
 
     def start(self):
         """Tick by the clock, and for the PPR also by the command."""
@@ -132,14 +156,23 @@ class ValveDriver(ManagedNode):
             self.loop.on_pressure(from_ros('pressure', message))
         for message, _ in self.supplies.take():
             self.loop.on_supply(from_ros('supply_pressure', message))
-        signal, status = self.loop.tick(self.now_ns())
-        self.send('valve_signal', signal)
+        now_ns = self.now_ns()
+        signal, status = self.loop.tick(now_ns)
+        problem = self.output.send(signal.efforts)
+        self.loop.on_device(problem)
+        self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
         self.diagnostics.update(status.level, status.message, status.values)
 
     def safe_stop(self, why):
-        """Send the signal that vents."""
-        if self.loop is not None:
-            self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
+        """Send the signal that vents, again if the device refuses it."""
+        if self.loop is None:
+            return
+        problem = self.output.vent(TRIES)
+        self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
+        if problem:
+            self.result_code = 1
+            self.get_logger().error(f'the valve did not take the signal that vents: {problem}')
+            self.diagnostics.update(ERROR, f'not vented: {problem}')
 
     def _look_at_graph(self):
         counts = [self.count_publishers(subscription.topic)

@@ -315,11 +315,27 @@ def test_pause_and_clock_set_back():
     assert bench.last(150).state == VENTED
 
 
+def test_a_device_that_refuses_latches_and_reset_waits_for_it():
+    """A write that failed vents until reset, which needs a device that takes signals again."""
+    bench = Bench()
+    bench.run(100)
+    bench.safety.on_device('out_voltage0_raw: cannot write 3000 (Remote I/O error)')
+    decision = bench.last(5)
+    assert decision.state == EMERGENCY_STOP and decision.pressure_pa is None
+    assert decision.fault == 'device_refuses' and 'Remote I/O error' in decision.message
+    done, text = bench.safety.reset()
+    assert not done and 'Remote I/O error' in text
+    bench.safety.on_device('')
+    assert bench.last(100).state == EMERGENCY_STOP
+    assert bench.safety.reset()[0]
+    assert bench.last(50).state == OK
+
+
 def test_fault_table_is_complete():
     """Every key the supervisor uses is a row; the Markdown has every row."""
     text = fault_table_markdown()
     assert len(FAULTS) == len(FAULT_TABLE)
     assert all(fault.title in text for fault in FAULT_TABLE)
     assert {fault.key for fault in FAULT_TABLE if fault.latched} == {
-        'emergency_stop', 'over_pressure', 'valve_command_interrupted'}
+        'emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses'}
     assert text.count('\n') == len(FAULT_TABLE) + 2

@@ -19,8 +19,9 @@ import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
+from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES
+from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES, RosWriter
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 import rclpy
@@ -107,6 +108,28 @@ class LiveRig:
             self.node.destroy_node()
             rclpy.try_shutdown(context=self._context)
         self._lock.release()
+
+
+class Commander:
+    """Publish a constant pressure command at 100 Hz, stamped with the time."""
+
+    def __init__(self, rig, command_pa):
+        self._publisher = rig.publisher('pressure_command')
+        self._writer = RosWriter('pressure_command')
+        self._command_pa = command_pa
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        while not self._ending.wait(0.01):
+            command = Pressure(time.time_ns(), self._command_pa)
+            self._publisher.publish(self._writer.fill(command))
+
+    def end(self):
+        """Fall silent."""
+        self._ending.set()
+        self._thread.join()
 
 
 def wait_for(condition, timeout_s, what):

@@ -15,41 +15,19 @@
 """Test the live driver with a plant: it follows, it stops, its last word is the safe signal."""
 
 import signal
-import threading
 import time
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
-from pam_actuation.messages import Pressure                                 # noqa: E402
-from pam_actuation.nodes.conversions import RosWriter                       # noqa: E402
+from live_rig import Commander, LiveRig, wait_for                           # noqa: E402, I100
 from std_srvs.srv import Trigger                                            # noqa: E402
 
 pytestmark = pytest.mark.ros
 
 SAFE = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 COMMAND_PA = 350_000.0
-
-
-class Commander:
-    """Publish a constant pressure command at 100 Hz, stamped with the time."""
-
-    def __init__(self, rig):
-        self._publisher = rig.publisher('pressure_command')
-        self._writer = RosWriter('pressure_command')
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def _run(self):
-        while not self._ending.wait(0.01):
-            self._publisher.publish(self._writer.fill(Pressure(time.time_ns(), COMMAND_PA)))
-
-    def end(self):
-        self._ending.set()
-        self._thread.join()
 
 
 @pytest.fixture(scope='module', params=['ppr', 'hsv'])
@@ -63,7 +41,7 @@ def rig(valve, tmp_path_factory):
     live.start('plant_simulator', rig='dmsp_5_300_hanging_mass', valve_type=valve)
     live.start('valve_driver', valve_type=valve)
     live.listen()
-    commander = Commander(live)
+    commander = Commander(live, COMMAND_PA)
     yield live
     commander.end()
     live.close()

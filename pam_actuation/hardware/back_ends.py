@@ -1,0 +1,89 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All back ends by name, and how one is opened."""
+
+from pam_actuation.hardware.dummy import DummySensors, DummyValve
+from pam_actuation.hardware.iio_adc import IioAdc
+from pam_actuation.hardware.iio_dac import IioDac
+from pam_actuation.hardware.pwm_sysfs import PwmPair
+from pam_actuation.hardware.sim import SimulatedValve
+from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.hardware.valve_output import GuardedOutput
+from pam_sim.errors import InputError
+
+VALVE_OUTPUTS = {
+    'sim': SimulatedValve, 'dummy': DummyValve, 'iio_dac': IioDac, 'pwm_sysfs': PwmPair}
+SENSOR_INPUTS = {'dummy': DummySensors, 'iio_adc': IioAdc}
+
+
+def parameters_of(back_ends):
+    """Return the parameters of several back ends, each once."""
+    return tuple({parameter.name: parameter for back_end in back_ends.values()
+                  for parameter in back_end.PARAMETERS}.values())
+
+
+def open_valve(name, valve_type, values, config, safe_efforts):
+    """
+    Open the output a valve hangs on; it vents from then on.
+
+    Parameters
+    ----------
+    name : str
+        Key of ``VALVE_OUTPUTS``.
+    valve_type : str
+        ``ppr`` or ``hsv``.
+    values : dict
+        Parameters of the back ends by name.
+    config : DriverConfig
+        What the driver knows of the valve.
+    safe_efforts : tuple of float
+        The signal that vents.
+
+    Raises
+    ------
+    InputError
+        The back end does not drive that valve, or its device is not usable.
+
+    """
+    back_end = VALVE_OUTPUTS[name]
+    if valve_type not in back_end.VALVE_TYPES:
+        fitting = [key for key, one in VALVE_OUTPUTS.items() if valve_type in one.VALVE_TYPES]
+        raise InputError(
+            f'{name} does not drive a valve of type {valve_type}, choose '
+            f'{" or ".join(fitting)}', 'parameter backend')
+    device = back_end(values, config)
+    _tell(device.open)
+    return GuardedOutput(device, safe_efforts)
+
+
+def open_sensors(name, values):
+    """
+    Return the sensors of a back end, a key of ``SENSOR_INPUTS``.
+
+    Raises
+    ------
+    InputError
+        A device is not usable.
+
+    """
+    return _tell(lambda: SENSOR_INPUTS[name](values))
+
+
+def _tell(action):
+    """Return what an action returns; a device that is not usable is a mistake of the user."""
+    try:
+        return action()
+    except DeviceError as error:
+        raise InputError(error.problem, error.where) from None

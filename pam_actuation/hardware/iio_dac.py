@@ -1,0 +1,74 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A proportional regulator on an analog output of Linux (IIO): volts to raw values."""
+
+from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.hardware import sysfs
+from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
+from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.hardware.valve_output import ValveOutput
+
+
+class IioDac(ValveOutput):
+    """Drive the set-point input of a regulator; 0 V vents."""
+
+    VALVE_TYPES = ('ppr',)
+    PARAMETERS = (
+        SYSFS_ROOT,
+        DriverParameter('dac.device', '', None, None,
+                        'analog output: its folder, such as iio:device0, or its name'),
+        DriverParameter('dac.channel', 0, 0, 255, 'channel of the analog output'),
+        DriverParameter('dac.amplification', 1.0, 0.01, 100.0,
+                        'volts at the regulator per volt of the analog output'),
+    )
+
+    def open(self):
+        """Find the channel, check that it reaches the regulator's range, vent."""
+        self._voltage = IioVoltage(
+            self.values['sysfs_root'], self.values['dac.device'], 'out',
+            self.values['dac.channel'], 'dac.device')
+        self._check_range()
+        self.vent()
+        power_down = self._voltage.attribute('powerdown')
+        if power_down is not None:
+            sysfs.write(power_down, 0)       # many converters start without power
+
+    def _check_range(self):
+        available = self._voltage.attribute('raw_available')
+        if available is None:
+            return
+        text = sysfs.read_text(available)
+        try:
+            lowest, _, highest = (float(part) for part in text.strip('[]').split())
+        except ValueError:
+            raise DeviceError(f'{text[:40]!r} is not a range [lowest step highest]',
+                              available) from None
+        for volts in (0.0, self.config.ppr.highest_v):
+            raw = self._raw(volts)
+            if not lowest <= raw <= highest:
+                raise DeviceError(
+                    f'{volts:g} V at the regulator are the raw value {raw}, the converter has '
+                    f'{lowest:.0f} to {highest:.0f}', self._voltage.raw_path)
+
+    def _raw(self, volts):
+        return self._voltage.raw(volts / self.values['dac.amplification'])
+
+    def write(self, efforts):
+        """Send the volts."""
+        sysfs.write(self._voltage.raw_path, self._raw(efforts[0]))
+
+    def vent(self):
+        """Send 0 V."""
+        self.write((0.0,))

@@ -1,0 +1,130 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A pair of on/off valves on two PWM channels of Linux (/sys/class/pwm)."""
+
+from pathlib import Path
+import time
+
+from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.hardware import sysfs
+from pam_actuation.hardware.iio import SYSFS_ROOT
+from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.hardware.valve_output import check_one_open, ValveOutput
+
+EXPORT_WAIT_S = 1.0     # until the kernel shows a channel and udev hands it over
+NS_PER_S = 1e9
+
+
+class PwmChannel:
+    """
+    One channel of a PWM chip, exported and running.
+
+    Parameters
+    ----------
+    chip : Path
+        Folder of the chip.
+    number : int
+        Channel of the chip.
+    inverted : bool
+        The valve is open without current: the channel is high while it is to be shut.
+
+    """
+
+    def __init__(self, chip, number, inverted=False):
+        self._chip = chip
+        self._number = number
+        self._inverted = inverted
+        self.folder = chip / f'pwm{number}'
+        self._period_ns = 0
+
+    def export(self):
+        """Ask the kernel for the channel; DeviceError if it does not come."""
+        channels = round(sysfs.read_number(self._chip / 'npwm'))
+        if self._number >= channels:
+            raise DeviceError(
+                f'there is no channel {self._number}, the chip has {channels}', self._chip)
+        if not self.folder.is_dir():
+            sysfs.write(self._chip / 'export', self._number)
+        deadline = time.monotonic() + EXPORT_WAIT_S
+        while not (self.folder / 'enable').exists():
+            if time.monotonic() > deadline:
+                raise DeviceError(f'channel {self._number} did not appear', self.folder)
+            time.sleep(0.01)
+
+    def start(self, period_ns, opening):
+        """Run with a period [ns] and a mean opening of the valve of 0..1."""
+        polarity = self.folder / 'polarity'
+        if polarity.exists() and sysfs.read_text(polarity) != 'normal':
+            sysfs.write(self.folder / 'enable', 0)      # else the kernel refuses the change
+            sysfs.write(polarity, 'normal')
+        if sysfs.read_number(self.folder / 'duty_cycle') > 0:
+            sysfs.write(self.folder / 'duty_cycle', 0)  # the period must not fall below it
+        sysfs.write(self.folder / 'period', period_ns)
+        self._period_ns = period_ns
+        self.set(opening)
+        sysfs.write(self.folder / 'enable', 1)
+
+    def set(self, opening):
+        """Set the mean opening of the valve, 0..1, from the next period on."""
+        share = min(max(opening, 0.0), 1.0)
+        share = 1.0 - share if self._inverted else share
+        sysfs.write(self.folder / 'duty_cycle', round(share * self._period_ns))
+
+
+class PwmPair(ValveOutput):
+    """Drive filling and venting valve; what shuts is written before what opens."""
+
+    VALVE_TYPES = ('hsv',)
+    PARAMETERS = (
+        SYSFS_ROOT,
+        DriverParameter('pwm.chip', 'pwmchip0', None, None, 'PWM chip of both valves'),
+        DriverParameter('pwm.fill_channel', 0, 0, 255, 'channel of the filling valve'),
+        DriverParameter('pwm.vent_channel', 1, 0, 255, 'channel of the venting valve'),
+        DriverParameter('pwm.vent_normally_open', False, None, None,
+                        'whether the venting valve is open without current'),
+    )
+
+    def open(self):
+        """Find and start both channels, venting."""
+        values = self.values
+        if values['pwm.fill_channel'] == values['pwm.vent_channel']:
+            raise DeviceError(
+                f'channel {values["pwm.vent_channel"]} drives the filling valve already',
+                'parameter pwm.vent_channel')
+        chip = sysfs.find_device(
+            Path(values['sysfs_root']) / 'class/pwm', values['pwm.chip'], 'pwm.chip')
+        self._fill = PwmChannel(chip, values['pwm.fill_channel'])
+        self._vent = PwmChannel(
+            chip, values['pwm.vent_channel'], values['pwm.vent_normally_open'])
+        for channel in (self._fill, self._vent):
+            channel.export()
+        period_ns = round(self.config.hsv.period_s * NS_PER_S)
+        self._fill.start(period_ns, 0.0)
+        self._vent.start(period_ns, 1.0)
+
+    def write(self, efforts):
+        """Send both duties, the one that shuts first."""
+        fill, vent = efforts
+        check_one_open(fill, vent)
+        order = ((self._fill, fill), (self._vent, vent))
+        for channel, opening in order if vent > 0.0 else reversed(order):
+            channel.set(opening)
+
+    def vent(self):
+        """Shut the filling valve and open the venting one, the second even if the first fails."""
+        try:
+            self._fill.set(0.0)
+        finally:
+            self._vent.set(1.0)

@@ -1,0 +1,152 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The interface of all valve outputs, and the guard that vents when one refuses.
+
+A back end is a class made from ``ValveOutput``. The valve driver speaks to it
+through ``GuardedOutput`` only.
+"""
+
+import time
+import weakref
+
+from pam_actuation.hardware.sysfs import DeviceError
+
+TRIES = 3              # to vent, on the way out
+BETWEEN_TRIES_S = 0.01
+
+
+class ValveOutput:
+    """
+    One device, or pair of channels, that a valve hangs on.
+
+    Derived classes set ``VALVE_TYPES``, which they can drive, and ``PARAMETERS``, and
+    override ``open``, ``write`` and ``vent``.
+
+    Parameters
+    ----------
+    values : dict
+        Values of ``PARAMETERS`` by name.
+    config : pam_actuation.drivers.config.DriverConfig
+        What the driver knows of the valve: range of the voltage, PWM period.
+
+    """
+
+    VALVE_TYPES = ('ppr', 'hsv')
+    PARAMETERS = ()
+
+    def __init__(self, values, config):
+        self.values = values
+        self.config = config
+
+    def open(self):
+        """Find the device, check it and vent; raise DeviceError if it is not usable."""
+
+    def write(self, efforts):
+        """
+        Send a valve signal; raise DeviceError if the device does not take it.
+
+        Parameters
+        ----------
+        efforts : tuple of float
+            PPR: volts. HSV: duties 0..1 of filling and venting valve.
+
+        """
+
+    def vent(self):
+        """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
+
+
+def check_one_open(fill_duty, vent_duty):
+    """Raise DeviceError if filling and venting valve are to be open in the same period."""
+    if fill_duty > 0.0 and vent_duty > 0.0:
+        raise DeviceError(
+            f'filling ({fill_duty:.3f}) and venting valve ({vent_duty:.3f}) are never open '
+            'together', 'valve signal')
+
+
+class GuardedOutput:
+    """
+    A valve output that vents when a write fails, and when nobody holds it any more.
+
+    An output that was not closed vents when it is collected or when the interpreter
+    ends, whatever came before. ``writes`` and ``failures`` count.
+
+    Parameters
+    ----------
+    device : ValveOutput
+        An open output.
+    safe_efforts : tuple of float
+        The signal that vents.
+
+    """
+
+    def __init__(self, device, safe_efforts):
+        self._device = device
+        self._safe_efforts = tuple(safe_efforts)
+        self._last_resort = weakref.finalize(self, _vent_quietly, device)
+        self.writes = 0
+        self.failures = 0
+
+    def send(self, efforts):
+        """
+        Send a signal; if that fails, send the safe one at once.
+
+        Returns
+        -------
+        str
+            What is wrong with the device, '' if it took the signal.
+
+        """
+        if tuple(efforts) == self._safe_efforts:
+            return self.vent()
+        problem = self._try(lambda: self._device.write(efforts))
+        if problem:
+            self.vent()
+        return problem
+
+    def vent(self, tries=1):
+        """Send the safe signal, up to ``tries`` times; return what is wrong, '' if nothing."""
+        problem = self._try(self._device.vent)
+        for _ in range(tries - 1):
+            if not problem:
+                break
+            time.sleep(BETWEEN_TRIES_S)
+            problem = self._try(self._device.vent)
+        return problem
+
+    def close(self):
+        """Vent and let go of the device; return what is wrong, '' if nothing."""
+        problem = self.vent(TRIES)
+        if not problem:
+            self._last_resort.detach()
+        return problem
+
+    def _try(self, action):
+        self.writes += 1
+        try:
+            action()
+        except DeviceError as error:
+            self.failures += 1
+            return str(error)
+        return ''
+
+
+def _vent_quietly(device):
+    """Vent at the very end, where nobody is left to be told of a failure."""
+    try:
+        device.vent()
+    except DeviceError:
+        pass

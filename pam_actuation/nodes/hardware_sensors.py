@@ -1,0 +1,100 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sensors of the real rig on ROS: pressure, contraction and force, stamped when read."""
+
+import sys
+
+from pam_actuation.hardware.back_ends import open_sensors
+from pam_actuation.hardware.back_ends import parameters_of
+from pam_actuation.hardware.back_ends import SENSOR_INPUTS
+from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.messages import Contraction
+from pam_actuation.messages import Force
+from pam_actuation.messages import Pressure
+from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import node_parameters
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.runner import run
+
+PLAIN = {'pressure': Pressure, 'supply_pressure': Pressure, 'contraction': Contraction,
+         'force': Force}
+
+
+class HardwareSensors(ManagedNode):
+    """
+    Publish what the sensors of the rig read, in place of ``plant_simulator``.
+
+    A sensor that does not answer sends nothing: those who need it notice that it is
+    silent, and the driver vents.
+    """
+
+    NAME = 'hardware_sensors'
+    PARAMETERS = (
+        NodeParameter('backend', 'iio_adc', 'What the sensors hang on.',
+                      choices=tuple(SENSOR_INPUTS)),
+        NodeParameter('publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
+        *node_parameters(parameters_of(SENSOR_INPUTS)),
+    )
+
+    sensors = None
+    failures = 0
+
+    def setup(self):
+        """Open the sensors, create the publishers of those connected."""
+        self.sensors = open_sensors(self.value('backend'), {
+            parameter.name: self.value(parameter.name)
+            for parameter in parameters_of(SENSOR_INPUTS)})
+        for topic in self.sensors.topics:
+            self.add_publisher(topic)
+
+    def teardown(self):
+        """Let go of the sensors."""
+        self.sensors = None
+
+    def start(self):
+        """Read at a steady rate."""
+        self.add_loop(1.0 / self.value('publish_rate_hz'))
+
+    def diagnostic_values(self):
+        """Add how often a sensor did not answer."""
+        return (*super().diagnostic_values(), ('read_failures', self.failures))
+
+    def tick(self):
+        """Read and send each sensor."""
+        problem = ''
+        for topic in self.sensors.topics:
+            now_ns = self.now_ns()
+            try:
+                value = self.sensors.read(topic)
+            except DeviceError as error:
+                self.failures += 1
+                problem = problem or f'{topic} is not measured: {error}'
+            else:
+                self.send(topic, PLAIN[topic](now_ns, value))
+        if problem:
+            self.diagnostics.update(ERROR, problem)
+        else:
+            self.diagnostics.update(OK, f'measuring {", ".join(self.sensors.topics)}')
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(HardwareSensors, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

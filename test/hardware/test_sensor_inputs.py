@@ -1,0 +1,85 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test analog inputs as sensors: straight lines, and refusals in one sentence."""
+
+from fake_sysfs import make_adc, put
+from pam_actuation.hardware.back_ends import open_sensors, parameters_of, SENSOR_INPUTS
+from pam_actuation.hardware.sysfs import DeviceError
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
+import pytest
+
+
+def open_adc(root, **changes):
+    values = {p.name: p.default for p in parameters_of(SENSOR_INPUTS)}
+    values.update({'sysfs_root': str(root), 'adc.device': 'ads1115'})
+    values.update({name.replace('__', '.'): value for name, value in changes.items()})
+    return open_sensors('iio_adc', values)
+
+
+def test_each_connected_sensor_has_its_line(tmp_path):
+    make_adc(tmp_path, [2.0, 1.5, 0.5])
+    sensors = open_adc(
+        tmp_path, pressure__channel=0, pressure__pa_at_0_v=5e4, pressure__pa_per_v=2e5,
+        force__channel=1, force__n_at_0_v=-10.0, force__n_per_v=40.0,
+        contraction__channel=2, contraction__m_per_v=-0.02)
+    assert sensors.topics == ('pressure', 'contraction', 'force')
+    assert sensors.read('pressure') == pytest.approx(4.5e5)
+    assert sensors.read('force') == pytest.approx(50.0)
+    assert sensors.read('contraction') == pytest.approx(-0.01)
+
+
+def test_the_offset_of_a_channel_is_added_before_scaling(tmp_path):
+    path, = make_adc(tmp_path, [1.0])
+    put(path.with_name('in_voltage0_offset'), 1000)
+    sensors = open_adc(tmp_path, pressure__channel=0, pressure__pa_at_0_v=0.0)
+    assert sensors.read('pressure') == pytest.approx(1.5e5)
+
+
+def test_a_sensor_that_falls_silent_is_told_and_comes_back(tmp_path):
+    path, = make_adc(tmp_path, [1.0])
+    sensors = open_adc(tmp_path, pressure__channel=0)
+    path.rename(path.with_name('away'))
+    with pytest.raises(DeviceError, match='in_voltage0_raw.*No such file'):
+        sensors.read('pressure')
+    path.with_name('away').rename(path)
+    assert sensors.read('pressure') == pytest.approx(P_ATM_PA + 1e5)
+
+
+@pytest.mark.parametrize('changes, words', [
+    ({}, 'no sensor is connected'),
+    ({'pressure__channel': 5}, 'in_voltage5_raw: there is no such channel'),
+    ({'pressure__channel': 0, 'adc__device': ''}, 'adc.device: the name of the device is needed'),
+    ({'pressure__channel': 0, 'pressure__pa_per_v': 0.0}, 'pressure.pa_per_v: 0 is not allowed'),
+    ({'pressure__channel': 1}, "'broken' is not a number"),
+])
+def test_sensors_that_are_not_usable_are_one_sentence(tmp_path, changes, words):
+    put(make_adc(tmp_path, [1.0, 1.0])[1], 'broken')
+    with pytest.raises(InputError) as told:
+        open_adc(tmp_path, **changes)
+    assert words in str(told.value) and '\n' not in str(told.value)
+
+
+def test_a_scale_that_is_no_scale_is_refused(tmp_path):
+    path, = make_adc(tmp_path, [1.0])
+    put(path.with_name('in_voltage_scale'), 0)
+    with pytest.raises(InputError, match='scale of 0.0 mV is not above 0'):
+        open_adc(tmp_path, pressure__channel=0)
+
+
+def test_sensors_that_are_not_there_read_a_muscle_at_rest():
+    sensors = open_sensors('dummy', {})
+    assert {topic: sensors.read(topic) for topic in sensors.topics} == {
+        'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
