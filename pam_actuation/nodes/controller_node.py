@@ -15,16 +15,20 @@
 """What the controller nodes share: measurements and reference in, pressure command out."""
 
 from pam_actuation.control.tick import REASONS
+from pam_actuation.experiments.reference import TRAJECTORY_EVERY_NS
 from pam_actuation.messages import Pressure
+from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
+from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
 OK_REASON = REASONS[0]
-INPUTS = ('reference_trajectory', 'reference', 'pressure', 'force', 'contraction')
+MEASURED = ('pressure', 'force', 'contraction')
+INPUTS = ('reference_trajectory', 'reference', *MEASURED)
 
 
 class ControllerNode(ManagedNode):
@@ -59,8 +63,28 @@ class ControllerNode(ManagedNode):
             (topic, self.add_subscription(topic), getattr(self.loop, f'on_{topic}'))
             for topic in INPUTS]
 
+    def inputs_of_a_tick(self):
+        """Return the measurements and, of a reference that takes part, what it asks for."""
+        by_topic = {topic: subscription for topic, subscription, _ in self.inputs}
+        awaited = [lockstep.EachTick(by_topic[topic]) for topic in MEASURED]
+        if lockstep.REFERENCE in self.participants:
+            awaited += [lockstep.Stamped(by_topic['reference']), lockstep.Repeated(
+                by_topic['reference_trajectory'], TRAJECTORY_EVERY_NS)]
+        return awaited
+
+    def _check_step(self, now_ns):
+        """Raise InputError if the ticks of the lockstep are not those of the controller."""
+        before_ns, self._last_ns = self._last_ns, now_ns
+        period_ns = round(1e9 / self.controller.rate_hz)
+        if before_ns is not None and now_ns - before_ns != period_ns:
+            raise InputError(
+                f'the clock steps by {(now_ns - before_ns) * 1e-6:g} ms, this controller by '
+                f'{period_ns * 1e-6:g} ms; set publish_rate_hz of the plant to '
+                f'{self.controller.rate_hz:g}', 'lockstep')
+
     def start(self):
         """Begin without memory of a former run; what was learned stays."""
+        self._last_ns = None
         self.add_loop(1.0 / self.controller.rate_hz)
 
     def tick(self):
@@ -68,7 +92,10 @@ class ControllerNode(ManagedNode):
         for topic, subscription, handler in self.inputs:
             for message, _ in subscription.take():
                 handler(from_ros(topic, message))
-        command, state = self.loop.tick(self.now_ns(), self.learning)
+        now_ns = self.now_ns()
+        if self.participants:
+            self._check_step(now_ns)
+        command, state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', state)
         if self.loop.reason == OK_REASON:

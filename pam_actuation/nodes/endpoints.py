@@ -25,6 +25,9 @@ import time
 from pam_actuation.nodes import qos
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+WaitSet = rclpy_implementation.WaitSet
 
 
 class CountedPublisher:
@@ -112,8 +115,11 @@ class PolledSubscription:
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
         self._type = message_type
         self._raw = raw
+        self._waiting = []
+        self._wait_set = None
         self.topic = self._subscription.topic_name
         self.received = 0
+        self.newest = None          # the message taken or collected last
 
     def take(self, limit=2000):
         """
@@ -122,16 +128,32 @@ class PolledSubscription:
         ``info`` is rclpy's dictionary with ``source_timestamp``, ``received_timestamp`` [ns]
         and ``publication_sequence_number``.
         """
-        taken = []
+        self.collect(limit)
+        taken, self._waiting = self._waiting, []
+        return taken
+
+    def collect(self, limit=2000):
+        """Fetch what has arrived, up to ``limit`` waiting messages, and keep it for ``take``."""
+        waiting = self._waiting
         handle = self._subscription.handle
         with handle:
-            while len(taken) < limit:
+            while len(waiting) < limit:
                 item = handle.take_message(self._type, self._raw)
                 if item is None:
-                    break
-                taken.append(item)
-        self.received += len(taken)
-        return taken
+                    return
+                waiting.append(item)
+                self.newest = item[0]
+                self.received += 1
+
+    def wait(self, timeout_s):
+        """Wait until a message arrives, at most ``timeout_s``; the processor is free meanwhile."""
+        handle = self._subscription.handle
+        with handle:
+            if self._wait_set is None:
+                self._wait_set = WaitSet(1, 0, 0, 0, 0, 0, self._node.context.handle)
+            self._wait_set.clear_entities()
+            self._wait_set.add_subscription(handle)
+            self._wait_set.wait(round(timeout_s * 1e9))
 
     @property
     def publishers(self):

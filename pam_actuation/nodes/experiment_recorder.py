@@ -54,6 +54,7 @@ class ExperimentRecorder(ManagedNode):
 
     NAME = 'experiment_recorder'
     STUCK_AFTER_S = 30.0        # the disk may be slow
+    FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (
         NodeParameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
         NodeParameter('overwrite', False, 'Replace an existing bag.'),

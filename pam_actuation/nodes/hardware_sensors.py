@@ -29,6 +29,7 @@ from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_sim.errors import InputError
 
 PLAIN = {'pressure': Pressure, 'supply_pressure': Pressure, 'contraction': Contraction,
          'force': Force}
@@ -52,6 +53,11 @@ class HardwareSensors(ManagedNode):
 
     sensors = None
     failures = 0
+
+    def check(self):
+        """Refuse to stamp what is measured with a time that may stand still."""
+        if self.uses_simulated_time and self.value('backend') != 'dummy':
+            raise InputError('real sensors are not read in simulated time', 'use_sim_time')
 
     def setup(self):
         """Open the sensors, create the publishers of those connected."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Periodic work on the steady clock, without an executor's cost per tick.
+Periodic work on the steady clock (or a simulated one), without an executor's cost per tick.
 
 rclpy's executor rebuilds its list of everything a node owns for every wake-up, which
 takes longer than a tick of a control loop. The loops of a node therefore run in the main
@@ -28,12 +28,17 @@ LONGEST_SLEEP_NS = 100_000_000     # how soon an idle node notices that it is to
 
 
 class Loop:
-    """One callback every ``period_ns``; ticks that were missed are not made up for."""
+    """
+    One callback every ``period_ns``; ticks that were missed are not made up for.
 
-    def __init__(self, period_ns, callback, now_ns):
+    ``clock`` is what the period is counted on, ``SteadyTime`` or something like it.
+    """
+
+    def __init__(self, period_ns, callback, now_ns, clock=None):
         self.period_ns = period_ns
         self.callback = callback
         self.next_ns = now_ns + period_ns
+        self.clock = clock
 
     def advance(self, now_ns):
         """Set the time of the next tick, in step with the former ones."""
@@ -41,21 +46,41 @@ class Loop:
         self.next_ns += self.period_ns * (1 + max(late_ns, 0) // self.period_ns)
 
 
+class SteadyTime:
+    """The time loops run on: here the steady clock of the computer."""
+
+    def now_ns(self):
+        """Return the time [ns]."""
+        return time.monotonic_ns()
+
+    def wait_until(self, wake_ns):
+        """Wait for a time [ns], at most 0.1 s."""
+        sleep_ns = min(wake_ns - time.monotonic_ns(), LONGEST_SLEEP_NS)
+        if sleep_ns > 0:
+            time.sleep(sleep_ns * 1e-9)
+
+
 class LoopSet:
-    """The loops of a node; ``lock`` is held while one of them runs."""
+    """
+    The loops of a node; ``lock`` is held while one of them runs.
+
+    ``time`` is what they run on, ``SteadyTime`` or something like it.
+    """
 
     def __init__(self):
         self.lock = threading.RLock()
+        self.time = SteadyTime()
         self._loops = []
 
     def __bool__(self):
         """Tell whether there is any loop."""
         return bool(self._loops)
 
-    def add(self, period_s, callback):
-        """Call ``callback`` every ``period_s`` from now on."""
+    def add(self, period_s, callback, clock=None):
+        """Call ``callback`` every ``period_s`` from now on; ``clock`` if not on ``time``."""
+        clock = clock or self.time
         with self.lock:
-            self._loops.append(Loop(round(period_s * 1e9), callback, time.monotonic_ns()))
+            self._loops.append(Loop(round(period_s * 1e9), callback, clock.now_ns(), clock))
 
     def clear(self):
         """End all loops."""
@@ -64,15 +89,15 @@ class LoopSet:
 
     def run_once(self):
         """Sleep until the next tick is due, at most 0.1 s, and run what is due."""
-        now_ns = time.monotonic_ns()
         loops = self._loops
-        wake_ns = min((loop.next_ns for loop in loops), default=now_ns + LONGEST_SLEEP_NS)
-        sleep_ns = min(wake_ns - now_ns, LONGEST_SLEEP_NS)
-        if sleep_ns > 0:
-            time.sleep(sleep_ns * 1e-9)
+        if not loops:
+            time.sleep(LONGEST_SLEEP_NS * 1e-9)
+            return
+        self.time.wait_until(min(
+            (loop.next_ns for loop in loops if loop.clock is self.time), default=0))
         with self.lock:
-            now_ns = time.monotonic_ns()
             for loop in self._loops:
+                now_ns = loop.clock.now_ns()
                 if loop.next_ns <= now_ns:
                     loop.advance(now_ns)
                     loop.callback()

@@ -28,6 +28,7 @@ import gc
 import time
 import traceback
 
+from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import MESSAGE_TYPES
 from pam_actuation.nodes.conversions import RosWriter
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
@@ -36,15 +37,20 @@ from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.endpoints import wait_until_matched
+from pam_actuation.nodes.lockstep import TickInputs
 from pam_actuation.nodes.loops import LoopSet
+from pam_actuation.nodes.loops import SteadyTime
 from pam_actuation.nodes.parameters import declare
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.realtime import ask_for_realtime
+from pam_actuation.nodes.simulated_time import FollowedTime
+from pam_actuation.nodes.simulated_time import leave_clock_to_node
 from pam_actuation.nodes.timing import LoopTiming
 from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import TransitionCallbackReturn
 
+EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
 FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
 
 COMMON_PARAMETERS = (
@@ -62,6 +68,9 @@ COMMON_PARAMETERS = (
         'realtime_priority', 0, 'Real-time priority of this process (Linux, SCHED_RR); 0: none. '
         'Without the right to it the node runs as before.', 0, 99),
     NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),
+    NodeParameter(
+        'lockstep', [''], 'Names of all nodes that go through the simulated time tick by tick '
+        'together, this one included; needs use_sim_time. Empty: none.'),
 )
 
 
@@ -79,6 +88,7 @@ class ManagedNode(LifecycleNode):
 
     NAME = ''
     STUCK_AFTER_S = 2.0         # how long the way out may take
+    FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
     PARAMETERS = ()
 
     def __init__(self, **kwargs):
@@ -94,6 +104,10 @@ class ManagedNode(LifecycleNode):
         super().__init__(self.NAME, **kwargs)
         self._refuse_impossible_transitions()
         declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS))
+        self.participants = self._participants()
+        self.simulated_time = None
+        if self.FOLLOWS_CLOCK and self.uses_simulated_time:
+            leave_clock_to_node(self)
         self.diagnostics = DiagnosticsReporter(self)
         self.diagnostics.silent = bool(self.value('await_subscriber'))
         self.check()
@@ -125,6 +139,14 @@ class ManagedNode(LifecycleNode):
     def teardown(self):
         """Drop what ``setup`` built, apart from publishers and subscriptions (cleanup)."""
 
+    def make_simulated_time(self):
+        """Return the time the loops run on with use_sim_time."""
+        return FollowedTime(self, self.tick_inputs())
+
+    def inputs_of_a_tick(self):
+        """Return what a tick waits for in lockstep, see ``lockstep``."""
+        return []
+
     def diagnostic_values(self):
         """Return (key, value) pairs that every status of this node shows."""
         return self.timing.values() if self.timing else ()
@@ -137,7 +159,30 @@ class ManagedNode(LifecycleNode):
 
     def now_ns(self):
         """Return the time for stamps [ns]: ROS time, simulated if use_sim_time is set."""
+        if self.simulated_time is not None:
+            return self.simulated_time.now_ns()
         return self.get_clock().now().nanoseconds
+
+    @property
+    def uses_simulated_time(self):
+        """Tell whether this node was started with use_sim_time."""
+        return bool(self.get_parameter('use_sim_time').value)
+
+    def tick_inputs(self):
+        """Return the ``TickInputs`` of this node."""
+        return TickInputs(
+            self.inputs_of_a_tick, bool(self.participants), self.get_logger().warning)
+
+    def topics_sent(self):
+        """Return (short topic name, publisher) of all topics of the rig this node sends."""
+        return [(topic, publisher) for topic, (publisher, _) in self._writers.items()]
+
+    def _participants(self):
+        """Return the nodes in lockstep; InputError if that is not possible."""
+        names = lockstep.participants_of(self.value('lockstep'))
+        if names and not self.uses_simulated_time:
+            raise InputError('lockstep is in simulated time, set use_sim_time', 'use_sim_time')
+        return names if self.NAME in names else ()
 
     def add_publisher(self, topic):
         """Create the publisher of a topic of the rig; ``send`` publishes on it."""
@@ -160,10 +205,13 @@ class ManagedNode(LifecycleNode):
         """
         Run ``tick`` every ``period_s`` on the steady clock while active.
 
-        With ``poll_s`` the node asks itself that often, by ``due``, whether to tick.
+        With ``poll_s`` the node asks itself that often, by ``due``, whether to tick. On simulated
+        time it does not; in lockstep it ticks with every clock message, whatever its period.
         """
         self.timing = LoopTiming(period_s)
-        if poll_s is None:
+        if self.participants:
+            self.loops.add(EVERY_TICK_S, self._timed_tick)
+        elif poll_s is None or self.simulated_time is not None:
             self.loops.add(period_s, self._timed_tick)
         else:
             self.loops.add(poll_s, self._polled_tick)
@@ -203,6 +251,8 @@ class ManagedNode(LifecycleNode):
 
     def _end_loops(self):
         self.loops.clear()
+        if self.simulated_time is not None:
+            self.simulated_time.end()
         if self.timing:
             self.timing.pause()
 
@@ -276,6 +326,8 @@ class ManagedNode(LifecycleNode):
     def _configure(self):
         self.input_error = None
         self.setup()
+        if self.FOLLOWS_CLOCK and self.uses_simulated_time:
+            self.simulated_time = self.loops.time = self.make_simulated_time()
         self.diagnostics.update(OK, 'configured, not active')
 
     def _activate(self):
@@ -285,9 +337,13 @@ class ManagedNode(LifecycleNode):
         refused = ask_for_realtime(self.value('realtime_priority'))
         if refused:
             self.get_logger().info(f'no real-time scheduling: {refused}')
+        if self.simulated_time is not None:
+            self._await_participants()
+            self.simulated_time.begin()
         self.start()
         self.diagnostics.silent = False
-        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send)
+        # Also while a simulated time stands still.
+        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send, SteadyTime())
         self.diagnostics.update(OK, 'active')
         self.get_logger().info('active')
 
@@ -295,14 +351,21 @@ class ManagedNode(LifecycleNode):
         subscriber = self.value('await_subscriber')
         if subscriber:
             publishers = (*self.publishers_counted, self.diagnostics.publisher)
-            missed = wait_until_matched(
-                publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping)
-            if missed and self.stopping:
-                raise StoppedEarly
-            if missed:
-                raise InputError(
-                    f'{subscriber} does not receive {", ".join(missed)}',
-                    'parameter await_subscriber')
+            self._await_matched(publishers, subscriber, 'await_subscriber')
+
+    def _await_participants(self):
+        """Wait until those in lockstep with this node receive what they need of it."""
+        for publisher, name in lockstep.connections(self, self.participants):
+            self._await_matched([publisher], name, 'lockstep')
+
+    def _await_matched(self, publishers, subscriber, parameter):
+        missed = wait_until_matched(
+            publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping)
+        if missed and self.stopping:
+            raise StoppedEarly
+        if missed:
+            raise InputError(
+                f'{subscriber} does not receive {", ".join(missed)}', f'parameter {parameter}')
 
     def _deactivate(self):
         was_active = bool(self.loops)

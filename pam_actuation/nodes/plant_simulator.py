@@ -16,10 +16,17 @@
 
 import sys
 
+from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
+from pam_actuation.nodes.simulated_time import PlantTime
+from pam_sim.errors import InputError
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
 
 MAX_SEED = 2**31 - 1
 
@@ -30,6 +37,7 @@ class PlantSimulator(ManagedNode):
 
     Physics runs up to the present at every tick. A valve signal or a disturbance acts from
     its own stamp on if physics has not passed it yet, else at once, and is held without limit.
+    With use_sim_time the plant makes the time and is the only publisher of ``/clock``.
     """
 
     NAME = 'plant_simulator'
@@ -38,10 +46,19 @@ class PlantSimulator(ManagedNode):
         NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
         NodeParameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED),
         NodeParameter(
-            'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
+            'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
+        NodeParameter(
+            'clock_rate', 1.0, 'With use_sim_time: simulated seconds per second; 0, in lockstep '
+            'only: as fast as the nodes answer.', 0.0, 1000.0),
     )
 
     plant = None
+    _clock_services = ()
+
+    def check(self):
+        """Refuse a clock that nothing would hold back."""
+        if self.value('clock_rate') == 0.0 and not self.participants:
+            raise InputError('0 is allowed in lockstep only', 'parameter clock_rate')
 
     def setup(self):
         """Load the rig, create the sensors' publishers."""
@@ -56,6 +73,45 @@ class PlantSimulator(ManagedNode):
             self.add_publisher('supply_pressure')
         self.signals = self.add_subscription('valve_signal')
         self.disturbances = self.add_subscription('external_force')
+        if self.uses_simulated_time:
+            self._clock_services = [
+                self.create_service(SetBool, '~/pause', self._on_pause),
+                self.create_service(Trigger, '~/step', self._on_step)]
+
+    def teardown(self):
+        """Take the services back."""
+        for service in self._clock_services:
+            self.destroy_service(service)
+        self._clock_services = ()
+
+    def make_simulated_time(self):
+        """Make the time that the others follow; InputError if somebody else does."""
+        if self.count_publishers(CLOCK_TOPIC):
+            raise InputError('another node publishes it; the plant is the only clock', CLOCK_TOPIC)
+        followers = tuple(full_name(self.get_namespace(), name)
+                          for name in self.participants if name != self.NAME)
+        return PlantTime(self, self.tick_inputs(), 1.0 / self.value('publish_rate_hz'),
+                         self.value('clock_rate'), followers)
+
+    def inputs_of_a_tick(self):
+        """Return the signal of the driver and, where there is one, the disturbance."""
+        if lockstep.DRIVER not in self.participants:
+            return []
+        return [lockstep.Stamped(self.signals), lockstep.StampedIfSent(self.disturbances)]
+
+    def _on_pause(self, request, response):
+        self.simulated_time.paused = request.data
+        response.success = True
+        response.message = 'paused' if request.data else 'going on'
+        return response
+
+    def _on_step(self, request, response):
+        response.success = self.simulated_time.paused
+        response.message = 'not paused'
+        if response.success:
+            self.simulated_time.step()
+            response.message = f'one step of {1e3 / self.value("publish_rate_hz"):g} ms'
+        return response
 
     def start(self):
         """Begin with the clock at the present."""
@@ -68,8 +124,13 @@ class PlantSimulator(ManagedNode):
         values = super().diagnostic_values()
         if self.plant is None:
             return values
-        return (*values, ('physics.steps', self.plant.steps),
-                ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
+        values = (*values, ('physics.steps', self.plant.steps),
+                  ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
+        if self.simulated_time is None:
+            return values
+        return (*values, ('clock.rate', f'{self.simulated_time.achieved_rate:.3f}'),
+                ('clock.paused', self.simulated_time.paused),
+                ('clock.waits_for', ' '.join(self.simulated_time.waits_for)))
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
@@ -87,6 +148,8 @@ class PlantSimulator(ManagedNode):
         self._sampled_steps = self.plant.steps
         for topic, plain in self.plant.sample(now_ns).items():
             self.send(topic, plain)
+        if self.simulated_time is not None:
+            self.simulated_time.publish()
 
 
 def main(args=None):

@@ -20,6 +20,7 @@ from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_sim.errors import InputError
 
 FINISHED = 'finished'      # beginning of the diagnostic message once the experiment is over
 
@@ -51,6 +52,11 @@ class ReferenceGenerator(ManagedNode):
 
     loop = None
     begin_ns = None
+
+    def check(self):
+        """Refuse to wait in lockstep, where everybody waits for the reference."""
+        if self.participants and self.value('start_delay_s') > 0.0:
+            raise InputError('0 is needed in lockstep', 'parameter start_delay_s')
 
     def setup(self):
         """Load the experiment, create the topics of its domain."""

@@ -23,12 +23,14 @@ from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
 from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
+from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_sim.errors import InputError
 from std_srvs.srv import Trigger
 
 COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
@@ -65,6 +67,20 @@ class ValveDriver(ManagedNode):
     loop = None
     output = None
     _safety_services = ()
+
+    def check(self):
+        """Refuse to drive a device on a time that may stand still."""
+        if self.uses_simulated_time and self.value('backend') not in ('sim', 'dummy'):
+            raise InputError('a real valve is not driven in simulated time', 'use_sim_time')
+
+    def inputs_of_a_tick(self):
+        """Return the measurements and the command."""
+        awaited = [lockstep.EachTick(self.pressures)]
+        if self.loop.is_hsv:
+            awaited.append(lockstep.EachTick(self.supplies))
+        if {lockstep.REFERENCE, *lockstep.CONTROLLERS} & {*self.participants}:
+            awaited.append(lockstep.Stamped(*filter(None, (self.commands, self.raw_commands))))
+        return awaited
 
     def setup(self):
         """Build the driver, its topics and services."""

@@ -1,0 +1,165 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run a rig in lockstep over DDS: how fast is it, and are two runs the same to the byte?
+
+    python benchmarks/lockstep.py
+    python benchmarks/lockstep.py --simulated-seconds 60 --runs 1 --silent
+
+Plant (1 ms physics), valve driver, controller (200 Hz) and reference as processes of their
+own; the plant's clock goes on as fast as the others answer. Prints simulated seconds per
+second, from the diagnostics of the plant, and per topic the number of messages
+and whether all runs have the same bytes. With ``--silent`` nobody listens to the
+topics, so that only the rig itself takes processor time. Exit code 1 if runs differ.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+import tempfile
+import time
+
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import MESSAGE_TYPES
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.rigging.client import RigClient
+from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+
+CONTROLLER = 'sofc_controller'
+NODES = ('plant_simulator', 'valve_driver', CONTROLLER, 'reference_generator')
+NAMESPACE = '/muscle'
+START_TIMEOUT_S = 120.0
+STALLED_S = 10.0
+
+
+def parameters_of(valve, experiment, rig):
+    """Return the parameters of each node."""
+    common = {'use_sim_time': True, 'lockstep': list(NODES), 'realtime_priority': 1,
+              'autostart': False}
+    own = {
+        'plant_simulator': {
+            'clock_rate': 0.0, 'publish_rate_hz': 200.0, 'rig': rig, 'valve_type': valve},
+        'valve_driver': {'valve_type': valve, 'rig': rig},
+        CONTROLLER: {'valve_type': valve, 'rig': rig},
+        'reference_generator': {'experiment': experiment, 'valve_type': valve}}
+    return {name: {**common, **own[name]} for name in NODES}
+
+
+class Listener:
+    """A digest of the bytes of each topic, up to a number of ticks of simulated time."""
+
+    def __init__(self, node, silent):
+        self.sources = {} if silent else {
+            topic: PolledSubscription(
+                node, message_type, f'{NAMESPACE}/{topic}', qos.reliable(20_000), raw=True)
+            for topic, message_type in MESSAGE_TYPES.items()}
+        self.messages = {topic: [] for topic in self.sources}
+
+    def take(self):
+        """Fetch what has arrived."""
+        for topic, source in self.sources.items():
+            self.messages[topic] += [bytes(data) for data, _ in source.take(100_000)]
+
+    def digests(self, until_ns):
+        """Return topic to (number of messages, digest) of those stamped up to a time [ns]."""
+        found = {}
+        for topic, messages in self.messages.items():
+            kept = [data for data in messages if stamp_of(data) <= until_ns]
+            if kept:
+                found[topic] = (len(kept), hashlib.sha256(b''.join(kept)).hexdigest()[:16])
+        return found
+
+
+def stamp_of(data):
+    """Return the header stamp [ns] of a serialized message: it comes first."""
+    return (int.from_bytes(data[4:8], 'little') * 1_000_000_000
+            + int.from_bytes(data[8:12], 'little'))
+
+
+def run_once(arguments):
+    """Run the rig for some simulated seconds; return (rate, {topic: (messages, digest)})."""
+    from pam_actuation.nodes.simulated_time import START_NS
+    lock = DomainLock()
+    client = None
+    with tempfile.TemporaryDirectory() as folder:
+        environment = node_environment(lock.domain_id, folder)
+        wanted = parameters_of(arguments.valve, arguments.experiment, arguments.rig)
+        nodes = {name: NodeProcess(name, NAMESPACE, parameters, environment, folder)
+                 for name, parameters in wanted.items()}
+        try:
+            client = RigClient(lock.domain_id)
+            listener = Listener(client.node, arguments.silent)
+            names = {nodes[name].full_name: nodes[name] for name in NODES}
+            for transition in ('configure', 'activate'):
+                refused = client.change_states(
+                    names, transition, START_TIMEOUT_S, lambda name: names[name].running)
+                if refused:
+                    raise SystemExit(f'{refused[0]}: {names[refused[0]].last_line()}')
+            rate = follow(client, listener, arguments.simulated_seconds)
+        finally:
+            end_all(nodes.values())
+            if client is not None:
+                listener.take()
+                client.close()
+            lock.release()
+    return rate, listener.digests(START_NS + round(arguments.simulated_seconds * 1e9))
+
+
+def follow(client, listener, simulated_s):
+    """Wait until the plant has simulated enough; return simulated seconds per second."""
+    plant = f'{NAMESPACE}/plant_simulator'
+    steps, moved_s = 0, time.monotonic()
+    while True:
+        client.spin(0.02)
+        listener.take()
+        values = client.statuses.get(plant, (0, '', {}))[2]
+        if int(values.get('physics.steps', 0)) > steps:
+            steps, moved_s = int(values['physics.steps']), time.monotonic()
+        if steps * 1e-3 > simulated_s:
+            return float(values['clock.rate'])
+        if time.monotonic() - moved_s > STALLED_S:
+            raise SystemExit(f'the rig stands still after {steps * 1e-3:.3f} simulated seconds')
+
+
+def main(args=None):
+    """Run the benchmark; return its exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--simulated-seconds', type=float, default=20.0)
+    parser.add_argument('--runs', type=int, default=2)
+    parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
+    parser.add_argument('--rig', default='dmsp_5_300_realistic')
+    parser.add_argument('--experiment', default='sine_half_hz')
+    parser.add_argument('--silent', action='store_true', help='listen to no topic')
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args(args)
+    runs = [run_once(arguments) for _ in range(arguments.runs)]
+    same = all(digests == runs[0][1] for _, digests in runs)
+    if arguments.json:
+        print(json.dumps({'rates': [rate for rate, _ in runs], 'same': same,
+                          'topics': [digests for _, digests in runs]}))
+        return 0 if same else 1
+    for number, (rate, digests) in enumerate(runs, 1):
+        print(f'run {number}: {rate:.2f} simulated seconds per second')
+        for topic, (count, digest) in digests.items():
+            equal = 'same' if runs[0][1].get(topic) == (count, digest) else 'DIFFERENT'
+            print(f'  {topic:22s} {count:6d} messages  {digest}  {equal}')
+    print('all runs are the same to the byte' if same else 'the runs differ')
+    return 0 if same else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,207 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Lockstep: all nodes of a rig go through the same ticks, none ahead of what it needs.
+
+Each node ticks once per message on ``/clock``, and only when what the tick needs has
+arrived. The plant sends measurements and clock, the reference answers the clock, the
+controller waits for both, the driver for the command, the plant for the valve
+signal before it goes on. So every node uses the same inputs in the same tick in every
+run, however long messages take. A node that stays silent is left out after a while,
+so that time goes on and its loss has the consequences it has in life.
+"""
+
+import time
+
+from pam_actuation.nodes.conversions import stamp_ns
+from pam_actuation.nodes.endpoints import full_name
+from pam_sim.errors import InputError
+
+PLANT, DRIVER, REFERENCE = 'plant_simulator', 'valve_driver', 'reference_generator'
+CONTROLLERS = ('sofc_controller', 'pid_controller')
+PARTICIPANTS = (PLANT, DRIVER, REFERENCE, *CONTROLLERS)
+LEFT_OUT_AFTER_S = 2.0
+LONGEST_WAIT_S = 0.1
+TURN_S = 0.0005
+
+# Who needs a topic; the measurements go to whoever follows the clock.
+NEEDED_BY = {
+    'reference': CONTROLLERS, 'reference_trajectory': CONTROLLERS,
+    'pressure_command': (DRIVER,), 'valve_command': (DRIVER,),
+    'valve_signal': (PLANT,), 'external_force': (PLANT,)}
+
+
+def participants_of(names):
+    """
+    Return the participants a parameter lists, () for none.
+
+    Raises
+    ------
+    InputError
+        A name is not that of a node that can take part.
+
+    """
+    names = tuple(name for name in names if name)
+    for name in names:
+        if name not in PARTICIPANTS:
+            raise InputError(f'{name!r} cannot take part, allowed are {", ".join(PARTICIPANTS)}',
+                             'parameter lockstep')
+    return names
+
+
+def connections(node, participants):
+    """
+    Return (publisher, full name of a node that must receive it) for what a node sends.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        A configured node.
+    participants : tuple of str
+        All nodes that take part.
+
+    """
+    own = node.get_namespace()
+    return [(publisher, full_name(own, name)) for topic, publisher in node.topics_sent()
+            for name in NEEDED_BY.get(topic, ()) if name in participants]
+
+
+class EachTick:
+    """A topic that has one message per clock message, whatever its stamps."""
+
+    def __init__(self, subscription):
+        self.subscriptions = (subscription,)
+        self._before = subscription.received
+        self._ticks = 0
+        self._tick_ns = None
+
+    def arrived(self, tick_ns):
+        """Return whether the message of a tick is there."""
+        if tick_ns != self._tick_ns:
+            self._tick_ns = tick_ns
+            self._ticks += 1
+        return self.subscriptions[0].received - self._before >= self._ticks
+
+
+class Stamped:
+    """A message with the stamp of the tick, on any one of some topics."""
+
+    def __init__(self, *subscriptions):
+        self.subscriptions = subscriptions
+
+    def arrived(self, tick_ns):
+        """Return whether the message of a tick is there."""
+        return any(one.newest is not None and stamp_ns(one.newest) >= tick_ns
+                   for one in self.subscriptions)
+
+
+class Repeated(Stamped):
+    """A topic that has a message every ``period_ns``, the first in the first tick."""
+
+    def __init__(self, subscription, period_ns):
+        super().__init__(subscription)
+        self._period_ns = period_ns
+        self._first_ns = None
+
+    def arrived(self, tick_ns):
+        """Return whether the message due last is there."""
+        if self._first_ns is None:
+            self._first_ns = tick_ns
+        return super().arrived(tick_ns - (tick_ns - self._first_ns) % self._period_ns)
+
+
+class StampedIfSent(Stamped):
+    """A topic that not every experiment has: asked for where somebody publishes it."""
+
+    def arrived(self, tick_ns):
+        """Return whether the message of a tick is there, or nobody sends any."""
+        return not self.subscriptions[0].publishers or super().arrived(tick_ns)
+
+
+class TickInputs:
+    """
+    What a node waits for before a tick; false if that is nothing, without lockstep.
+
+    Parameters
+    ----------
+    make : callable
+        Returns the list of inputs, such as ``EachTick`` and ``Stamped``; called at every start.
+    active : bool
+        Whether the node takes part in a lockstep.
+    report : callable
+        Gets one sentence when a sender is left out or is back.
+
+    """
+
+    def __init__(self, make, active, report):
+        self._make = make
+        self._active = active
+        self._report = report
+        self._inputs = []
+        self._left_out = set()
+        self._since_s = None
+
+    def __bool__(self):
+        """Tell whether this is a lockstep."""
+        return self._active
+
+    def begin(self):
+        """Begin to count."""
+        self._inputs = self._make() if self._active else []
+        self._left_out = set()
+        self._since_s = None
+
+    def arrived(self, tick_ns):
+        """Wait for what a tick needs, at most 0.1 s; return whether all of it is there."""
+        deadline_s = None
+        for one in self._inputs:
+            while not self._there(one, tick_ns):
+                now_s = time.monotonic()
+                deadline_s = deadline_s or now_s + LONGEST_WAIT_S
+                if now_s >= deadline_s:
+                    return self._give_up(one, now_s)
+                self._wait(one, deadline_s - now_s)
+        self._since_s = None
+        return True
+
+    def _there(self, one, tick_ns):
+        for subscription in one.subscriptions:
+            subscription.collect()
+        if not one.arrived(tick_ns):
+            return one in self._left_out
+        if one in self._left_out:
+            self._left_out.remove(one)
+            self._report(f'{_names(one)} takes part in the lockstep again')
+        return True
+
+    @staticmethod
+    def _wait(one, longest_s):
+        # Of several topics any may come: looked at in turn.
+        several = len(one.subscriptions) > 1
+        for subscription in one.subscriptions:
+            subscription.wait(TURN_S if several else longest_s)
+
+    def _give_up(self, one, now_s):
+        """Return False, for the next call to wait on; note a sender that is silent for long."""
+        self._since_s = self._since_s or now_s
+        if now_s - self._since_s > LEFT_OUT_AFTER_S:
+            self._since_s = None
+            self._left_out.add(one)
+            self._report(f'{_names(one)} is silent and left out of the lockstep')
+        return False
+
+
+def _names(one):
+    return ' or '.join(subscription.topic for subscription in one.subscriptions)

@@ -1,0 +1,240 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Simulated time of a node: followed from ``/clock``, or, in the plant, made.
+
+Both are times a ``LoopSet`` runs on. ``FollowedTime`` goes on when a clock message
+arrives, ``PlantTime`` when the rate asked for allows it. In lockstep both wait in
+addition until what they need of the tick has arrived (``lockstep``).
+"""
+
+import time
+
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.endpoints import CountedPublisher
+from pam_actuation.nodes.endpoints import full_name
+from pam_actuation.nodes.endpoints import PolledSubscription
+from rclpy.clock import ClockType
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import ReliabilityPolicy
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+
+CLOCK_TOPIC = '/clock'
+START_NS = 1_000_000_000 * 1_000_000_000    # simulated time starts here, as in pam simulate
+LONGEST_WAIT_S = 0.1                        # how soon a waiting node notices that it is to end
+FALLEN_BEHIND_S = 0.1                       # later than this, the rate counts from now on anew
+
+
+def leave_clock_to_node(node):
+    """
+    End rclpy's own subscription of the clock.
+
+    It would run in the executor's thread, at a higher cost per message than a tick.
+    """
+    node._time_source.detach_node()
+
+
+def set_node_clock(node, now_ns):
+    """Let the clock of a node, which stamps its log, show a simulated time [ns]."""
+    node.get_clock().set_ros_time_override(
+        Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME))
+
+
+class FollowedTime:
+    """
+    The time the plant publishes.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        Node whose loops run on it.
+    inputs : pam_actuation.nodes.lockstep.TickInputs
+        What a tick needs before it may begin; none without lockstep.
+
+    """
+
+    def __init__(self, node, inputs):
+        self._node = node
+        self._inputs = inputs
+        self._subscription = None
+        self._now_ns = 0
+        self._pending_ns = None
+
+    def begin(self):
+        """Subscribe to the clock: the plant then knows that this node is ready."""
+        self.end()
+        self._pending_ns = None
+        self._inputs.begin()
+        self._subscription = PolledSubscription(self._node, Clock, CLOCK_TOPIC, qos.CONSUMER)
+
+    def end(self):
+        """Leave the clock."""
+        if self._subscription is not None:
+            self._subscription.destroy()
+            self._subscription = None
+
+    def now_ns(self):
+        """Return the simulated time [ns], 0 before the first clock message."""
+        return self._now_ns
+
+    def wait_until(self, wake_ns):
+        """Wait for the next clock message, and in lockstep for the inputs of its tick."""
+        subscription = self._subscription
+        if subscription is None:
+            return
+        try:
+            if self._pending_ns is None:
+                self._pending_ns = self._next(subscription)
+            if self._pending_ns is not None and self._inputs.arrived(self._pending_ns):
+                self._now_ns, self._pending_ns = self._pending_ns, None
+                set_node_clock(self._node, self._now_ns)
+        except InvalidHandle:
+            return              # left the clock while waiting
+
+    def _next(self, subscription):
+        """Return the next time to go to [ns]; None if no message came for a while."""
+        # In lockstep every message is a tick; else only the newest one counts.
+        limit = 1 if self._inputs else 2000
+        taken = subscription.take(limit)
+        if not taken:
+            subscription.wait(LONGEST_WAIT_S)
+            taken = subscription.take(limit)
+        if not taken:
+            return None
+        clock = taken[-1][0].clock
+        return clock.sec * 1_000_000_000 + clock.nanosec
+
+
+class PlantTime:
+    """
+    The time of the simulated rig, in steps of the plant's period; the plant publishes it.
+
+    ``paused`` stops it, ``step`` lets it go on by one period. ``achieved_rate`` tells
+    how many simulated seconds pass per second.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        The plant.
+    inputs : pam_actuation.nodes.lockstep.TickInputs
+        What must have arrived before the time goes on; none without lockstep.
+    period_s : float
+        Step [s].
+    rate : float
+        Simulated seconds per second; 0: as fast as the inputs arrive.
+    followers : tuple of str
+        Full names of nodes that must receive the clock before it starts.
+
+    """
+
+    def __init__(self, node, inputs, period_s, rate, followers=()):
+        self._node = node
+        self._inputs = inputs
+        self._period_ns = round(period_s * 1e9)
+        self._rate = rate
+        self._followers = followers
+        self._missing = ()
+        self._publisher = CountedPublisher(node, Clock, CLOCK_TOPIC)
+        self._message = Clock()
+        self._now_ns = START_NS
+        self._steps_left = 0
+        self.paused = False
+        self._begin_ns = START_NS
+        self._anchor = None
+        self._rate_anchor = None
+
+    def begin(self):
+        """Go on from the present, once all are there who take part."""
+        self._anchor = self._rate_anchor = None
+        self._missing = self._followers
+        self._begin_ns = self._now_ns
+        self._inputs.begin()
+
+    def end(self):
+        """Do nothing: the time stands still without loops."""
+
+    @property
+    def waits_for(self):
+        """Return the full names of the nodes that do not receive the clock yet."""
+        return self._missing
+
+    def now_ns(self):
+        """Return the simulated time [ns]."""
+        return self._now_ns
+
+    def publish(self):
+        """Tell everybody the time."""
+        stamp = self._message.clock
+        stamp.sec, stamp.nanosec = divmod(self._now_ns, 1_000_000_000)
+        self._publisher.publish(self._message)
+
+    def _follows(self, name):
+        """Tell whether a node subscribed by its own ``FollowedTime`` and not by rclpy's."""
+        ends = self._node.get_subscriptions_info_by_topic(CLOCK_TOPIC)
+        return self._publisher.matched_with(name) and any(
+            end.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            and full_name(end.node_namespace, end.node_name) == name for end in ends)
+
+    def step(self):
+        """Go on by one period although paused."""
+        self._steps_left += 1
+
+    def wait_until(self, wake_ns):
+        """Go on by one period when that is due."""
+        if self.paused and not self._steps_left:
+            self._anchor = self._rate_anchor = None
+            time.sleep(0.005)
+            return
+        if self._missing:
+            self._missing = tuple(name for name in self._missing if not self._follows(name))
+            time.sleep(0.02 if self._missing else 0.0)
+            return
+        # Before the first tick nobody has been asked for anything.
+        first = self._now_ns == self._begin_ns
+        try:
+            if not (first or self._inputs.arrived(self._now_ns)) or not self._due():
+                return
+        except InvalidHandle:
+            return              # cleaned up while waiting
+        self._steps_left -= self._steps_left > 0
+        self._now_ns += self._period_ns
+        set_node_clock(self._node, self._now_ns)
+
+    def _due(self):
+        """Wait until the rate allows the next period, at most 0.1 s; return whether it does."""
+        steady_ns = time.monotonic_ns()
+        if self._rate_anchor is None:
+            self._rate_anchor = (steady_ns, self._now_ns)
+        if self._rate == 0.0 or self.paused:
+            return True
+        if self._anchor is None:
+            self._anchor = (steady_ns, self._now_ns)
+        begin_ns, begin_simulated_ns = self._anchor
+        simulated_ns = self._now_ns + self._period_ns - begin_simulated_ns
+        left_s = (begin_ns + simulated_ns / self._rate - steady_ns) * 1e-9
+        if left_s < -FALLEN_BEHIND_S:
+            self._anchor = None
+        if left_s > 0.0:
+            time.sleep(min(left_s, LONGEST_WAIT_S))
+        return left_s <= LONGEST_WAIT_S
+
+    @property
+    def achieved_rate(self):
+        """Return simulated seconds per second since the start or the last pause."""
+        if self._rate_anchor is None:
+            return 0.0
+        begin_ns, begin_simulated_ns = self._rate_anchor
+        return (self._now_ns - begin_simulated_ns) / max(time.monotonic_ns() - begin_ns, 1)
