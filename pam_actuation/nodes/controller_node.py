@@ -28,6 +28,7 @@ from pam_sim.units import P_ATM_PA
 
 OK_REASON = REASONS[0]
 MEASURED = ('pressure', 'force', 'contraction')
+SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
 INPUTS = ('reference_trajectory', 'reference', *MEASURED)
 
 
@@ -66,9 +67,9 @@ class ControllerNode(ManagedNode):
     def inputs_of_a_tick(self):
         """Return the measurements and, of a reference that takes part, what it asks for."""
         by_topic = {topic: subscription for topic, subscription, _ in self.inputs}
-        awaited = [lockstep.EachTick(by_topic[topic]) for topic in MEASURED]
+        awaited = [lockstep.EachTick(by_topic[topic]) for topic in SENT_LAST_FIRST]
         if lockstep.REFERENCE in self.participants:
-            awaited += [lockstep.Stamped(by_topic['reference']), lockstep.Repeated(
+            awaited += [lockstep.OneTickOld(by_topic['reference']), lockstep.OneTickOld(
                 by_topic['reference_trajectory'], TRAJECTORY_EVERY_NS)]
         return awaited
 
@@ -89,12 +90,14 @@ class ControllerNode(ManagedNode):
 
     def tick(self):
         """Take the newest inputs, compute, send command and internals."""
-        for topic, subscription, handler in self.inputs:
-            for message, _ in subscription.take():
-                handler(from_ros(topic, message))
         now_ns = self.now_ns()
         if self.participants:
             self._check_step(now_ns)
+        for topic, subscription, handler in self.inputs:
+            # In lockstep the reference is that of the tick before.
+            old = self.participants and topic not in MEASURED
+            for message, _ in subscription.take_before(now_ns) if old else subscription.take():
+                handler(from_ros(topic, message))
         command, state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', state)

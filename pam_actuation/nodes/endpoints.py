@@ -23,6 +23,7 @@ arrived when the loop asks, each with the time it was received.
 import time
 
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import stamp_ns
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -131,6 +132,12 @@ class PolledSubscription:
         self.collect(limit)
         taken, self._waiting = self._waiting, []
         return taken
+
+    def take_before(self, time_ns):
+        """Return what ``take`` would as far as it is stamped before a time; keep the rest."""
+        taken = self.take()
+        self._waiting = [item for item in taken if stamp_ns(item[0]) >= time_ns]
+        return [item for item in taken if stamp_ns(item[0]) < time_ns]
 
     def collect(self, limit=2000):
         """Fetch what has arrived, up to ``limit`` waiting messages, and keep it for ``take``."""

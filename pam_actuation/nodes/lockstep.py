@@ -16,11 +16,11 @@
 Lockstep: all nodes of a rig go through the same ticks, none ahead of what it needs.
 
 Each node ticks once per message on ``/clock``, and only when what the tick needs has
-arrived. The plant sends measurements and clock, the reference answers the clock, the
-controller waits for both, the driver for the command, the plant for the valve
-signal before it goes on. So every node uses the same inputs in the same tick in every
-run, however long messages take. A node that stays silent is left out after a while,
-so that time goes on and its loss has the consequences it has in life.
+arrived. The plant sends measurements and clock, the controller waits for both and for
+the reference of the tick before, the driver for the command, the plant for the
+valve signal before it goes on. So every node uses the same inputs in the same tick in
+every run, however long messages take. A node that stays silent is left out after a
+while, so that time goes on and its loss has the consequences it has in life.
 """
 
 import time
@@ -107,19 +107,38 @@ class Stamped:
                    for one in self.subscriptions)
 
 
-class Repeated(Stamped):
-    """A topic that has a message every ``period_ns``, the first in the first tick."""
+class OneTickOld(Stamped):
+    """
+    A topic that is used one tick after it was sent, so that its sender is not waited for.
 
-    def __init__(self, subscription, period_ns):
+    The receiver takes what is stamped before the tick (``take_before``): what was sent in the
+    tick itself may have arrived already, or not.
+
+    Parameters
+    ----------
+    subscription : PolledSubscription
+        Of that topic.
+    period_ns : int
+        Time between two messages, the first in the first tick; 0: one per tick.
+
+    """
+
+    def __init__(self, subscription, period_ns=0):
         super().__init__(subscription)
         self._period_ns = period_ns
-        self._first_ns = None
+        self._first_ns = self._last_ns = self._tick_ns = None
 
     def arrived(self, tick_ns):
-        """Return whether the message due last is there."""
-        if self._first_ns is None:
-            self._first_ns = tick_ns
-        return super().arrived(tick_ns - (tick_ns - self._first_ns) % self._period_ns)
+        """Return whether the last message due before the tick is there."""
+        if tick_ns != self._tick_ns:
+            self._last_ns, self._tick_ns = self._tick_ns, tick_ns
+            self._first_ns = self._first_ns or tick_ns
+        if self._last_ns is None:
+            return True
+        due_ns = self._last_ns
+        if self._period_ns:
+            due_ns -= (due_ns - self._first_ns) % self._period_ns
+        return super().arrived(due_ns)
 
 
 class StampedIfSent(Stamped):

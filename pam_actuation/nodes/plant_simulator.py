@@ -146,10 +146,13 @@ class PlantSimulator(ManagedNode):
         if self.plant.steps == self._sampled_steps:
             return              # right after a late tick: there is nothing new to measure
         self._sampled_steps = self.plant.steps
-        for topic, plain in self.plant.sample(now_ns).items():
+        messages = self.plant.sample(now_ns)
+        if self.participants:
+            self.simulated_time.publish()       # first: who follows wakes up and waits for the rest
+        for topic, plain in messages.items():
             self.send(topic, plain)
-        if self.simulated_time is not None:
-            self.simulated_time.publish()
+        if self.simulated_time is not None and not self.participants:
+            self.simulated_time.publish()       # last: a tick finds what was measured for it
 
 
 def main(args=None):

@@ -29,13 +29,22 @@ pytestmark = pytest.mark.ros
 MISTAKES = {
     'valve_driver valve': (
         'valve_driver', ['valve_type:=xyz'], "valve_type: 'xyz' is not allowed", 'ppr or hsv'),
+    'valve_driver time': (
+        'valve_driver', ['backend:=iio_dac', 'use_sim_time:=true'], 'use_sim_time',
+        'not driven in simulated time'),
+    'plant_simulator clock': (
+        'plant_simulator', ['use_sim_time:=true', 'clock_rate:=0.0'], 'clock_rate',
+        'in lockstep only'),
+    'reference_generator lockstep': (
+        'reference_generator', ['lockstep:=[reference_generator]'], 'use_sim_time',
+        'simulated time'),
     'valve_driver limit': (
         'valve_driver', ['max_pressure_gauge_pa:=5e7'], 'max_pressure_gauge_pa: 5e+07',
         '1000 to 1e+06'),
     'plant_simulator rig': (
         'plant_simulator', ['rig:=dmsp_99'], 'dmsp_99', 'dmsp_5_300_realistic'),
     'plant_simulator rate': (
-        'plant_simulator', ['publish_rate_hz:=50'], 'publish_rate_hz: 50', '200 to 1000'),
+        'plant_simulator', ['publish_rate_hz:=50'], 'publish_rate_hz: 50', '100 to 1000'),
     'sofc_controller preset': (
         'sofc_controller', ['controller:=nobody'], 'nobody', 'sofc_ppr'),
     'pid_controller type': (
