@@ -33,6 +33,7 @@ PLANT, DRIVER, REFERENCE = 'plant_simulator', 'valve_driver', 'reference_generat
 CONTROLLERS = ('sofc_controller', 'pid_controller')
 PARTICIPANTS = (PLANT, DRIVER, REFERENCE, *CONTROLLERS)
 LEFT_OUT_AFTER_S = 2.0
+PLANT_PATIENCE_S = 2.5 * LEFT_OUT_AFTER_S   # the driver may have waited for others before it
 LONGEST_WAIT_S = 0.1
 TURN_S = 0.0005
 
@@ -94,6 +95,10 @@ class EachTick:
             self._ticks += 1
         return self.subscriptions[0].received - self._before >= self._ticks
 
+    def follows(self, before_ns):
+        """Return False: a count that was lost once stays lost."""
+        return False
+
 
 class Stamped:
     """A message with the stamp of the tick, on any one of some topics."""
@@ -103,7 +108,11 @@ class Stamped:
 
     def arrived(self, tick_ns):
         """Return whether the message of a tick is there."""
-        return any(one.newest is not None and stamp_ns(one.newest) >= tick_ns
+        return self.follows(tick_ns)
+
+    def follows(self, before_ns):
+        """Return whether the newest message is of a certain tick or later."""
+        return any(one.newest is not None and stamp_ns(one.newest) >= before_ns
                    for one in self.subscriptions)
 
 
@@ -138,7 +147,7 @@ class OneTickOld(Stamped):
         due_ns = self._last_ns
         if self._period_ns:
             due_ns -= (due_ns - self._first_ns) % self._period_ns
-        return super().arrived(due_ns)
+        return self.follows(due_ns)
 
 
 class StampedIfSent(Stamped):
@@ -161,16 +170,20 @@ class TickInputs:
         Whether the node takes part in a lockstep.
     report : callable
         Gets one sentence when a sender is left out or is back.
+    patience_s : float
+        A sender silent for longer than this is left out [s].
 
     """
 
-    def __init__(self, make, active, report):
+    def __init__(self, make, active, report, patience_s=LEFT_OUT_AFTER_S):
         self._make = make
         self._active = active
         self._report = report
+        self._patience_s = patience_s
         self._inputs = []
-        self._left_out = set()
+        self._left_out = {}          # input to the tick it was missing in
         self._since_s = None
+        self._before_ns = None
 
     def __bool__(self):
         """Tell whether this is a lockstep."""
@@ -179,8 +192,9 @@ class TickInputs:
     def begin(self):
         """Begin to count."""
         self._inputs = self._make() if self._active else []
-        self._left_out = set()
+        self._left_out = {}
         self._since_s = None
+        self._before_ns = None
 
     def arrived(self, tick_ns):
         """Wait for what a tick needs, at most 0.1 s; return whether all of it is there."""
@@ -190,20 +204,21 @@ class TickInputs:
                 now_s = time.monotonic()
                 deadline_s = deadline_s or now_s + LONGEST_WAIT_S
                 if now_s >= deadline_s:
-                    return self._give_up(one, now_s)
+                    return self._give_up(one, tick_ns, now_s)
                 self._wait(one, deadline_s - now_s)
         self._since_s = None
+        self._before_ns = tick_ns
         return True
 
     def _there(self, one, tick_ns):
         for subscription in one.subscriptions:
             subscription.collect()
-        if not one.arrived(tick_ns):
-            return one in self._left_out
         if one in self._left_out:
-            self._left_out.remove(one)
+            if not one.follows(max(self._left_out[one], self._before_ns or 0)):
+                return True
+            del self._left_out[one]
             self._report(f'{_names(one)} takes part in the lockstep again')
-        return True
+        return one.arrived(tick_ns)
 
     @staticmethod
     def _wait(one, longest_s):
@@ -212,12 +227,12 @@ class TickInputs:
         for subscription in one.subscriptions:
             subscription.wait(TURN_S if several else longest_s)
 
-    def _give_up(self, one, now_s):
+    def _give_up(self, one, tick_ns, now_s):
         """Return False, for the next call to wait on; note a sender that is silent for long."""
         self._since_s = self._since_s or now_s
-        if now_s - self._since_s > LEFT_OUT_AFTER_S:
+        if now_s - self._since_s > self._patience_s:
             self._since_s = None
-            self._left_out.add(one)
+            self._left_out[one] = tick_ns
             self._report(f'{_names(one)} is silent and left out of the lockstep')
         return False
 

@@ -168,10 +168,10 @@ class ManagedNode(LifecycleNode):
         """Tell whether this node was started with use_sim_time."""
         return bool(self.get_parameter('use_sim_time').value)
 
-    def tick_inputs(self):
+    def tick_inputs(self, patience_s=lockstep.LEFT_OUT_AFTER_S):
         """Return the ``TickInputs`` of this node."""
         return TickInputs(
-            self.inputs_of_a_tick, bool(self.participants), self.get_logger().warning)
+            self.inputs_of_a_tick, bool(self.participants), self.get_logger().warning, patience_s)
 
     def topics_sent(self):
         """Return (short topic name, publisher) of all topics of the rig this node sends."""

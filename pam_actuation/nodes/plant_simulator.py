@@ -90,8 +90,9 @@ class PlantSimulator(ManagedNode):
             raise InputError('another node publishes it; the plant is the only clock', CLOCK_TOPIC)
         followers = tuple(full_name(self.get_namespace(), name)
                           for name in self.participants if name != self.NAME)
-        return PlantTime(self, self.tick_inputs(), 1.0 / self.value('publish_rate_hz'),
-                         self.value('clock_rate'), followers)
+        return PlantTime(
+            self, self.tick_inputs(lockstep.PLANT_PATIENCE_S),
+            1.0 / self.value('publish_rate_hz'), self.value('clock_rate'), followers)
 
     def inputs_of_a_tick(self):
         """Return the signal of the driver and, where there is one, the disturbance."""
@@ -148,7 +149,7 @@ class PlantSimulator(ManagedNode):
         self._sampled_steps = self.plant.steps
         messages = self.plant.sample(now_ns)
         if self.participants:
-            self.simulated_time.publish()       # first: who follows wakes up and waits for the rest
+            self.simulated_time.publish()       # first: the others wake up and await the rest
         for topic, plain in messages.items():
             self.send(topic, plain)
         if self.simulated_time is not None and not self.participants:

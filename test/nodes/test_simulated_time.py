@@ -96,19 +96,20 @@ def test_what_is_used_one_tick_later_is_asked_for_one_tick_later():
 
 
 def test_a_silent_sender_is_left_out_and_may_come_back(monkeypatch):
-    monkeypatch.setattr('pam_actuation.nodes.lockstep.LEFT_OUT_AFTER_S', 0.05)
     monkeypatch.setattr('pam_actuation.nodes.lockstep.LONGEST_WAIT_S', 0.02)
     said, messages = [], Messages()
-    inputs = TickInputs(lambda: [Stamped(messages)], True, said.append)
+    inputs = TickInputs(lambda: [Stamped(messages)], True, said.append, patience_s=0.05)
     inputs.begin()
     deadline = time.monotonic() + 5.0
     while not inputs.arrived(STEP_NS):
         assert time.monotonic() < deadline
     assert said == ['/muscle/force is silent and left out of the lockstep']
+    assert inputs.arrived(2 * STEP_NS)              # nobody waits for it any more
     messages.put(2 * STEP_NS)
-    assert inputs.arrived(2 * STEP_NS)
+    assert not inputs.arrived(3 * STEP_NS)          # until it follows again
     assert said[1] == '/muscle/force takes part in the lockstep again'
-    assert not inputs.arrived(3 * STEP_NS)
+    messages.put(3 * STEP_NS)
+    assert inputs.arrived(3 * STEP_NS)
 
 
 def test_without_lockstep_nothing_is_waited_for():
