@@ -94,7 +94,8 @@ class LoopSet:
             time.sleep(LONGEST_SLEEP_NS * 1e-9)
             return
         self.time.wait_until(min(
-            (loop.next_ns for loop in loops if loop.clock is self.time), default=0))
+            (loop.next_ns for loop in loops if loop.clock is self.time),
+            default=self.time.now_ns() + LONGEST_SLEEP_NS))
         with self.lock:
             for loop in self._loops:
                 now_ns = loop.clock.now_ns()

@@ -343,7 +343,8 @@ class ManagedNode(LifecycleNode):
         self.start()
         self.diagnostics.silent = False
         # Also while a simulated time stands still.
-        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send, SteadyTime())
+        steady = None if self.simulated_time is None else SteadyTime()
+        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send, steady)
         self.diagnostics.update(OK, 'active')
         self.get_logger().info('active')
 

@@ -14,7 +14,7 @@
 
 """Test the loops of a node and their statistics, without ROS."""
 
-from pam_actuation.nodes.loops import Loop, LoopSet
+from pam_actuation.nodes.loops import Loop, LoopSet, SteadyTime
 from pam_actuation.nodes.timing import LoopTiming
 
 MS = 1_000_000
@@ -52,6 +52,34 @@ def test_a_loop_may_end_all_loops():
     loops.add(0.001, loops.clear)
     loops.run_once()
     assert not loops
+
+
+class StandingTime:
+    """A time that goes on only by hand."""
+
+    def __init__(self):
+        self.time_ns = 0
+
+    def now_ns(self):
+        return self.time_ns
+
+    def wait_until(self, wake_ns):
+        pass
+
+
+def test_loops_run_on_the_time_they_are_given():
+    loops = LoopSet()
+    loops.time = StandingTime()
+    calls = []
+    loops.add(0.01, lambda: calls.append('simulated'))
+    loops.add(0.001, lambda: calls.append('steady'), SteadyTime())
+    while calls.count('steady') < 5:
+        loops.run_once()
+    assert 'simulated' not in calls
+    for _ in range(3):
+        loops.time.time_ns += 10 * MS
+        loops.run_once()
+    assert calls.count('simulated') == 3
 
 
 def test_timing_counts_period_jitter_and_overruns():
