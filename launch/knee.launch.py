@@ -25,10 +25,11 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import EmitEvent
 from launch.actions import RegisterEventHandler
-from launch.conditions import LaunchConfigurationNotEquals
+from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
+from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -96,7 +97,7 @@ def generate_launch_description():
         'reference_generator',
         {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
          'start_delay_s': 3.0, 'exit_when_finished': True},
-        condition=LaunchConfigurationNotEquals('experiment', ''))
+        condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration('experiment'), '')))
     ends = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
