@@ -79,6 +79,7 @@ def measurement_reason(message, value, allowed, reasons, now_ns):
     reasons : tuple of int
         Codes of: none yet, too old, too far ahead, not finite, implausible.
     now_ns : int
+        Time on the clock of the stamps.
 
     """
     none, old, ahead, not_finite, implausible = reasons

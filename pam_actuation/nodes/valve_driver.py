@@ -45,9 +45,9 @@ class ValveDriver(ManagedNode):
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
             'high-speed valves.', choices=('ppr', 'hsv')),
         NodeParameter(
-            'rig', '', 'Rig preset or model file that tells the driver valves, volume and load, or '
-            'JOINT/flexor and JOINT/extensor; numbers given beside it win. Empty: the defaults of '
-            'the parameters.'),
+            'rig', '', 'Rig preset or model file, or JOINT/flexor and JOINT/extensor, that tells '
+            'the driver valves, volume and load; numbers given beside it win. Empty: the '
+            'defaults of the parameters.'),
         NodeParameter(
             'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
             'pressure_command; supervised alike.'),

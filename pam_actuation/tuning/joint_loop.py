@@ -18,8 +18,6 @@ Closed-loop rollouts in joint mode: two muscles turn a limb, the angle is tracke
 The same compiled steps as in the controller, drivers and joint, as in ``closed_loop``.
 """
 
-import math
-
 import numpy as np
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config

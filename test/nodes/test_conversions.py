@@ -44,7 +44,8 @@ SAMPLES = {
 JOINT_SAMPLES = {
     'joint_state': messages.JointAngle(STAMP_NS, 0.25, -1.5),
     'joint_reference': messages.AngleReference(STAMP_NS, 0.25, -0.1),
-    'joint_trajectory': messages.AngleTrajectory(STAMP_NS, (0, 20_000_000), (0.2, 0.3), (0.0, 5.0)),
+    'joint_trajectory': messages.AngleTrajectory(
+        STAMP_NS, (0, 20_000_000), (0.2, 0.3), (0.0, 5.0)),
     'co_contraction': messages.Pressure(STAMP_NS, 401_325.0),
 }
 
