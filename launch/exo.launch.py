@@ -44,10 +44,12 @@ def generate_launch_description():
     """Return the arguments and two knees."""
     arguments = [DeclareLaunchArgument(name, default_value=default, description=text)
                  for name, (default, text) in HANDED_ON.items()]
-    knee = PythonLaunchDescriptionSource(str(Path(__file__).with_name('knee.launch.py')))
+    file = str(Path(__file__).with_name('knee.launch.py'))
+    # A source of its own for each: a source describes its nodes once, and they start once.
     knees = [
-        GroupAction([IncludeLaunchDescription(knee, launch_arguments={
-            **{name: LaunchConfiguration(name) for name in HANDED_ON},
-            'namespace': namespace, 'seed': str(k)}.items())])
+        GroupAction([IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(file), launch_arguments={
+                **{name: LaunchConfiguration(name) for name in HANDED_ON},
+                'namespace': namespace, 'seed': str(k)}.items())])
         for k, namespace in enumerate(KNEES)]
     return LaunchDescription([*arguments, *knees])

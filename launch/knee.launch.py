@@ -35,6 +35,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
+NAME = {'muscle': ParameterValue(LaunchConfiguration('namespace'), value_type=str)}
 
 
 def _arguments():
@@ -77,7 +78,8 @@ def _node(executable, *parameters, side='', condition=None):
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable, namespace=namespace,
         output='screen', condition=condition,
-        parameters=[{'realtime_priority': ParameterValue(priority, value_type=int)}, *parameters])
+        parameters=[{'realtime_priority': ParameterValue(priority, value_type=int)}, NAME,
+                    *parameters])
 
 
 def generate_launch_description():
