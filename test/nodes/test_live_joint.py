@@ -85,7 +85,7 @@ def holds(rig, angle_rad):
 
 
 def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(knee):
-    wait_for(lambda: holds(knee, 0.3), 90.0, 'the angle of the experiment')
+    wait_for(lambda: holds(knee, 0.3), 150.0, 'the angle of the experiment')
     assert math.isclose(newest(knee, 'joint_reference').angle_rad, 0.3)
     for side in SIDES:      # both pull: co-contraction
         assert newest(knee, f'{side}/pressure').pressure_pa > P_ATM_PA + 100e3
@@ -104,13 +104,3 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
     wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')
     wait_for(lambda: max(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES)
              < P_ATM_PA + 20e3, 30.0, 'the air of both muscles to leave')
-
-
-def test_both_muscles_are_vented_when_the_controller_is_ended(knee):
-    commands = [f'{side}/pressure_command' for side in SIDES]
-    wait_for(lambda: all(knee.heard[topic] and newest(knee, topic).pressure_pa > P_ATM_PA + 50e3
-                         for topic in commands), 90.0, 'commands for both muscles')
-    process = knee.processes['joint_controller']
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(20.0) and process.exit_code == 0
-    wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')
