@@ -196,8 +196,19 @@ def build(case, folder, with_gap=True):
         truths[part] = truth
     (folder / 'model.yaml').write_text(
         f'rig: dmsp_5_300_hanging_mass\nvalve: {case.valve}\n', encoding='utf-8')
+    key = key_of(case, drawn) | {'noise': chain.noise, 'filter_s': chain.filter_s}
+    if with_gap:
+        key['gap_sigma'] = gap.gap_in_sigma(
+            drawn.numbers, drawn.without, chain, truths['fit'], truths['certify'], case.valve)
+        if len(key['effects']) > 1:
+            key['gap_alone'] = {e: _alone(case, drawn, chain, e, truths) for e in key['effects']}
+    return key
+
+
+def key_of(case, drawn):
+    """Return what is true of a case as plain data."""
     names = [e for e in case.effects if e in effects.EFFECTS]
-    key = {
+    return {
         'name': case.name, 'kind': case.kind, 'valve': case.valve, 'protocol': case.protocol,
         'certify': CERTIFY[case.protocol], 'with_force': case.with_force,
         'effects': names, 'outside': [e for e in case.effects if e not in effects.EFFECTS
@@ -207,14 +218,7 @@ def build(case, folder, with_gap=True):
         'subsystem': {e: effects.EFFECTS[e].subsystem for e in names},
         'equivalent': drawn.equivalent, 'scales': drawn.scales,
         'numbers': {p: drawn.numbers[effects.PARAMETERS[p][0]]
-                    for p in effects.PARAMETERS_OF[case.valve]},
-        'noise': chain.noise, 'filter_s': chain.filter_s}
-    if with_gap:
-        key['gap_sigma'] = gap.gap_in_sigma(
-            drawn.numbers, drawn.without, chain, truths['fit'], truths['certify'], case.valve)
-        if len(names) > 1:
-            key['gap_alone'] = {e: _alone(case, drawn, chain, e, truths) for e in names}
-    return key
+                    for p in effects.PARAMETERS_OF[case.valve]}}
 
 
 def _alone(case, drawn, chain, effect, truths):
