@@ -53,6 +53,10 @@ AMBIGUITIES = (
     ('narrow_friction', ('coulomb_friction', 'pressure_friction'), 'narrow', True))
 
 
+# By how much a wrong number is off, where 10 to 20 % would hardly move anything.
+WRONG = {'damping_n_s_per_m': (0.35, 0.6), 'V_dead': (0.2, 0.4)}
+
+
 @dataclass(frozen=True)
 class Case:
     """One case before it is drawn."""
@@ -152,7 +156,8 @@ def draw(case):
 def _add(found, effect, case, rng):
     if effect in effects.PARAMETERS:
         number, nominal = effects.PARAMETERS[effect]
-        size = rng.uniform(0.35, 0.6) if number == 'damping' else rng.uniform(0.10, 0.20)
+        low, high = WRONG.get(effect, (0.10, 0.20))
+        size = rng.uniform(low, high)
         value = nominal * (1.0 + rng.choice((-1.0, 1.0)) * size)
         found.numbers[number] = value
         found.wrong[effect] = value

@@ -202,8 +202,9 @@ def protocol(name, seed):
             **sines, 'min_hz': 0.2, 'max_hz': 0.6, 'lines': 3, 'duration_s': 27.0,
             'seed': draw}}]
     elif name == 'narrow':
-        segments = [{'ramp': {'to_pa': middle - 12e3, 'duration_s': 1.0}}, {'sine': {
-            'center_pa': middle, 'amplitude_pa': 12e3, 'frequency_hz': 0.5, 'cycles': 13}}]
+        start = []                # a rise from low pressure would show more
+        segments = [{'sine': {'center_pa': middle, 'amplitude_pa': 12e3, 'frequency_hz': 0.5,
+                              'cycles': 14}}]
     elif name == 'multisine':
         segments = [to_middle, {'multisine': {**sines, 'duration_s': 27.0, 'seed': draw}}]
     elif name == 'triangle':
