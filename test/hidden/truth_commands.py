@@ -203,7 +203,7 @@ def protocol(name, seed):
             'seed': draw}}]
     elif name == 'narrow':
         start = []                # a rise from low pressure would show more
-        segments = [{'sine': {'center_pa': middle, 'amplitude_pa': 12e3, 'frequency_hz': 0.5,
+        segments = [{'sine': {'center_pa': middle, 'amplitude_pa': 8e3, 'frequency_hz': 0.5,
                               'cycles': 14}}]
     elif name == 'multisine':
         segments = [to_middle, {'multisine': {**sines, 'duration_s': 27.0, 'seed': draw}}]
