@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Run the gap look on loaded bags and write its folder.
+Run the gap workflow on loaded bags and write its folder.
 
 ``gap.json``, ``model.yaml``, ``compare.mcap`` and ``report.html``, each written whole or
 not at all.
@@ -37,7 +37,7 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
-from pam_sim.gap import gap_first_look
+from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
 from pam_sim.rig import Rig
@@ -47,20 +47,22 @@ FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
 
-def write_gap(runs, model, out_dir, seconds=20.0):
+def write_gap(runs, model, out_dir, certify=None, **options):
     """
-    Measure the gap between recordings and a model and write the result folder.
+    Find the gap between recordings and a model and write the result folder.
 
     Parameters
     ----------
     runs : list of pam_sim.run.Run
-        Recordings; the first one is looked at.
+        Recordings that are searched.
     model : str, path or pam_sim.Rig
         The model. A preset named without its valve gets that of the recording.
     out_dir : path
         Folder for the results; made if needed.
-    seconds : float
-        Time budget of the calibration.
+    certify : pam_sim.run.Run, optional
+        Recording for the proof; by default blocks of the first one.
+    options
+        As of :func:`pam_sim.gap.find_gap`.
 
     Returns
     -------
@@ -74,12 +76,8 @@ def write_gap(runs, model, out_dir, seconds=20.0):
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
-    run = runs[0]
-    result = gap_first_look(run, model_for(run, model), seconds)
-    if len(runs) > 1:
-        result.remarks.append(
-            f'This version looks at one recording at a time; shown is {run.path}.')
-    save_gap(result, run, out_dir)
+    result = find_gap(runs, model_for(runs[0], model), certify, **options)
+    save_gap(result, certify or runs[0], out_dir)
     return result
 
 

@@ -163,18 +163,20 @@ def run_from_pressure(rig, recording):
         pressure_driven(rig), recording, _fast_command(recording)))
 
 
-def simulate_driven(rig, recording, contraction_m, valve_signal=None):
+def simulate_driven(rig, recording, contraction_m, valve_signal=None, start_pa=None):
     """
     Run the rig with the contraction prescribed on the grid; return its Response.
 
     Without a valve signal the measured pressure is the input, for a rig from
-    ``pressure_driven``. Force is then the tension of the muscle alone.
+    ``pressure_driven``. Force is then the tension of the muscle alone. It starts from
+    ``start_pa``, by default the recorded pressure.
     """
     if valve_signal is None:
         valve_signal = _fast_command(recording)
+    start_pa = recording.start('pressure') if start_pa is None else start_pa
     return rig.with_(load='driven').simulate(
         valve_signal, contraction_m=np.maximum(contraction_m, 0.0),
-        initial_pressure_pa=max(recording.start('pressure'), P_ATM_PA), dt_s=GRID_S)
+        initial_pressure_pa=max(start_pa, P_ATM_PA), dt_s=GRID_S)
 
 
 def _fast_command(recording):
@@ -187,7 +189,7 @@ def _fast_command(recording):
 
 def pressure_driven(rig):
     """Return the rig with a regulator that follows its command at once."""
-    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load')]
+    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load', 'sensor')]
     return rig.with_(valve='ppr', effects=kept, parameters={
         'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
 

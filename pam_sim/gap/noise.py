@@ -85,3 +85,22 @@ def rms_rate(time_s, values, noise=0.0):
     change = np.asarray(values)[span:] - np.asarray(values)[:-span]
     squared = np.mean((change / seconds) ** 2) - 2.0 * (noise / (span * period)) ** 2
     return float(np.sqrt(max(squared, 0.0)))
+
+
+def autocorrelation_time(values):
+    """
+    Return the integrated autocorrelation time in samples, at least 1.
+
+    Summed up to the first negative value, as is usual for noisy estimates.
+    """
+    values = np.asarray(values, dtype=float) - np.mean(values)
+    n = values.size
+    if n < 8 or not np.any(values):
+        return 1.0
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(values, size)
+    correlation = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n]
+    correlation /= correlation[0]
+    negative = np.flatnonzero(correlation < 0.0)
+    stop = negative[0] if negative.size else n
+    return float(min(max(1.0 + 2.0 * correlation[1:stop].sum(), 1.0), n / 10.0))

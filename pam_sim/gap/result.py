@@ -129,6 +129,8 @@ class GapResult:
         For compare.mcap and plots; not part of gap.json.
     model_yaml : str
         The final model.
+    moved : dict of str -> float
+        By signal, how far the final model moves it, in standard deviations of its sensor.
 
     """
 
@@ -149,6 +151,7 @@ class GapResult:
     remarks: list = field(default_factory=list)
     traces: dict = field(default_factory=dict)
     model_yaml: str = ''
+    moved: dict = field(default_factory=dict)
 
     def text(self):
         """Return the result in lines for a person."""
@@ -157,7 +160,8 @@ class GapResult:
             factor, unit = READABLE[name]
             rows.append(
                 f'  {name}: noise floor {s.noise_floor * factor:.3g}, model off by '
-                f'{s.rmse_before * factor:.3g}, calibrated {s.rmse_refit * factor:.3g} {unit} rms')
+                f'{s.rmse_before * factor:.3g}, calibrated {s.rmse_refit * factor:.3g}, '
+                f'final {s.rmse_after * factor:.3g} {unit} rms')
         return '\n'.join(rows + [f'  {r}' for r in self.remarks])
 
     def to_dict(self):
