@@ -172,7 +172,7 @@ def _add(found, effect, case, rng):
         if case.kind == 'two':
             low, high = max(low, 0.6), min(high, 1.5)
         elif case.kind == 'ambiguous':
-            low, high = {'slow_gait': (0.25, 0.4), 'narrow': (0.3, 0.5)}.get(
+            low, high = {'slow_gait': (0.45, 0.65), 'narrow': (0.3, 0.5)}.get(
                 case.protocol, (0.4, 1.2))
         scale = float(np.exp(rng.uniform(np.log(low), np.log(high))))
         drawn = hidden.draw(rng, scale, case.valve)
