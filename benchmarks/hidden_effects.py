@@ -27,8 +27,6 @@ Exit code 1 when a bar is missed.
 """
 
 import argparse
-import contextlib
-import io
 import json
 from pathlib import Path
 import platform
@@ -44,6 +42,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The generator and the scorer live beside their tests; runs from the source tree as it stands.
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
+from asking import pam_gap  # noqa: E402
 from scoring_table import scored, table  # noqa: E402
 from scoring_text import report  # noqa: E402
 import truth_cases  # noqa: E402
@@ -141,20 +140,6 @@ def answer(folder, name, runs, materiality):
     result = pam_gap(folder, [folder / run for run in runs], folder / name, materiality)
     target.write_text(json.dumps({
         'result': result, 'wall_s': time.perf_counter() - begun}), encoding='utf-8')
-
-
-def pam_gap(folder, runs, out, materiality):
-    """Return what `pam gap` wrote into gap.json, or that it did not get so far."""
-    from pam_actuation.cli.main import main as pam
-    said = io.StringIO()
-    arguments = ['gap', *map(str, runs), '--model', str(folder / 'model.yaml'), '--certify',
-                 str(folder / 'certify'), '--out', str(out), '--materiality', str(materiality)]
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            pam(arguments)
-        return json.loads((out / 'gap.json').read_text(encoding='utf-8'))
-    except (Exception, SystemExit) as error:      # a crash is an answer, too: a wrong one
-        return {'verdict': 'crashed', 'reason': f'{error!r} {said.getvalue()[-2000:]}'}
 
 
 def follow(case, work, materiality):
