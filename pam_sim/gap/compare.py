@@ -24,7 +24,7 @@ let the few blocks with the largest error decide.
 import numpy as np
 from pam_sim.gap.parts import SELECT
 
-ACTIVE_CHI2 = 1.3            # of the baseline; quieter blocks say nothing
+ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks say nothing
 ACTIVE_SHARE = 0.05          # of the mean gap
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
 MIN_BLOCKS = 4
@@ -34,7 +34,7 @@ NO_TEST_T = 0.0
 
 def gap(cut, errors, part=SELECT):
     """Return the mean squared error beyond the noise, in floors squared."""
-    return cut.chi2(errors, part) - 1.0
+    return cut.chi2(errors, part) - cut.level
 
 
 def share(cut, base, errors, part=SELECT):
@@ -76,8 +76,9 @@ def preference(cut, base, better, worse, part=SELECT):
 
     """
     _, before = block_chi2(cut, base, part)
-    mean = max(float(np.mean(before)) - 1.0, 0.0)
-    active = (before > ACTIVE_CHI2) & (before - 1.0 > ACTIVE_SHARE * mean)
+    mean = max(float(np.mean(before)) - cut.level, 0.0)
+    least = max(min(ACTIVE_GAP, mean), ACTIVE_SHARE * mean)
+    active = before - cut.level > least
     if active.sum() < MIN_BLOCKS:
         return NO_TEST_T
     first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))

@@ -22,12 +22,13 @@ faster than the whole. A sensor effect on a measured input is taken out of it.
 """
 
 from dataclasses import dataclass
+import itertools
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.free_run import (
     FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven)
-from pam_sim.gap.noise import noise_sd, rms_rate, SMALLEST, STAMP_SD_S
+from pam_sim.gap.noise import noise_of, noise_sd, rms_rate, SMALLEST, STAMP_SD_S
 from pam_sim.gap.parts import part_of
 from pam_sim.gap.result import FIELD
 from pam_sim.units import P_ATM_PA
@@ -83,6 +84,9 @@ class Cut:
         Numbers of the rig and of the measurement that act here.
     floor : dict of str -> float
         Standard deviation of what noise and stamps explain, by signal.
+    level : float
+        Mean squared error in floors squared that noise alone leaves: 1, or less where the
+        floor turned out too careful.
     part, block, signal : numpy.ndarray of int, shape (N,)
         Part, test block and signal (index into ``signals``) of every compared sample.
 
@@ -93,8 +97,10 @@ class Cut:
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self.recordings = recordings
         self.signals = self._outputs(recordings[0])
-        self.simulations = 0
+        self.level = 1.0
+        self._count = itertools.count()      # several threads count at once
         self.known = self._rig_numbers(rig) + self._nuisances(recordings[0])
+        self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured = [], [], [], [], []
         first = 0
         for recording in recordings:
@@ -104,10 +110,11 @@ class Cut:
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
                 chosen[name] = np.arange(0, time_s.size, every)
                 at = time_s[chosen[name]]
+                chosen[name] = at
                 parts.append(part_of(at, recording.grid_s[-1], own_proof))
                 blocks.append(first + (at // TEST_BLOCK_S).astype(int))
                 signals.append(np.full(at.size, s))
-                measured.append(recording.measured[name][chosen[name]])
+                measured.append(recording.measured[name][::every])
             self._index.append(chosen)
             first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
         self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
@@ -134,13 +141,21 @@ class Cut:
         numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
         rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
         found = []
-        for recording, chosen in zip(self.recordings, self._index):
-            response = self._simulate(rig, recording, numbers)
-            self.simulations += 1
+        for index, instants in enumerate(self._index):
+            response = self._simulate(rig, index, numbers)
+            next(self._count)
             for name in self.signals:
-                found.append(np.interp(recording.time_s[name][chosen[name]], response.time_s,
-                                       getattr(response, FIELD[name])))
+                late = numbers.get('force_skew', 0.0) if name == 'force' else 0.0
+                place = np.clip((instants[name] - late) / GRID_S, 0.0, len(response) - 1.001)
+                row = place.astype(int)
+                value = getattr(response, FIELD[name])
+                found.append(value[row] + (place - row) * (value[row + 1] - value[row]))
         return np.concatenate(found)
+
+    @property
+    def simulations(self):
+        """Return how many simulations were made so far."""
+        return self._count.__reduce__()[1][0]
 
     def chi2(self, errors, part):
         """Return the mean squared error in a part, each signal with the same weight."""
@@ -174,9 +189,10 @@ class Cut:
     @staticmethod
     def _sensor_floor(recording, name):
         time_s, values = recording.time_s[name], recording.measured[name]
-        noise = noise_sd(values)
-        return float(np.sqrt(noise ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise)) ** 2
-                             + SMALLEST[name] ** 2))
+        noise = noise_of(time_s, values)
+        return float(np.sqrt(
+            noise.sd ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise.white_sd)) ** 2
+            + SMALLEST[name] ** 2))
 
 
 class ValveCut(Cut):
@@ -212,12 +228,12 @@ class ValveCut(Cut):
         self._shift_s = None if random is None else [
             STAMP_SD_S * random.standard_normal(r.messages) for r in self.recordings]
 
-    def _simulate(self, rig, recording, numbers):
-        index = self.recordings.index(recording)
+    def _simulate(self, rig, index, numbers):
+        recording = self.recordings[index]
         shift = None if self._shift_s is None else self._shift_s[index]
         x = _true('contraction', rig, *self._motion[index])
         kept = [e for e in rig.effects if acts_on(e.name, 'valve')]
-        p = recording.start('pressure') + numbers.get('start_error', 0.0)
+        p = self._start[index]['pressure'] + numbers.get('start_error', 0.0)
         return simulate_driven(
             rig.with_(effects=kept), recording, x,
             recording.valve_signal(numbers['latency'], shift),
@@ -231,7 +247,10 @@ class MechanicsCut(Cut):
 
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self._noise_pa = [0.0] * len(recordings)
-        self._pressure = [_smooth(r, 'pressure') for r in recordings]
+        self._noise = [noise_of(r.time_s['pressure'], r.measured['pressure'])
+                       for r in recordings]
+        self._pressure = [tuple(np.interp(r.time_s['pressure'], r.grid_s, y)
+                                for y in _smooth(r, 'pressure')) for r in recordings]
         super().__init__(rig, recordings, own_proof, seed)
 
     @staticmethod
@@ -259,40 +278,33 @@ class MechanicsCut(Cut):
         return found
 
     def _disturb(self, random):
-        self._noise_pa = [0.0 if random is None else noise_sd(r.measured['pressure'])
-                          * random.standard_normal(r.time_s['pressure'].size)
-                          for r in self.recordings]
+        self._noise_pa = [0.0 if random is None else noise.draw(r.time_s['pressure'], random)
+                          for r, noise in zip(self.recordings, self._noise)]
 
-    def _simulate(self, rig, recording, numbers):
-        index = self.recordings.index(recording)
-        _, rate = self._pressure[index]
-        p = _true('pressure', rig, recording.measured['pressure'] + self._noise_pa[index],
-                  np.interp(recording.time_s['pressure'], recording.grid_s, rate))
-        # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
-        at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - numbers['pressure_skew']
-        command = (np.interp(at, recording.time_s['pressure'], p) - P_ATM_PA) / FAST_GAIN_PA_PER_V
-        command = np.clip(command, 0.0, 6.0)
+    def _simulate(self, rig, index, numbers):
+        recording = self.recordings[index]
         rig = pressure_driven(rig)
-        start = max(_true('pressure', rig, recording.start('pressure'), 0.0), P_ATM_PA)
+        command = self._command(rig, index, numbers['pressure_skew'])
+        start = max(_true('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
         if recording.driven:
             x = np.interp(recording.grid_s, recording.time_s['contraction'],
                           recording.measured['contraction'])
-            return _Shifted(simulate_driven(rig, recording, x, command, start),
-                            numbers.get('force_skew', 0.0))
-        x = _true('contraction', rig, recording.start('contraction'), 0.0)
-        return _Shifted(rig.simulate(
+            return simulate_driven(rig, recording, x, command, start)
+        x = _true('contraction', rig, self._start[index]['contraction'], 0.0)
+        return rig.simulate(
             command, external_force_n=recording.external_force_n, initial_pressure_pa=start,
-            initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S),
-            numbers.get('force_skew', 0.0))
+            initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S)
 
-
-class _Shifted:
-    """A response whose force is read a little late."""
-
-    def __init__(self, response, late_s):
-        self.time_s, self.contraction_m = response.time_s, response.contraction_m
-        self.force_n = response.force_n if late_s == 0.0 else np.interp(
-            response.time_s - late_s, response.time_s, response.force_n)
+    def _command(self, rig, index, skew_s):
+        """Return the voltage at which the stand-in for the valve gives the measured pressure."""
+        recording = self.recordings[index]
+        time_s, rate = recording.time_s['pressure'], self._pressure[index][1]
+        p = _true('pressure', rig, recording.measured['pressure'] + self._noise_pa[index],
+                  rate)
+        # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
+        at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
+        command = (np.interp(at, time_s, p) - P_ATM_PA) / FAST_GAIN_PA_PER_V
+        return np.clip(command, 0.0, 6.0)
 
 
 def cuts_of(rig, recordings, own_proof=True, seed=0):

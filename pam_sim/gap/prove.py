@@ -21,8 +21,8 @@ recorded valve signal alone.
 
 import numpy as np
 from pam_sim.gap.free_run import free_run
-from pam_sim.gap.noise import noise_floor, noise_sd, STAMP_SD_S
-from pam_sim.gap.parts import CERTIFY, part_of
+from pam_sim.gap.noise import noise_floor, noise_of, STAMP_SD_S
+from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT
 
 INPUT_DRAWS = 3
@@ -66,13 +66,13 @@ class Proof:
 
     def __init__(self, run, recording, whole, problem, base, final, seed=0):
         self.recording, self.problem = recording, problem
-        self.part = {s: np.ones(recording.time_s[s].size, bool) if whole else
+        self.part = {s: recording.time_s[s] > SETTLE_S if whole else
                      part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY
                      for s in recording.signals}
         self.before = free_run(problem.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
-        self.noise = {s: noise_sd(recording.measured[s]) for s in recording.signals}
+        self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd for s in recording.signals}
         self.floor = self._floors(run, final, seed)
 
     def run(self, found, whole):

@@ -20,12 +20,14 @@ known numbers can do within their priors; what is left is the effect's signature
 its projection on the remaining errors gives amplitude and promise in closed form.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.candidates import Candidate
 from pam_sim.gap.cuts import acts_on
+from pam_sim.rollout.batch import default_workers
 
 AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a fit
 
@@ -59,7 +61,8 @@ def screen(problem, near, found):
 
     """
     spaces = {cut.subsystem: _Space(problem, cut, near) for cut in problem.cuts}
-    return [_best_start(problem, near, c, spaces) for c in found]
+    with ThreadPoolExecutor(default_workers()) as pool:
+        return list(pool.map(lambda c: _best_start(problem, near, c, spaces), found))
 
 
 def signature(problem, near, candidate, values, cut):

@@ -21,6 +21,7 @@ cannot be told apart they stay together as a set. At the end every effect must b
 missed when it is left out.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from pam_sim.gap.candidates import candidates, LIMITS
@@ -28,6 +29,7 @@ from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
+from pam_sim.rollout.batch import default_workers
 
 MAX_EFFECTS = 3
 PROMISING = 0.15             # of the best promise in a cut
@@ -99,8 +101,9 @@ class Search:
     Parameters
     ----------
     problem : Problem
-    least_gap : float
-        Gap, in floors squared, below which a cut needs no explanation.
+    seen_gap, least_gap : float
+        Gaps, in floors squared: from the first on a cut needs an explanation, from the
+        second on one is looked for where an effect promises it.
     only : sequence of str, optional
         Names to try; all by default.
     out_of_time : callable
@@ -108,15 +111,15 @@ class Search:
 
     """
 
-    def __init__(self, problem, least_gap, only=None, out_of_time=lambda: False):
-        self.problem, self.least_gap, self.out_of_time = problem, least_gap, out_of_time
+    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False):
+        self.problem, self.out_of_time = problem, out_of_time
+        self.seen_gap, self.least_gap = seen_gap, least_gap
         outputs = sum((cut.signals for cut in problem.cuts), ())
         self.only, self.pool = only, candidates(problem.rig, outputs, only)
         self.base = problem.base
         self.fitted = []
-        # A gap is one that both the fitted and the judging part show.
-        self.first_gap = {c.subsystem: min(gap(c, self.base.errors[c.subsystem], part)
-                                           for part in (FIT, SELECT)) for c in problem.cuts}
+        self.screened = screen(problem, self.base, self.pool)
+        self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
 
     def run(self):
         """Return the Outcome."""
@@ -127,6 +130,7 @@ class Search:
             if not open_cuts:
                 break
             rivals = self._rivals(current, open_cuts)
+            self._set_levels(rivals, open_cuts)
             taken = self._joint_winner(rivals, current, open_cuts)
             if taken is None:
                 taken = [w for w in (self._winner(rivals, current, c) for c in open_cuts) if w]
@@ -145,10 +149,34 @@ class Search:
         return Outcome(self.base, current, named, self._explained(current),
                        not self.out_of_time())
 
+    def _first_gap(self, cut):
+        """
+        Return the gap of a cut before anything is added.
+
+        Both the fitted and the judging part must show it. One that is below the floor
+        can still be seen, if an effect promises to explain a part of the errors.
+        """
+        s = cut.subsystem
+        seen = min(gap(cut, self.base.errors[s], part) for part in (FIT, SELECT))
+        if seen > self.seen_gap:
+            return seen
+        promise = max((p.promise.get(s, 0.0) for p in self.screened), default=0.0)
+        return promise * cut.chi2(self.base.errors[s], FIT)
+
+    def _set_levels(self, rivals, cuts):
+        """Lower the level of noise to what the best rival reaches."""
+        for cut in cuts:
+            s = cut.subsystem
+            cut.level = min([cut.level] + [cut.chi2(r.found.errors[s], SELECT) for r in rivals])
+        for r in rivals:
+            r.share = self._rival(r.found, r.name).share
+
     def _is_open(self, cut, current):
         first = self.first_gap[cut.subsystem]
         left = gap(cut, current.errors[cut.subsystem])
-        return first > self.least_gap and left > max(self.least_gap, DONE * first)
+        if not current.hypothesis.touches(cut):
+            return first > self.least_gap
+        return left > max(self.seen_gap, DONE * first)
 
     def _explained(self, current):
         return {c.subsystem: share(c, self.base.errors[c.subsystem],
@@ -160,9 +188,10 @@ class Search:
         """Return the fitted hypotheses that add one effect or free one number."""
         taken = set(current.hypothesis.names)
         pool = [c for c in self.pool if c.name not in taken]
-        screened = screen(self.problem, current, pool)
+        screened = self.screened if current is self.base else screen(
+            self.problem, current, pool)
         chosen = self._promising(screened, cuts)
-        rivals = [self._fit(current, s) for s in chosen if not self.out_of_time()]
+        rivals = self._fit_all(current, chosen)
         for cut in cuts:
             for known in cut.known:
                 z = current.known_z[cut.subsystem][cut.known.index(known)]
@@ -174,9 +203,8 @@ class Search:
                 for c in cuts}
         contending = {r.name for r in rivals for s, top in best.items()
                       if r.share[s] > top - CONTENDS and r.share[s] > 0.0}
-        for s in screened:
-            if s.candidate.name in contending and s not in chosen and not self.out_of_time():
-                rivals.append(self._fit(current, s))
+        rivals += self._fit_all(current, [
+            s for s in screened if s.candidate.name in contending and s not in chosen])
         self.fitted = rivals
         return self._best_of_name(rivals)
 
@@ -195,7 +223,15 @@ class Search:
                     chosen.append(s)
         return [s for i, s in enumerate(chosen) if s not in chosen[:i]]
 
+    def _fit_all(self, current, screened):
+        """Return the rivals of screened candidates; the simulations hold no lock."""
+        with ThreadPoolExecutor(default_workers()) as pool:
+            return [r for r in pool.map(lambda s: self._fit(current, s), screened)
+                    if r is not None]
+
     def _fit(self, current, screened):
+        if self.out_of_time():
+            return None
         hypothesis = Hypothesis((*current.hypothesis.effects, screened.candidate),
                                 current.hypothesis.freed)
         return self._rival(self.problem.fit(
@@ -223,7 +259,7 @@ class Search:
                 continue
             worse = any(
                 gap(c, r.found.errors[c.subsystem]) - gap(c, current.errors[c.subsystem])
-                > max(self.least_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
+                > max(self.seen_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
                 for c in self.problem.cuts if c is not cut)
             if not worse:
                 found.append(r)
@@ -243,7 +279,7 @@ class Search:
             return []
         for r in ranked:
             if r.share[s] > ranked[0].share[s] - CLOSE and gap(
-                    cut, r.found.errors[s]) > self.least_gap:
+                    cut, r.found.errors[s]) > self.seen_gap:
                 r.found = self.problem.polish(r.found)
                 r.share = self._rival(r.found, r.name).share
         ranked.sort(key=lambda r: -r.share[s])

@@ -33,8 +33,8 @@ from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
 from pam_sim.gap.words import explain
 from scipy.stats import norm
 
-GAP_PER_MATERIALITY = 0.5    # of the size worth naming: a smaller gap is not searched
-LEAST_GAP = 0.1              # floors squared; smaller ones are within the error of the floor
+SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
+LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
@@ -84,9 +84,9 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     cuts = cuts_of(rig, recordings, certify is None, seed)
     problem = Problem(rig, cuts)
     progress(0.1)
-    least = max(LEAST_GAP, (GAP_PER_MATERIALITY * materiality) ** 2)
+    least = LEAST_GAP * min(materiality, 1.0)
     deadline = started + seconds
-    outcome = Search(problem, least, effects, lambda: time.perf_counter() > deadline).run()
+    outcome = Search(problem, SEEN_GAP, least, effects, lambda: time.perf_counter() > deadline).run()
     progress(0.8)
     unused = {s for s, share in outcome.share.items() if share < NAMED}
     problem.use = (FIT, SELECT)
