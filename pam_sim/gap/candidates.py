@@ -57,7 +57,7 @@ class Free:
 
     def value(self, coordinate):
         """Return the value of a normalised coordinate, kept within the range."""
-        value = self.scale * (math.exp(coordinate) if self.shape else coordinate)
+        value = self.scale * (math.exp(min(coordinate, 50.0)) if self.shape else coordinate)
         return min(max(value, self.lower), self.upper)
 
     def coordinate(self, value):

@@ -41,6 +41,7 @@ EFFECT_STEP = 0.01           # of a parameter of an effect, relative
 ROUNDS = 3
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
+UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
 
@@ -213,7 +214,8 @@ class Problem:
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
         slope = search.slopes(x)
         self.slopes = kept
-        whole = np.linalg.pinv(slope.T @ slope)
+        # What the data do not touch is unknown, not certain.
+        whole = np.linalg.inv(slope.T @ slope + UNTOUCHED * np.eye(x.size))
         names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
         chosen = [j for j, n in enumerate(names) if n is None] + [
             names.index(n) for n in found.hypothesis.freed]

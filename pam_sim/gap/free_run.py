@@ -123,13 +123,14 @@ class Recording:
                 return float(level)
         return float(np.median(value))
 
-    def at_stamps(self, response):
-        """Return the response at the measured stamps, by signal name."""
-        return {s: np.interp(self.time_s[s], response.time_s, getattr(response, FIELD[s]))
-                for s in self.signals}
+    def at_stamps(self, response, late_s=None):
+        """Return the response at the measured stamps, by signal; ``late_s`` are their errors."""
+        late_s = late_s or {}
+        return {s: np.interp(self.time_s[s] - late_s.get(s, 0.0), response.time_s,
+                             getattr(response, FIELD[s])) for s in self.signals}
 
 
-def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0):
+def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0, late_s=None):
     """
     Return the model's outputs at the measured stamps, by signal name.
 
@@ -146,10 +147,12 @@ def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0
     start_error_pa : float
         Added to the recorded pressure at the start; what fills a closed volume keeps
         the error of its start.
+    late_s : dict of str -> float, optional
+        By how much the stamps of a signal are late.
 
     """
     return recording.at_stamps(simulate(
-        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa))
+        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa), late_s)
 
 
 def run_from_pressure(rig, recording):

@@ -43,6 +43,12 @@ def model_of(problem, found):
     return problem.with_effects(found.settings()).with_(parameters=numbers)
 
 
+def late_by(measurement):
+    """Return by how much [s] contraction and force are stamped later than pressure."""
+    skew = measurement.get('pressure_skew', 0.0)
+    return {'contraction': skew, 'force': skew + measurement.get('force_skew', 0.0)}
+
+
 class Proof:
     """
     Free runs of a model before and after on one recording.
@@ -72,15 +78,16 @@ class Proof:
         self.before = free_run(problem.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
-        self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd for s in recording.signals}
+        self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd
+                      for s in recording.signals}
         self.floor = self._floors(run, final, seed)
 
     def run(self, found, whole):
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.problem, found)
         start = 0.0 if whole else measurement.get('start_error', 0.0)
-        return free_run(model_of(self.problem, found), self.recording,
-                        measurement['latency'], start_error_pa=start)
+        return free_run(model_of(self.problem, found), self.recording, measurement['latency'],
+                        start_error_pa=start, late_s=late_by(measurement))
 
     def signals(self):
         """Return the SignalGap of every signal."""
@@ -117,8 +124,9 @@ class Proof:
         rig, squares = model_of(self.problem, final), dict.fromkeys(r.signals, 0.0)
         _, measurement = numbers_of(self.problem, final)
         for _ in range(INPUT_DRAWS):
-            moved = free_run(rig, r, measurement['latency'],
-                             STAMP_SD_S * random.standard_normal(r.messages))
+            shift = STAMP_SD_S * random.standard_normal(r.messages)
+            moved = free_run(rig, r, measurement['latency'], shift,
+                             late_s=late_by(measurement))
             self.simulations += 1
             for s in r.signals:
                 squares[s] += float(np.mean((moved[s] - self.after[s]) ** 2)) / INPUT_DRAWS

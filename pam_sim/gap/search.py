@@ -36,7 +36,9 @@ PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 FIRST_STEP = 0.25            # least share of the gap a first effect explains
-NAMED = 0.5                  # least share that all effects of a cut explain
+NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+RIVAL = 0.5                  # of the best share; a name that explains less is no rival
+BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
 DONE = 0.01                  # rest of the gap that formulations may leave
 RIVALS = 4                   # that are ranked again when further effects are in
@@ -146,8 +148,12 @@ class Search:
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named = self._eliminate(current, named)
         current, named = self._resolve(current, named)
-        return Outcome(self.base, current, named, self._explained(current),
-                       not self.out_of_time())
+        explained = self._explained(current)
+        for w in list(named):        # what explains too little is no name
+            if explained.get(w.subsystem, 0.0) < NAMED:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
+        return Outcome(self.base, current, named, explained, not self.out_of_time())
 
     def _first_gap(self, cut):
         """
@@ -286,14 +292,15 @@ class Search:
         best = ranked[0].found.errors[s]
         for r in ranked:
             r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
-        half = NAMED * ranked[0].share[s]
+        half = RIVAL * ranked[0].share[s]
         tied = [r for r in ranked if r is ranked[0]
                 or (r.t[s] < CERTAIN_T and r.share[s] > half)]
         strain = min(self._strain(r.found) for r in tied)
         tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
         names = {r.name for r in tied}
+        as_good = {r.name for r in tied if r.t[s] < BETTER_T}
         return [r for r in tied
-                if not any((simple, r.name) in LIMITS for simple in names)
+                if not any((simple, r.name) in LIMITS for simple in as_good)
                 and SAME_AS.get(r.name) not in names]
 
     def _strain(self, found):
@@ -327,7 +334,7 @@ class Search:
                 r in tied[s] or (tied[s] and r.share[s] > tied[s][0].share[s] - CLOSE)
                 for s in tied)
             if everywhere and all(self._touches(r, current, c) for c in cuts) \
-                    and min(r.share[s] for s in tied) > NAMED:
+                    and min(r.share[s] for s in tied) > RIVAL:
                 same = [o.name for o in tied[cuts[0].subsystem]
                         if o in tied[cuts[1].subsystem]]
                 names = tuple(dict.fromkeys([r.name, *same]))

@@ -24,13 +24,13 @@ import numpy as np
 from pam_sim.effects.registry import get_effect
 
 NORMAL_95 = 1.96
-DIFFERENCE = 1e-3            # of a normalised parameter, for the slope of a quantity
 AS_GOOD = 2.0                # times the rest of the best formulation, plus what follows
 AS_GOOD_SHARE = 0.01
+FORM = 1.5                   # times the amplitude of what is left, relative to the gap
 NUMERICS = 0.002             # relative, of step and interpolation
 
 
-def effect_numbers(rig, found, place, covariance, named, subsystem):
+def effect_numbers(rig, found, place, covariance, named, rest):
     """
     Return (parameters, equivalent) of one effect of a fit as entries of gap.json.
 
@@ -46,8 +46,8 @@ def effect_numbers(rig, found, place, covariance, named, subsystem):
         As of ``Problem.covariance``.
     named : Named
         With the fits in other formulations.
-    subsystem : str
-        Of the cut in which it was found.
+    rest : float
+        Share of the squared gap of its cut that the model leaves.
 
     Returns
     -------
@@ -68,16 +68,32 @@ def effect_numbers(rig, found, place, covariance, named, subsystem):
         low, high = sorted((f.value(theta[j] - half), f.value(theta[j] + half)))
         parameters[f.name] = _entry(f.value(theta[j]), units[f.name], low, high)
     equivalent = {}
-    spread = _formulation_spread(rig, candidate, found, place, named, subsystem)
+    spread = _formulation_spread(rig, candidate, named)
+    moved = _along_axes(candidate, theta, own, rig)
+    # What is left may be the effect's own: a formulation that is a little off.
+    off = FORM * np.sqrt(max(rest, 0.0))
+    scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
+    push = np.where(scaled, [off if f.shape else off * t
+                             for f, t in zip(candidate.free, theta)], 0.0)
+    moved.append([_report(candidate, theta + sign * push, rig) for sign in (-1.0, 1.0)])
     for name, (value, unit) in _report(candidate, theta, rig).items():
-        slope = np.array([
-            (_report(candidate, theta + DIFFERENCE * e, rig)[name][0]
-             - _report(candidate, theta - DIFFERENCE * e, rig)[name][0]) / (2.0 * DIFFERENCE)
-            for e in np.eye(theta.size)])
-        half = float(np.sqrt(NORMAL_95 ** 2 * slope @ own @ slope + spread.get(name, 0.0) ** 2
-                             + (NUMERICS * value) ** 2))
-        equivalent[name] = _entry(value, unit, value - half, value + half)
+        shifts = np.array([[report[name][0] - value for report in pair] for pair in moved])
+        extra = spread.get(name, 0.0) ** 2 + (NUMERICS * value) ** 2
+        # Each axis of the ellipsoid pushes one way or both; what is not linear is kept.
+        down, up = (float(np.sqrt(np.sum(np.max(sign * shifts, axis=1).clip(0.0) ** 2) + extra))
+                    for sign in (-1.0, 1.0))
+        equivalent[name] = _entry(value, unit, value - down, value + up)
     return parameters, equivalent
+
+
+def _along_axes(candidate, theta, covariance, rig):
+    """Return what the effect reports at both ends of every axis of the 95 % ellipsoid."""
+    size, axes = np.linalg.eigh(covariance)
+    found = []
+    for variance, axis in zip(size, axes.T):
+        step = NORMAL_95 * np.sqrt(max(variance, 0.0)) * axis
+        found.append([_report(candidate, theta + sign * step, rig) for sign in (-1.0, 1.0)])
+    return found
 
 
 def _report(candidate, theta, rig):
@@ -87,9 +103,10 @@ def _report(candidate, theta, rig):
     return effect.report(effect.values(candidate.setting(values)['parameters']), rig)
 
 
-def _formulation_spread(rig, candidate, found, place, named, subsystem):
+def _formulation_spread(rig, candidate, named):
     """Return by quantity how far formulations that explain about as much are from this one."""
-    best = max((r.share.get(subsystem, 0.0) for r in named.formulations), default=0.0)
+    s = named.subsystem
+    best = max((r.share.get(s, 0.0) for r in named.formulations), default=0.0)
     limit = AS_GOOD * (1.0 - best) + AS_GOOD_SHARE
     spread = {}
     mine = next((r for r in named.formulations if candidate in r.found.hypothesis.effects), None)
@@ -98,7 +115,7 @@ def _formulation_spread(rig, candidate, found, place, named, subsystem):
     reference = _reported_in(mine, candidate, rig)
     for r in named.formulations:
         other = r.found.hypothesis.effects[-1]
-        if 1.0 - r.share.get(subsystem, 0.0) > limit or other == candidate:
+        if 1.0 - r.share.get(s, 0.0) > limit or other == candidate:
             continue
         for name, value in _reported_in(r, other, rig).items():
             if name in reference:

@@ -28,7 +28,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import model_of, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
-from pam_sim.gap.search import NAMED, Search
+from pam_sim.gap.search import Search
 from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
 from pam_sim.gap.words import explain
 from scipy.stats import norm
@@ -84,11 +84,10 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     cuts = cuts_of(rig, recordings, certify is None, seed)
     problem = Problem(rig, cuts)
     progress(0.1)
-    least = LEAST_GAP * min(materiality, 1.0)
     deadline = started + seconds
-    outcome = Search(problem, SEEN_GAP, least, effects, lambda: time.perf_counter() > deadline).run()
+    outcome = Search(problem, SEEN_GAP, LEAST_GAP * min(materiality, 1.0), effects,
+                     lambda: time.perf_counter() > deadline).run()
     progress(0.8)
-    unused = {s for s, share in outcome.share.items() if share < NAMED}
     problem.use = (FIT, SELECT)
     final, base = problem.polish(outcome.final), problem.refit_base()
     proof = Proof(certify or runs[0],
@@ -98,7 +97,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     _fill(result, problem, outcome, final, proof)
-    _judge(result, outcome, proof, base, unused, materiality, certify is not None)
+    _judge(result, outcome, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
     result.reason = explain(result, outcome)
@@ -122,7 +121,7 @@ def _fill(result, problem, outcome, final, proof):
         if place is None:
             continue
         parameters, equivalent = effect_numbers(
-            model, final, place, covariance, w, w.subsystem)
+            model, final, place, covariance, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
         effect = get_effect(w.name)
         formulation = final.hypothesis.effects[place].effect
         result.effects.append({
@@ -134,23 +133,22 @@ def _fill(result, problem, outcome, final, proof):
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
 
-def _judge(result, outcome, proof, base, unused, materiality, whole):
+def _judge(result, outcome, proof, base, materiality, whole):
     """Set verdict, ambiguity set and the unexplained fraction of a result."""
-    named = [w for w in outcome.named if w.subsystem not in unused]
-    moved = proof.moved(base, whole) if outcome.named else {}
+    named = outcome.named
+    moved = proof.moved(base, whole) if named else {}
     material = max(moved.values(), default=0.0) > materiality
     result.moved = moved
     wrong = [c for c in result.parameters if abs(c.pull) > PULL]
     left = max((beyond(s.rmse_refit, s.noise_floor) / max(proof.noise[name], 1e-12)
                 for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (
-            outcome.named or left <= materiality)):
+            named or left <= materiality)):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
         return
     result.unexplained_fraction = proof.unexplained()
     if not named:
         result.verdict, result.unexplained_fraction = 'unknown', 1.0
-        result.effects, result.parameters = [], []
         return
     result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
     if any(len(w.names) > 1 for w in named):
