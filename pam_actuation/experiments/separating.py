@@ -36,6 +36,7 @@ from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.located_yaml import dump_yaml
 from pam_sim.units import P_ATM_PA
 
 HIGHEST_GAUGE_PA = 550e3     # below the pressure limit of the driver
@@ -125,7 +126,7 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
     if with_cell:
         text += ' It needs a load cell, which the recording does not have.'
     return {'name': plain['name'], 'why': text, 'separation_sigma': sigma,
-            'needs': ['force'] if with_cell else [], 'experiment': {**plain, 'needs': needs}}
+            'needs': needs, 'experiment': {**plain, 'needs': needs}}
 
 
 def separation(run, rig, rivals, with_force):
@@ -144,5 +145,5 @@ def separation(run, rig, rivals, with_force):
 
 def _simulated(plain, rig):
     with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
-        simulate_experiment(load_experiment(plain), rig, None, Path(folder) / 'bag')
+        simulate_experiment(load_experiment(dump_yaml(plain)), rig, None, Path(folder) / 'bag')
         return load_run(Path(folder) / 'bag')

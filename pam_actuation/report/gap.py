@@ -28,6 +28,7 @@ import numpy as np
 
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.experiments.separating import next_experiment
 from pam_actuation.messages import Contraction, Force, Pressure
 from pam_actuation.report.page import render, write_text
 from pam_actuation.report.pages import FOOTER
@@ -40,6 +41,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
+from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
 MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
@@ -76,7 +78,11 @@ def write_gap(runs, model, out_dir, certify=None, **options):
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
-    result = find_gap(runs, model_for(runs[0], model), certify, **options)
+    rig = model_for(runs[0], model)
+    result = find_gap(runs, rig, certify, **options)
+    if len(result.rivals) > 1:
+        result.next_experiment = next_experiment(
+            rig, result.rivals, tuple(result.signals), result.noise)
     save_gap(result, certify or runs[0], out_dir)
     return result
 
@@ -90,13 +96,20 @@ def model_for(run, model):
 
 
 def save_gap(result, run, out_dir):
-    """Write gap.json, model.yaml, compare.mcap and report.html of a result."""
+    """
+    Write gap.json, model.yaml, compare.mcap and report.html of a result.
+
+    Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
+    """
     out_dir = Path(out_dir)
     if out_dir.exists() and not out_dir.is_dir():
         raise InputError('is a file; give a folder for the results', str(out_dir))
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)
+    if result.next_experiment:
+        write_text(out_dir / 'next_experiment.yaml',
+                   dump_yaml(result.next_experiment['experiment']))
     if result.traces:
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(

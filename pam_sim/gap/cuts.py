@@ -22,7 +22,7 @@ faster than the whole. A sensor effect on a measured input is taken out of it.
 """
 
 from dataclasses import dataclass
-import itertools
+import threading
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
@@ -30,7 +30,7 @@ from pam_sim.gap.free_run import (
     FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven)
 from pam_sim.gap.noise import noise_of, noise_sd, rms_rate, SMALLEST, STAMP_SD_S
 from pam_sim.gap.parts import part_of
-from pam_sim.gap.result import FIELD
+from pam_sim.gap.result import FIELD, SIGNALS
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve import hsv, ppr
 from scipy.signal import savgol_filter
@@ -87,6 +87,8 @@ class Cut:
     level : float
         Mean squared error in floors squared that noise alone leaves: 1, or less where the
         floor turned out too careful.
+    simulations : int
+        Made so far.
     part, block, signal : numpy.ndarray of int, shape (N,)
         Part, test block and signal (index into ``signals``) of every compared sample.
 
@@ -96,16 +98,18 @@ class Cut:
 
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self.recordings = recordings
-        self.signals = self._outputs(recordings[0])
+        self.signals = tuple(s for s in SIGNALS
+                             if any(s in self.outputs(r) for r in recordings))
         self.level = 1.0
-        self._count = itertools.count()      # several threads count at once
-        self.known = self._rig_numbers(rig) + self._nuisances(recordings[0])
+        self.simulations, self._lock = 0, threading.Lock()
+        self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured = [], [], [], [], []
         first = 0
         for recording in recordings:
             chosen = {}
-            for s, name in enumerate(self.signals):
+            for name in self.outputs(recording):
+                s = self.signals.index(name)
                 time_s = recording.time_s[name]
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
                 chosen[name] = np.arange(0, time_s.size, every)
@@ -143,19 +147,15 @@ class Cut:
         found = []
         for index, instants in enumerate(self._index):
             response = self._simulate(rig, index, numbers)
-            next(self._count)
-            for name in self.signals:
+            with self._lock:                 # several threads count at once
+                self.simulations += 1
+            for name in instants:
                 late = numbers.get('force_skew', 0.0) if name == 'force' else 0.0
                 place = np.clip((instants[name] - late) / GRID_S, 0.0, len(response) - 1.001)
                 row = place.astype(int)
                 value = getattr(response, FIELD[name])
                 found.append(value[row] + (place - row) * (value[row + 1] - value[row]))
         return np.concatenate(found)
-
-    @property
-    def simulations(self):
-        """Return how many simulations were made so far."""
-        return self._count.__reduce__()[1][0]
 
     def chi2(self, errors, part):
         """Return the mean squared error in a part, each signal with the same weight."""
@@ -178,7 +178,8 @@ class Cut:
         squares += ((self._coarse(rig) - base) / COARSE_GAIN) ** 2
         floor = {}
         for s, name in enumerate(self.signals):
-            own = np.mean([self._sensor_floor(r, name) ** 2 for r in self.recordings])
+            own = np.mean([self._sensor_floor(r, name) ** 2 for r in self.recordings
+                           if name in self.outputs(r)])
             floor[name] = float(np.sqrt(own + np.mean(squares[self.signal == s])))
         return floor
 
@@ -206,7 +207,8 @@ class ValveCut(Cut):
         super().__init__(rig, recordings, own_proof, seed)
 
     @staticmethod
-    def _outputs(recording):
+    def outputs(recording):
+        """Return the signals of a recording that this cut gives."""
         return ('pressure',)
 
     @staticmethod
@@ -215,7 +217,8 @@ class ValveCut(Cut):
         return [k for k in known_numbers(rig) if k.name in own]
 
     @staticmethod
-    def _nuisances(recording):
+    def _nuisances(recordings):
+        recording = recordings[0]
         found = [Known('latency', 's', LATENCY_PRIOR_S, LATENCY_SD_S, 0.0, LATENCY_MAX_S, False,
                        GRID_S / LATENCY_SD_S)]
         if recording.valve == 'hsv':        # a closed volume keeps the error of its start
@@ -254,7 +257,8 @@ class MechanicsCut(Cut):
         super().__init__(rig, recordings, own_proof, seed)
 
     @staticmethod
-    def _outputs(recording):
+    def outputs(recording):
+        """Return the signals of a recording that this cut gives."""
         return tuple(s for s in recording.signals if s != 'pressure')
 
     @staticmethod
@@ -263,9 +267,9 @@ class MechanicsCut(Cut):
         return [k for k in known_numbers(rig) if k.name not in valve]
 
     @staticmethod
-    def _nuisances(recording):
-        late = ('pressure_skew', 'force_skew') if 'force' in recording.signals \
-            else ('pressure_skew',)
+    def _nuisances(recordings):
+        cell = any('force' in r.signals for r in recordings)
+        late = ('pressure_skew', 'force_skew') if cell else ('pressure_skew',)
         return [Known(n, 's', 0.0, SKEW_SD_S, -SKEW_MAX_S, SKEW_MAX_S, False) for n in late]
 
     def _coarse(self, rig):
@@ -310,7 +314,7 @@ class MechanicsCut(Cut):
 def cuts_of(rig, recordings, own_proof=True, seed=0):
     """Return the cuts that these recordings allow, the valve first."""
     found = [ValveCut(rig, recordings, own_proof, seed)]
-    if MechanicsCut._outputs(recordings[0]):
+    if any(MechanicsCut.outputs(r) for r in recordings):
         found.append(MechanicsCut(rig, recordings, own_proof, seed))
     return found
 

@@ -131,6 +131,14 @@ class GapResult:
         The final model.
     moved : dict of str -> float
         By signal, how far the final model moves it, in standard deviations of its sensor.
+    rivals : list of (str, pam_sim.Rig, Hypothesis, numpy.ndarray)
+        What the first set of names holds, the likeliest first: name, fitted model, hypothesis
+        and its normalised parameters.
+    evidence : list of dict
+        Of every name that was fitted: ``subsystem``, ``name``, ``share`` of the gap it
+        explains, ``t`` by which the best is better.
+    noise : dict of str -> float
+        Standard deviation of the sensors, by signal.
 
     """
 
@@ -152,6 +160,9 @@ class GapResult:
     traces: dict = field(default_factory=dict)
     model_yaml: str = ''
     moved: dict = field(default_factory=dict)
+    rivals: list = field(default_factory=list)
+    noise: dict = field(default_factory=dict)
+    evidence: list = field(default_factory=list)
 
     def text(self):
         """Return the result in lines for a person."""

@@ -35,6 +35,8 @@ from scipy.stats import norm
 
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
+UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
+FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
@@ -97,7 +99,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     _fill(result, problem, outcome, final, proof)
-    _judge(result, outcome, proof, base, materiality, certify is not None)
+    _judge(result, outcome, problem, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
     result.reason = explain(result, outcome)
@@ -133,17 +135,26 @@ def _fill(result, problem, outcome, final, proof):
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
 
-def _judge(result, outcome, proof, base, materiality, whole):
+def _judge(result, outcome, problem, proof, base, materiality, whole):
     """Set verdict, ambiguity set and the unexplained fraction of a result."""
     named = outcome.named
     moved = proof.moved(base, whole) if named else {}
     material = max(moved.values(), default=0.0) > materiality
     result.moved = moved
+    result.noise = proof.noise
+    unsure = next((w for w in named if len(w.names) > 1), None)
+    if unsure is not None:
+        by_name = {r.name: r.found for r in unsure.rivals}
+        result.rivals = [(name, model_of(problem, by_name[name]), by_name[name].hypothesis,
+                          by_name[name].theta) for name in unsure.names]
+    result.evidence = [
+        {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
+         't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.pull) > PULL]
-    left = max((beyond(s.rmse_refit, s.noise_floor) / max(proof.noise[name], 1e-12)
+    left = max((beyond(s.rmse_refit, FLOOR_ERROR * s.noise_floor) / max(proof.noise[name], 1e-12)
                 for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (
-            named or left <= materiality)):
+            named or left <= UNNAMED * materiality)):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
         return
     result.unexplained_fraction = proof.unexplained()

@@ -225,3 +225,17 @@ def test_an_overlay_of_the_true_model_stays_near():
     overlays = {o.signal: o for o in free_run_overlay(run, load_rig('dmsp_5_300_realistic'))}
     contraction = overlays['contraction']
     assert np.sqrt(np.mean((contraction.recorded - contraction.simulated) ** 2)) < 1e-4
+
+
+def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path):
+    from pam_actuation.experiments import load_experiment
+    rig = nominal().with_(effects=[
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
+    run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
+    result = write_gap([run], NOMINAL, tmp_path, effects=['coulomb_friction', 'guide_friction'])
+    assert result.verdict == 'ambiguous'
+    assert set(result.ambiguity_set) == {'coulomb_friction', 'guide_friction'}
+    # Inside the muscle or at the rail: only a load cell between them can tell.
+    assert 'force' in result.next_experiment['needs']
+    found = load_experiment(str(tmp_path / 'next_experiment.yaml'))
+    assert found.domain == 'pressure' and 'force' in found.needs
