@@ -65,6 +65,8 @@ def main():
     parser.add_argument('--work', type=Path, help='keep recordings and answers here')
     parser.add_argument('--again', action='store_true',
                         help='with --work: keep the recordings, answer anew')
+    parser.add_argument('--seconds', type=float, default=None, help='time budget of `pam gap` for '
+                        'one case (default: its own); on a busy machine give more')
     parser.add_argument('--out', type=Path, help='write the report here as well')
     args = parser.parse_args()
     cases = truth_cases.plan(args.number, args.seed)
@@ -93,9 +95,9 @@ def examine(cases, work, args):
         for path in (*work.glob('*/answer.json'), *work.glob('*/after.json')):
             path.unlink()
     each(args.jobs, 'answering', answer, [
-        (work / c.name, 'answer', ['fit'], orders[c.name]) for c in cases])
+        (work / c.name, 'answer', ['fit'], orders[c.name], args.seconds) for c in cases])
     each(args.jobs, 'next experiments', follow, [
-        (c, work, orders[c.name]) for c in cases if c.kind == 'ambiguous'])
+        (c, work, orders[c.name], args.seconds) for c in cases if c.kind == 'ambiguous'])
     rivals = {}
     if args.rivals:
         from hidden_rivals import METHODS
@@ -106,7 +108,7 @@ def examine(cases, work, args):
     keys = truth_key.open_keys(work, answers)
     found = [scored(keys[c.name], answers[c.name]['result'],
                     (read(work / c.name / 'after.json') or {}).get('result'),
-                    answers[c.name]['wall_s']) for c in cases]
+                    answers[c.name]['wall_s'], answers[c.name]['processor_s']) for c in cases]
     others = {name: [scored(keys[case], one) for case, one in given]
               for name, given in rivals.items()}
     text = '\n'.join([
@@ -131,18 +133,19 @@ def record(case, work):
     return truth_cases.build(case, work / case.name)
 
 
-def answer(folder, name, runs, materiality):
+def answer(folder, name, runs, materiality, seconds):
     """Call `pam gap` on the runs of a case, unless that was done; keep its result."""
     target = folder / f'{name}.json'
     if target.exists():
         return
-    begun = time.perf_counter()
-    result = pam_gap(folder, [folder / run for run in runs], folder / name, materiality)
+    begun, used = time.perf_counter(), time.process_time()
+    result = pam_gap(folder, [folder / run for run in runs], folder / name, materiality, seconds)
     target.write_text(json.dumps({
-        'result': result, 'wall_s': time.perf_counter() - begun}), encoding='utf-8')
+        'result': result, 'wall_s': time.perf_counter() - begun,
+        'processor_s': time.process_time() - used}), encoding='utf-8')
 
 
-def follow(case, work, materiality):
+def follow(case, work, materiality, seconds):
     """Run the experiment suggested for an ambiguous case and answer again, with both runs."""
     folder = work / case.name
     suggestion = read(folder / 'answer.json')['result'].get('next_experiment') or {}
@@ -158,7 +161,7 @@ def follow(case, work, materiality):
         (folder / 'after.json').write_text(json.dumps({
             'result': {'verdict': 'crashed', 'reason': repr(error)}}), encoding='utf-8')
         return
-    answer(folder, 'after', ['fit', 'next'], materiality)
+    answer(folder, 'after', ['fit', 'next'], materiality, seconds)
 
 
 def read(path):

@@ -19,7 +19,7 @@ import io
 import json
 
 
-def pam_gap(folder, runs, out, materiality=1.0):
+def pam_gap(folder, runs, out, materiality=1.0, seconds=None):
     """
     Return the data of the ``gap.json`` that `pam gap` wrote; of a crash, its reason.
 
@@ -31,14 +31,15 @@ def pam_gap(folder, runs, out, materiality=1.0):
         Bags to learn from.
     out : pathlib.Path
         Folder for the results.
-    materiality : float
-        As of the option.
+    materiality, seconds : float
+        As of the options.
 
     """
     from pam_actuation.cli.main import main
     said = io.StringIO()
     arguments = ['gap', *map(str, runs), '--model', str(folder / 'model.yaml'), '--certify',
                  str(folder / 'certify'), '--out', str(out), '--materiality', str(materiality)]
+    arguments += [] if seconds is None else ['--seconds', str(seconds)]
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             main(arguments)

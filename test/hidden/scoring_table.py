@@ -33,6 +33,7 @@ class Scored:
     answer: object
     after: object = None
     wall_s: float = 0.0
+    processor_s: float = 0.0
 
     @property
     def gap(self):
@@ -42,9 +43,10 @@ class Scored:
         return max(self.key.get('gap_sigma', {'': 0.0}).values())
 
 
-def scored(key, raw, raw_after=None, wall_s=0.0):
+def scored(key, raw, raw_after=None, wall_s=0.0, processor_s=0.0):
     """Return the Scored of the plain data of a key and of results."""
-    return Scored(key, read_answer(raw), read_answer(raw_after) if raw_after else None, wall_s)
+    return Scored(key, read_answer(raw), read_answer(raw_after) if raw_after else None, wall_s,
+                  processor_s)
 
 
 def wilson(hits, count, z=1.96):
@@ -196,6 +198,7 @@ def _time(measure, cases, bar_s):
     times = [c.answer.raw.get('runtime_s') or c.wall_s for c in cases]
     if not times:
         return Row(measure, 'no cases', f'≤ {bar_s:g} s', None)
+    work = np.median([c.processor_s for c in cases])
     return Row(measure, f'median {np.median(times):.1f} s, 95th pct {np.quantile(times, 0.95):.1f}'
-               f' s, longest {max(times):.1f} s', f'≤ {bar_s:g} s',
+               f' s, longest {max(times):.1f} s; processor {work:.1f} s', f'≤ {bar_s:g} s',
                bool(np.quantile(times, 0.95) <= bar_s))
