@@ -38,7 +38,8 @@ BOX = 3.5                    # prior deviations; beyond it a number is wrong, no
 FREE_BOX = 60.0
 FREE_SD = 30.0               # factor on the deviation of the prior of a freed number
 EFFECT_STEP = 0.01           # of a parameter of an effect, relative
-ROUNDS = 3
+ROUNDS = 4
+BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
@@ -165,16 +166,14 @@ class Problem:
         """
         near = near or self.base
         touched = [cut for cut in self.cuts if hypothesis.touches(cut)]
-        search = _Search(self, hypothesis, touched, dict(near.temper))
+        # From full weight: a low one is its own reason, for it keeps the misfit that made it.
+        search = _Search(self, hypothesis, touched, {
+            c.subsystem: np.ones(len(c.signals)) for c in touched})
         # The baseline's numbers are bent by what is missing; a better model starts unbent.
         bent = near is self.base
         x = np.concatenate([np.asarray(theta, float)] + [
             (0.0 if bent else 1.0) * near.known_z[cut.subsystem] for cut in touched])
-        for _ in range(ROUNDS):
-            x = search.run(x)
-            errors = dict(search.errors(x))
-            if search.retemper(errors):
-                break
+        x, errors = search.settle(x)
         theta, known_z = search.split(x)
         known_z, temper = dict(known_z), search.temper
         for cut in self.cuts:
@@ -223,18 +222,13 @@ class Problem:
 
     def _fit_base(self):
         known = {c.subsystem: np.zeros(len(c.known)) for c in self.cuts}
-        errors = {c.subsystem: c.errors(self.rig, known[c.subsystem]) for c in self.cuts}
-        start = Found(Hypothesis(), np.zeros(0), known, errors,
-                      {c.subsystem: tempering(c, errors[c.subsystem], self.use)
-                       for c in self.cuts})
-        search = _Search(self, Hypothesis(), self.cuts, dict(start.temper))
-        x = np.concatenate([known[c.subsystem] for c in self.cuts])
-        for _ in range(ROUNDS):
-            x = search.run(x)
-            errors = dict(search.errors(x))
-            if search.retemper(errors):
-                break
-        return Found(Hypothesis(), np.zeros(0), dict(search.split(x)[1]), errors, search.temper)
+        temper = {c.subsystem: np.ones(len(c.signals)) for c in self.cuts}
+        for _ in range(BASE_PASSES):
+            search = _Search(self, Hypothesis(), self.cuts, dict(temper))
+            x, errors = search.settle(np.concatenate([known[c.subsystem] for c in self.cuts]))
+            known, temper = dict(search.split(x)[1]), search.temper
+            self.take_slopes([], known)
+        return Found(Hypothesis(), np.zeros(0), known, errors, temper)
 
 
 class _Search:
@@ -320,6 +314,15 @@ class _Search:
         start = np.clip(x, low + margin, high - margin)
         return least_squares(self.residuals, start, self.slopes, (low, high), x_scale='jac',
                              ftol=1e-5, xtol=1e-4, max_nfev=EVALUATIONS).x
+
+    def settle(self, x):
+        """Return (solution, errors by subsystem) once weights and errors agree."""
+        for _ in range(ROUNDS):
+            x = self.run(x)
+            errors = dict(self.errors(x))
+            if self.retemper(errors):
+                break
+        return x, errors
 
     def retemper(self, errors):
         """Set the weights after the errors; return whether they had settled."""
