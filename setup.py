@@ -75,6 +75,7 @@ BENCH_REQUIRES = [
     'mujoco>=3.2',
     'scikit-fuzzy>=0.5',
     'networkx>=3.2',  # scikit-fuzzy needs it and does not bring it
+    'pysindy>=2.0',
 ]
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Run the gap look on loaded bags and write its folder.
+Run the gap workflow on loaded bags and write its folder.
 
 ``gap.json``, ``model.yaml``, ``compare.mcap`` and ``report.html``, each written whole or
 not at all.
@@ -28,6 +28,7 @@ import numpy as np
 
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.experiments.separating import next_experiment
 from pam_actuation.messages import Contraction, Force, Pressure
 from pam_actuation.report.page import render, write_text
 from pam_actuation.report.pages import FOOTER
@@ -37,9 +38,10 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
-from pam_sim.gap import gap_first_look
+from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
+from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
 MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
@@ -47,20 +49,22 @@ FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
 
-def write_gap(runs, model, out_dir, seconds=20.0):
+def write_gap(runs, model, out_dir, certify=None, **options):
     """
-    Measure the gap between recordings and a model and write the result folder.
+    Find the gap between recordings and a model and write the result folder.
 
     Parameters
     ----------
     runs : list of pam_sim.run.Run
-        Recordings; the first one is looked at.
+        Recordings that are searched.
     model : str, path or pam_sim.Rig
         The model. A preset named without its valve gets that of the recording.
     out_dir : path
         Folder for the results; made if needed.
-    seconds : float
-        Time budget of the calibration.
+    certify : pam_sim.run.Run, optional
+        Recording for the proof; by default blocks of the first one.
+    options
+        As of :func:`pam_sim.gap.find_gap`.
 
     Returns
     -------
@@ -74,12 +78,12 @@ def write_gap(runs, model, out_dir, seconds=20.0):
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
-    run = runs[0]
-    result = gap_first_look(run, model_for(run, model), seconds)
-    if len(runs) > 1:
-        result.remarks.append(
-            f'This version looks at one recording at a time; shown is {run.path}.')
-    save_gap(result, run, out_dir)
+    rig = model_for(runs[0], model)
+    result = find_gap(runs, rig, certify, **options)
+    if len(result.rivals) > 1:
+        result.next_experiment = next_experiment(
+            rig, result.rivals, tuple(result.signals), result.noise)
+    save_gap(result, certify or runs[0], out_dir)
     return result
 
 
@@ -92,13 +96,20 @@ def model_for(run, model):
 
 
 def save_gap(result, run, out_dir):
-    """Write gap.json, model.yaml, compare.mcap and report.html of a result."""
+    """
+    Write gap.json, model.yaml, compare.mcap and report.html of a result.
+
+    Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
+    """
     out_dir = Path(out_dir)
     if out_dir.exists() and not out_dir.is_dir():
         raise InputError('is a file; give a folder for the results', str(out_dir))
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)
+    if result.next_experiment:
+        write_text(out_dir / 'next_experiment.yaml',
+                   dump_yaml(result.next_experiment['experiment']))
     if result.traces:
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(

@@ -13,16 +13,19 @@
 # limitations under the License.
 
 """
-Find the gap between a recording and a model: how large it is and where it sits.
+Find the gap between recordings and a model, name what is missing, add it and prove it.
 
 The files in reading order: ``health`` (can these data be used), ``noise`` (what
-sensors and stamps explain), ``free_run`` (the model on the recorded valve signal),
-``nominal`` (calibrate the model's own numbers within their tolerance), ``locate``
-(which subsystem, which condition), ``first_look`` (all of it in order, and the
-verdict), ``result`` (what gap.json holds).
+sensors and stamps explain), ``parts`` (what is fitted, what judges, what proves),
+``free_run`` (the model on the recorded valve signal), ``cuts`` (each subsystem on its
+measured input), ``candidates`` (what may be missing), ``fit`` (one hypothesis),
+``screen`` (which are worth a fit), ``compare`` (which one the data prefer), ``search``
+(one effect after another), ``uncertainty`` (how well its numbers are known), ``prove``
+(free runs on data kept aside), ``locate`` (where the gap sits), ``workflow`` (all of it in
+order, and the verdict), ``words`` (the verdict in sentences), ``result`` (what gap.json holds).
 """
 
-from pam_sim.gap.first_look import gap_first_look
 from pam_sim.gap.result import GapResult
+from pam_sim.gap.workflow import find_gap
 
-__all__ = ['gap_first_look', 'GapResult']
+__all__ = ['find_gap', 'GapResult']

@@ -123,13 +123,14 @@ class Recording:
                 return float(level)
         return float(np.median(value))
 
-    def at_stamps(self, response):
-        """Return the response at the measured stamps, by signal name."""
-        return {s: np.interp(self.time_s[s], response.time_s, getattr(response, FIELD[s]))
-                for s in self.signals}
+    def at_stamps(self, response, late_s=None):
+        """Return the response at the measured stamps, by signal; ``late_s`` are their errors."""
+        late_s = late_s or {}
+        return {s: np.interp(self.time_s[s] - late_s.get(s, 0.0), response.time_s,
+                             getattr(response, FIELD[s])) for s in self.signals}
 
 
-def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0):
+def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0, late_s=None):
     """
     Return the model's outputs at the measured stamps, by signal name.
 
@@ -146,10 +147,12 @@ def free_run(rig, recording, delay_s=0.0, stamp_shift_s=None, start_error_pa=0.0
     start_error_pa : float
         Added to the recorded pressure at the start; what fills a closed volume keeps
         the error of its start.
+    late_s : dict of str -> float, optional
+        By how much the stamps of a signal are late.
 
     """
     return recording.at_stamps(simulate(
-        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa))
+        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa), late_s)
 
 
 def run_from_pressure(rig, recording):
@@ -163,18 +166,20 @@ def run_from_pressure(rig, recording):
         pressure_driven(rig), recording, _fast_command(recording)))
 
 
-def simulate_driven(rig, recording, contraction_m, valve_signal=None):
+def simulate_driven(rig, recording, contraction_m, valve_signal=None, start_pa=None):
     """
     Run the rig with the contraction prescribed on the grid; return its Response.
 
     Without a valve signal the measured pressure is the input, for a rig from
-    ``pressure_driven``. Force is then the tension of the muscle alone.
+    ``pressure_driven``. Force is then the tension of the muscle alone. It starts from
+    ``start_pa``, by default the recorded pressure.
     """
     if valve_signal is None:
         valve_signal = _fast_command(recording)
+    start_pa = recording.start('pressure') if start_pa is None else start_pa
     return rig.with_(load='driven').simulate(
         valve_signal, contraction_m=np.maximum(contraction_m, 0.0),
-        initial_pressure_pa=max(recording.start('pressure'), P_ATM_PA), dt_s=GRID_S)
+        initial_pressure_pa=max(start_pa, P_ATM_PA), dt_s=GRID_S)
 
 
 def _fast_command(recording):
@@ -187,7 +192,7 @@ def _fast_command(recording):
 
 def pressure_driven(rig):
     """Return the rig with a regulator that follows its command at once."""
-    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load')]
+    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load', 'sensor')]
     return rig.with_(valve='ppr', effects=kept, parameters={
         'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
 

@@ -20,12 +20,17 @@ of standard deviation s they have sqrt(20) s. The median makes it blind to steps
 and outliers.
 """
 
-import numpy as np
+from dataclasses import dataclass
 
+import numpy as np
 from pam_sim.gap.result import FIELD
+from scipy.signal import lfilter
 
 THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)      # 1, 3, 3, 1 squared and summed
 MAD_TO_SD = 1.4826                          # of a normal distribution
+QUIET_S, MEAN_S, LAG_S = 0.4, 0.05, 0.01    # windows at rest, means in them, autocovariance
+QUIET_MEANS = 1.2            # scatter of the means, in standard deviations of the white noise
+SLOW_SHARE = 0.15            # of the white variance, below which noise counts as white
 # Stamp jitter and skew up to 0.5 ms are normal on a measured bag; uniform, that is
 # this standard deviation.
 STAMP_SD_S = 0.5e-3 / np.sqrt(3.0)
@@ -45,6 +50,69 @@ def noise_sd(values):
     third = np.diff(values, 3)
     spread = MAD_TO_SD * float(np.median(np.abs(third - np.median(third))))
     return max(spread / THIRD_DIFFERENCE_GAIN, quantisation_step(values) / np.sqrt(12.0))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """
+    Noise of a signal: a white part and a slower one.
+
+    Parameters
+    ----------
+    white_sd, slow_sd : float
+        Standard deviations.
+    memory_s : float
+        Correlation time of the slow part.
+
+    """
+
+    white_sd: float
+    slow_sd: float = 0.0
+    memory_s: float = 0.0
+
+    @property
+    def sd(self):
+        """Return the standard deviation of both parts together."""
+        return float(np.hypot(self.white_sd, self.slow_sd))
+
+    def draw(self, time_s, random):
+        """Return noise like it at rising instants, shape of ``time_s``."""
+        found = self.white_sd * random.standard_normal(time_s.size)
+        if self.slow_sd > 0.0:
+            period = float(np.median(np.diff(time_s)))
+            keep = np.exp(-period / self.memory_s)
+            driven = self.slow_sd * np.sqrt(1.0 - keep ** 2) * random.standard_normal(time_s.size)
+            found += lfilter([1.0], [1.0, -keep], driven)
+        return found
+
+
+def noise_of(time_s, values):
+    """
+    Return the Noise of a signal.
+
+    The slow part shows where the signal rests: windows in which means over 50 ms
+    scatter no more than noise does. Without such windows the noise is taken for white.
+    """
+    white = noise_sd(values)
+    period = float(np.median(np.diff(time_s)))
+    window, part = int(QUIET_S / period), max(int(MEAN_S / period), 1)
+    lag = max(int(round(LAG_S / period)), 1)
+    if white <= 0.0 or window < 4 * part or window <= 2 * lag:
+        return Noise(white)
+    rows = values[:values.size // window * window].reshape(-1, window)
+    slope = np.arange(window) - 0.5 * (window - 1)
+    rows = rows - rows.mean(axis=1, keepdims=True)
+    rows = rows - np.outer(rows @ slope / (slope @ slope), slope)
+    means = rows[:, :window // part * part].reshape(rows.shape[0], -1, part).mean(axis=2)
+    quiet = rows[means.std(axis=1) < QUIET_MEANS * white]
+    if len(quiet) < 2:
+        return Noise(white)
+    total = float(np.mean(quiet ** 2))
+    together = [float(np.mean(quiet[:, k:] * quiet[:, :-k])) for k in (lag, 2 * lag)]
+    if total < (1.0 + SLOW_SHARE) * white ** 2 or together[0] <= SLOW_SHARE * white ** 2:
+        return Noise(white)
+    ratio = min(max(together[1] / together[0], 0.05), 0.95)
+    return Noise(white, float(np.sqrt(total - white ** 2)), -LAG_S / float(np.log(ratio)))
 
 
 def quantisation_step(values):
@@ -69,9 +137,10 @@ def noise_floor(run, signal, inputs_sd=0.0):
     order = np.argsort(series.stamp_ns, kind='stable')
     time_s = np.asarray(series.stamp_ns)[order] * 1e-9
     values = np.asarray(series.values[FIELD[signal]], dtype=float)[order]
-    noise = noise_sd(values)
-    return float(np.sqrt(noise ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise)) ** 2
-                         + inputs_sd ** 2 + SMALLEST[signal] ** 2))
+    noise = noise_of(time_s, values)
+    return float(np.sqrt(
+        noise.sd ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise.white_sd)) ** 2
+        + inputs_sd ** 2 + SMALLEST[signal] ** 2))
 
 
 def rms_rate(time_s, values, noise=0.0):
@@ -85,3 +154,22 @@ def rms_rate(time_s, values, noise=0.0):
     change = np.asarray(values)[span:] - np.asarray(values)[:-span]
     squared = np.mean((change / seconds) ** 2) - 2.0 * (noise / (span * period)) ** 2
     return float(np.sqrt(max(squared, 0.0)))
+
+
+def autocorrelation_time(values):
+    """
+    Return the integrated autocorrelation time in samples, at least 1.
+
+    Summed up to the first negative value, as is usual for noisy estimates.
+    """
+    values = np.asarray(values, dtype=float) - np.mean(values)
+    n = values.size
+    if n < 8 or not np.any(values):
+        return 1.0
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(values, size)
+    correlation = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n]
+    correlation /= correlation[0]
+    negative = np.flatnonzero(correlation < 0.0)
+    stop = negative[0] if negative.size else n
+    return float(min(max(1.0 + 2.0 * correlation[1:stop].sum(), 1.0), n / 10.0))

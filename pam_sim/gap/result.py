@@ -129,6 +129,16 @@ class GapResult:
         For compare.mcap and plots; not part of gap.json.
     model_yaml : str
         The final model.
+    moved : dict of str -> float
+        By signal, how far the final model moves it, in standard deviations of its sensor.
+    rivals : list of (str, pam_sim.Rig, Hypothesis, numpy.ndarray)
+        What the first set of names holds, the likeliest first: name, fitted model, hypothesis
+        and its normalised parameters.
+    evidence : list of dict
+        Of every name that was fitted: ``subsystem``, ``name``, ``share`` of the gap it
+        explains, ``t`` by which the best is better.
+    noise : dict of str -> float
+        Standard deviation of the sensors, by signal.
 
     """
 
@@ -149,6 +159,10 @@ class GapResult:
     remarks: list = field(default_factory=list)
     traces: dict = field(default_factory=dict)
     model_yaml: str = ''
+    moved: dict = field(default_factory=dict)
+    rivals: list = field(default_factory=list)
+    noise: dict = field(default_factory=dict)
+    evidence: list = field(default_factory=list)
 
     def text(self):
         """Return the result in lines for a person."""
@@ -157,7 +171,8 @@ class GapResult:
             factor, unit = READABLE[name]
             rows.append(
                 f'  {name}: noise floor {s.noise_floor * factor:.3g}, model off by '
-                f'{s.rmse_before * factor:.3g}, calibrated {s.rmse_refit * factor:.3g} {unit} rms')
+                f'{s.rmse_before * factor:.3g}, calibrated {s.rmse_refit * factor:.3g}, '
+                f'final {s.rmse_after * factor:.3g} {unit} rms')
         return '\n'.join(rows + [f'  {r}' for r in self.remarks])
 
     def to_dict(self):

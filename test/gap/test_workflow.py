@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The gap look: verdict, size and place on recordings whose truth is known."""
+"""The gap workflow: verdict, size and place on recordings whose truth is known."""
 
 import json
 
@@ -20,18 +20,21 @@ from gap_runs import NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
-from pam_sim.gap import gap_first_look
-from pam_sim.gap.first_look import in_fit_part
+from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, held_mean, Recording
+from pam_sim.gap.parts import CERTIFY, FIT, part_of, SELECT, UNUSED
 from pam_sim.gap.result import SignalGap
 import pytest
 
 
 @pytest.fixture(scope='module')
-def realistic():
-    """Return (recording of the realistic rig, its gap to the nominal one)."""
-    run = recorded(load_rig('dmsp_5_300_realistic'), voltages(16.0))
-    return run, gap_first_look(run, nominal())
+def two_effects():
+    """Return (recording of a rig with two effects, its gap to the nominal one)."""
+    rig = nominal().with_(effects=[
+        {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.03}},
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
+    run = recorded(rig, voltages(20.0))
+    return run, find_gap(run, nominal())
 
 
 def shares(result, signal, condition='all'):
@@ -40,28 +43,37 @@ def shares(result, signal, condition='all'):
 
 
 def test_noise_alone_is_no_gap():
-    result = gap_first_look(recorded(nominal(), voltages(16.0)), nominal())
+    result = find_gap(recorded(nominal(), voltages(16.0)), nominal())
     assert result.verdict == 'no_gap'
     assert result.parameters == [] and result.unexplained_fraction == 0.0
     for signal in result.signals.values():
         assert signal.rmse_before < 1.1 * signal.noise_floor
 
 
-def test_the_realistic_rig_has_a_gap_in_valve_and_muscle(realistic):
-    _, result = realistic
-    assert result.verdict == 'unknown'
-    assert result.effects == [] and 'does not yet name effects' in result.reason
+def test_two_effects_are_named_with_their_sizes(two_effects):
+    _, result = two_effects
+    assert result.verdict == 'effects'
+    found = {e['name']: e for e in result.effects}
+    assert set(found) == {'valve_dead_time', 'coulomb_friction'}
+    for name, quantity, truth in (('valve_dead_time', 'delay_s', 0.03),
+                                  ('coulomb_friction', 'force_n', 1.5)):
+        said = found[name]['equivalent'][quantity]
+        assert said['value'] == pytest.approx(truth, rel=0.05)
+        assert said['ci95'][0] < truth < said['ci95'][1]
+        assert 0.5 < found[name]['confidence'] <= 1.0
+    assert found['coulomb_friction']['subsystem'] == 'muscle'
+    assert result.unexplained_fraction < 0.02
     for name in ('pressure', 'contraction', 'force'):
         assert result.signals[name].rmse_refit > 3.0 * result.signals[name].noise_floor
+        assert result.signals[name].shrink_percent > 90.0
     assert shares(result, 'pressure') == {'valve': 1.0}
     contraction = shares(result, 'contraction')
     assert sum(contraction.values()) == pytest.approx(1.0)
-    assert contraction['load'] < 0.1
     assert contraction['muscle'] > 0.2 and contraction['valve'] > 0.2
 
 
-def test_shares_by_condition_add_up(realistic):
-    _, result = realistic
+def test_shares_by_condition_add_up(two_effects):
+    _, result = two_effects
     directions = [w.share_of_gap for w in result.where if w.signal == 'contraction'
                   and w.condition in ('contracting', 'extending', 'at rest')]
     assert sum(directions) == pytest.approx(1.0)
@@ -72,7 +84,7 @@ def test_shares_by_condition_add_up(realistic):
 
 def test_a_wrong_mass_is_a_parameter():
     run = recorded(nominal().with_(parameters={'mass_kg': 5.75}), voltages(16.0))
-    result = gap_first_look(run, nominal())
+    result = find_gap(run, nominal())
     assert result.verdict == 'parameter'
     assert [p.name for p in result.parameters] == ['mass_kg']
     assert result.parameters[0].value == pytest.approx(5.75, rel=2e-3)
@@ -84,7 +96,7 @@ def test_a_wrong_mass_is_a_parameter():
 
 def test_a_small_error_within_tolerance_is_calibrated_silently():
     run = recorded(nominal().with_(parameters={'mass_kg': 5.15}), voltages(16.0))
-    result = gap_first_look(run, nominal())
+    result = find_gap(run, nominal())
     assert result.verdict == 'no_gap'
     assert result.signals['contraction'].rmse_before > result.signals[
         'contraction'].noise_floor
@@ -95,7 +107,7 @@ def test_a_hair_of_latency_is_no_gap():
     run = recorded(nominal(), voltages(16.0))
     for topic in ('pressure', 'contraction', 'force'):
         run.topics[topic].stamp_ns += 1_500_000
-    assert gap_first_look(run, nominal()).verdict == 'no_gap'
+    assert find_gap(run, nominal()).verdict == 'no_gap'
 
 
 def test_the_hsv_pair_keeps_no_gap_in_a_closed_volume():
@@ -105,14 +117,15 @@ def test_the_hsv_pair_keeps_no_gap_in_a_closed_volume():
     duty = np.column_stack([np.clip(wave, 0, 1), np.clip(-1.1 * wave, 0, 1)])
     duty[:1500] = (0.3, 0.0)
     run = recorded(rig, duty, rate_hz=100, initial_pressure_pa=101_325.0)
-    assert gap_first_look(run, rig).verdict == 'no_gap'
+    assert find_gap(run, rig).verdict == 'no_gap'
 
 
 def test_without_a_load_cell_the_gap_is_still_measured():
     run = recorded(load_rig('dmsp_5_300_realistic'), voltages(12.0),
                    topics=('pressure', 'contraction'))
-    result = gap_first_look(run, nominal())
-    assert result.verdict == 'unknown' and set(result.signals) == {'pressure', 'contraction'}
+    result = find_gap(run, nominal())
+    assert set(result.signals) == {'pressure', 'contraction'}
+    assert result.signals['contraction'].shrink_percent > 50.0
     assert any('load cell' in remark for remark in result.remarks)
 
 
@@ -127,21 +140,24 @@ def test_without_a_load_cell_the_gap_is_still_measured():
 def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     run = recorded(nominal(), voltages(12.0))
     spoil(run)
-    result = gap_first_look(run, nominal())
+    result = find_gap(run, nominal())
     assert result.verdict == 'refused' and word in result.reason
     json.dumps(result.to_dict(), allow_nan=False)
 
 
 def test_another_valve_is_refused():
     run = recorded(nominal(), voltages(12.0))
-    result = gap_first_look(run, load_rig(NOMINAL, valve='hsv'))
+    result = find_gap(run, load_rig(NOMINAL, valve='hsv'))
     assert result.verdict == 'refused' and 'hsv' in result.reason
 
 
-def test_equal_inputs_give_equal_results(realistic):
-    run, first = realistic
-    second = gap_first_look(run, nominal()).to_dict()
-    assert {**second, 'runtime_s': 0} == {**first.to_dict(), 'runtime_s': 0}
+def test_equal_inputs_give_equal_results():
+    rig = nominal().with_(effects=[
+        {'name': 'valve_hysteresis', 'parameters': {'half_width_pa': 2e3}}])
+    run = recorded(rig, voltages(12.0))
+    first, second = (find_gap(run, nominal()).to_dict() for _ in range(2))
+    assert first['effects'][0]['name'] == 'valve_hysteresis'
+    assert {**second, 'runtime_s': 0} == {**first, 'runtime_s': 0}
 
 
 def test_a_free_run_of_the_true_model_follows_the_recording():
@@ -160,9 +176,11 @@ def test_mean_of_a_held_signal_is_exact_between_grid_points():
     assert mean == pytest.approx([1.5, 2.0, 2.0])
 
 
-def test_fit_and_certify_blocks_cover_everything_once():
-    part = in_fit_part(np.arange(0.0, 20.0, 0.5))
-    assert part.mean() == pytest.approx(0.6)
+def test_parts_cover_everything_once_the_start_has_settled():
+    part = part_of(np.arange(0.0, 20.0, 0.5), 20.0)
+    assert part[0] == UNUSED
+    assert [(part == p).sum() for p in (FIT, SELECT, CERTIFY)] == [15, 16, 8]
+    assert not (part_of(np.arange(0.5, 20.0, 0.5), 20.0, own_proof=False) == CERTIFY).any()
 
 
 def test_shrink_takes_the_noise_out():
@@ -171,9 +189,9 @@ def test_shrink_takes_the_noise_out():
     assert SignalGap('m', 1.0, 9.0, 0.9, 0.9).shrink_percent is None
 
 
-def test_the_folder_holds_what_others_rely_on(realistic, tmp_path):
-    run, _ = realistic
-    result = write_gap([run], NOMINAL, tmp_path / 'gap', seconds=5.0)
+def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
+    run, _ = two_effects
+    result = write_gap([run], NOMINAL, tmp_path / 'gap')
     found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
@@ -188,10 +206,10 @@ def test_the_folder_holds_what_others_rely_on(realistic, tmp_path):
         'compare.mcap', 'gap.json', 'model.yaml', 'report.html']
 
 
-def test_the_comparison_opens_with_an_independent_reader(realistic, tmp_path):
+def test_the_comparison_opens_with_an_independent_reader(two_effects, tmp_path):
     from mcap_ros2.reader import read_ros2_messages
-    run, _ = realistic
-    write_gap([run], NOMINAL, tmp_path, seconds=2.0)
+    run, _ = two_effects
+    write_gap([run], NOMINAL, tmp_path, effects=['valve_dead_time'])
     counts = {}
     for message in read_ros2_messages(str(tmp_path / 'compare.mcap')):
         counts[message.channel.topic] = counts.get(message.channel.topic, 0) + 1
@@ -202,8 +220,22 @@ def test_the_comparison_opens_with_an_independent_reader(realistic, tmp_path):
     assert len(set(counts.values())) <= 3
 
 
-def test_an_overlay_of_the_true_model_stays_near(realistic):
-    run, _ = realistic
+def test_an_overlay_of_the_true_model_stays_near():
+    run = recorded(load_rig('dmsp_5_300_realistic'), voltages(16.0))
     overlays = {o.signal: o for o in free_run_overlay(run, load_rig('dmsp_5_300_realistic'))}
     contraction = overlays['contraction']
     assert np.sqrt(np.mean((contraction.recorded - contraction.simulated) ** 2)) < 1e-4
+
+
+def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path):
+    from pam_actuation.experiments import load_experiment
+    rig = nominal().with_(effects=[
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
+    run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
+    result = write_gap([run], NOMINAL, tmp_path, effects=['coulomb_friction', 'guide_friction'])
+    assert result.verdict == 'ambiguous'
+    assert set(result.ambiguity_set) == {'coulomb_friction', 'guide_friction'}
+    # Inside the muscle or at the rail: only a load cell between them can tell.
+    assert 'force' in result.next_experiment['needs']
+    found = load_experiment(str(tmp_path / 'next_experiment.yaml'))
+    assert found.domain == 'pressure' and 'force' in found.needs

@@ -1,0 +1,173 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How often `pam gap` names the hidden effect: rigs made by an independent simulator.
+
+    python benchmarks/hidden_effects.py                      # 330 cases
+    python benchmarks/hidden_effects.py --number 33 --seed 7 --jobs 2 --kinds single,null
+
+Four phases: all cases are recorded and the key is sealed; `pam gap` answers every case from
+its bags; the experiments it suggests for the ambiguous cases are run on the hidden rigs and
+answered; then the key is opened and everything is scored. With --work DIR the recordings and
+the answers are kept, and an interrupted run goes on where it stopped.
+
+Exit code 1 when a bar is missed.
+"""
+
+import argparse
+import json
+from pathlib import Path
+import platform
+import shutil
+import sys
+import tempfile
+import time
+
+from joblib import delayed, Parallel
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parent.parent
+# The generator and the scorer live beside their tests; runs from the source tree as it stands.
+sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
+
+from asking import pam_gap  # noqa: E402
+from scoring_table import scored, table  # noqa: E402
+from scoring_text import report  # noqa: E402
+import truth_cases  # noqa: E402
+from truth_commands import NotRunnable  # noqa: E402
+from truth_effects import EFFECTS  # noqa: E402
+import truth_key  # noqa: E402
+
+FAMILIES = {name: hidden.family for name, hidden in EFFECTS.items()}
+SMALL = 0.3                  # materiality asked for where the gap is below 1 sigma
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--number', type=int, default=330, help='cases (default: 330)')
+    parser.add_argument('--seed', type=int, default=2026, help='of the examination')
+    parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
+    parser.add_argument('--kinds', help=f'only these, of {", ".join(truth_cases.SHARES)}')
+    parser.add_argument('--rivals', type=int, default=0, metavar='N',
+                        help='answer the first N cases by the other methods, too')
+    parser.add_argument('--work', type=Path, help='keep recordings and answers here')
+    parser.add_argument('--again', action='store_true',
+                        help='with --work: keep the recordings, answer anew')
+    parser.add_argument('--seconds', type=float, default=None, help='time budget of `pam gap` for '
+                        'one case (default: its own); on a busy machine give more')
+    parser.add_argument('--out', type=Path, help='write the report here as well')
+    args = parser.parse_args()
+    cases = truth_cases.plan(args.number, args.seed)
+    if args.kinds:
+        cases = [c for c in cases if c.kind in args.kinds.split(',')]
+    if args.work:
+        args.work.mkdir(parents=True, exist_ok=True)
+        return examine(cases, args.work, args)
+    with tempfile.TemporaryDirectory(prefix='hidden_effects_') as folder:
+        return examine(cases, Path(folder), args)
+
+
+def examine(cases, work, args):
+    """Run the four phases; return the exit code."""
+    begun = time.time()
+    if not (work / 'sealed.json').exists():
+        keys = each(args.jobs, 'recording', record, [(c, work) for c in cases])
+        truth_key.seal({c.name: key for c, key in zip(cases, keys)}, work)
+        (work / 'orders.json').write_text(json.dumps({
+            c.name: SMALL if 0.0 < max(key['gap_sigma'].values()) < 1.0 else 1.0
+            for c, key in zip(cases, keys)}), encoding='utf-8')
+    orders = read(work / 'orders.json')
+    if set(orders) != {c.name for c in cases}:
+        sys.exit(f'{work} holds another examination; give the same --number, --seed and --kinds')
+    if args.again:
+        for path in (*work.glob('*/answer.json'), *work.glob('*/after.json')):
+            path.unlink()
+    each(args.jobs, 'answering', answer, [
+        (work / c.name, 'answer', ['fit'], orders[c.name], args.seconds) for c in cases])
+    each(args.jobs, 'next experiments', follow, [
+        (c, work, orders[c.name], args.seconds) for c in cases if c.kind == 'ambiguous'])
+    rivals = {}
+    if args.rivals:
+        from hidden_rivals import METHODS
+        for name, method in METHODS.items():
+            found = each(args.jobs, name, method, [(work / c.name,) for c in cases[:args.rivals]])
+            rivals[name] = [(c.name, one) for c, one in zip(cases, found)]
+    answers = {c.name: read(work / c.name / 'answer.json') for c in cases}
+    keys = truth_key.open_keys(work, answers)
+    found = [scored(keys[c.name], answers[c.name]['result'],
+                    (read(work / c.name / 'after.json') or {}).get('result'),
+                    answers[c.name]['wall_s'], answers[c.name]['processor_s']) for c in cases]
+    others = {name: [scored(keys[case], one) for case, one in given]
+              for name, given in rivals.items()}
+    text = '\n'.join([
+        f'{len(cases)} cases, seed {args.seed}, {args.jobs} processes on {platform.machine()}, '
+        f'{(time.time() - begun) / 60.0:.0f} min.', '', report(found, FAMILIES, others), ''])
+    print(text)
+    if args.out:
+        args.out.write_text(text, encoding='utf-8')
+    return int(any(row.met is False for row in table(found, FAMILIES)))
+
+
+def each(jobs, what, function, arguments):
+    """Return function(*a) of all arguments, in order, on some processes, with a progress bar."""
+    results = Parallel(n_jobs=jobs, return_as='generator')(
+        delayed(function)(*a) for a in arguments)
+    return list(tqdm(results, total=len(arguments), desc=what, disable=None))
+
+
+def record(case, work):
+    """Record one case anew; return its key."""
+    shutil.rmtree(work / case.name, ignore_errors=True)
+    return truth_cases.build(case, work / case.name)
+
+
+def answer(folder, name, runs, materiality, seconds):
+    """Call `pam gap` on the runs of a case, unless that was done; keep its result."""
+    target = folder / f'{name}.json'
+    if target.exists():
+        return
+    begun, used = time.perf_counter(), time.process_time()
+    result = pam_gap(folder, [folder / run for run in runs], folder / name, materiality, seconds)
+    target.write_text(json.dumps({
+        'result': result, 'wall_s': time.perf_counter() - begun,
+        'processor_s': time.process_time() - used}), encoding='utf-8')
+
+
+def follow(case, work, materiality, seconds):
+    """Run the experiment suggested for an ambiguous case and answer again, with both runs."""
+    folder = work / case.name
+    suggestion = read(folder / 'answer.json')['result'].get('next_experiment') or {}
+    experiment = suggestion.get('experiment')
+    if not experiment or (folder / 'after.json').exists():
+        return
+    experiment = {**experiment, 'needs': [
+        *(experiment.get('needs') or ()), *(suggestion.get('needs') or ())]}
+    shutil.rmtree(folder / 'next', ignore_errors=True)
+    try:
+        truth_cases.run_suggested(case, folder / 'next', experiment)
+    except (NotRunnable, TypeError, KeyError) as error:
+        (folder / 'after.json').write_text(json.dumps({
+            'result': {'verdict': 'crashed', 'reason': repr(error)}}), encoding='utf-8')
+        return
+    answer(folder, 'after', ['fit', 'next'], materiality, seconds)
+
+
+def read(path):
+    """Return the data of a JSON file, None if it is missing."""
+    return json.loads(path.read_text(encoding='utf-8')) if path.exists() else None
+
+
+if __name__ == '__main__':
+    sys.exit(main())

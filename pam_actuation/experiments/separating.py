@@ -1,0 +1,149 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The experiment that tells rivals apart, when a recording could not.
+
+Every experiment of a small menu is simulated with the likeliest rival as the truth; the
+others are fitted to what it would record, numbers and all. The experiment that leaves
+the best of them farthest off is the one to run (T-optimality: Atkinson and Fedorov,
+1975, Biometrika 62(1)). A load cell is asked for where none was there and the rivals
+stay together without it.
+"""
+
+from pathlib import Path
+import tempfile
+
+import numpy as np
+
+from pam_actuation.bags.load import load_run
+from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_sim.errors import InputError
+from pam_sim.gap.compare import gap
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.located_yaml import dump_yaml
+from pam_sim.units import P_ATM_PA
+
+HIGHEST_GAUGE_PA = 550e3     # below the pressure limit of the driver
+LOWEST_GAUGE_PA = 200e3      # a hanging mass of 5 kg has left its stop
+NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothing is recorded
+CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
+
+
+def menu(valve):
+    """Return experiment name -> (what it shows, segments) of the menu for a valve."""
+    low, high = P_ATM_PA + LOWEST_GAUGE_PA, P_ATM_PA + HIGHEST_GAUGE_PA
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    band = {'low_pa': low, 'high_pa': high}
+    start = [{'rest': {'duration_s': 1.0}}, {'ramp': {'to_pa': low, 'duration_s': 1.5}}]
+    found = {
+        'edges': ('sharp steps at random times show transport and speed', [
+            {'random_steps': {**band, 'min_hold_s': 0.25, 'max_hold_s': 0.9,
+                              'duration_s': 16.0, 'seed': 7}}]),
+        'loops': ('slow moves with inner loops show what depends on the path', [
+            {'triangle_loops': {**band, 'depth_pa': 0.15 * half, 'loops': 2,
+                                'period_s': 12.0, 'cycles': 1}}]),
+        'bands': ('the same motion at a low and a high pressure shows what grows with it', [
+            {'two_bands': {'low_center_pa': middle - 0.6 * half,
+                           'high_center_pa': middle + 0.6 * half,
+                           'amplitude_pa': 0.35 * half, 'frequency_hz': 0.5, 'cycles': 3,
+                           'move_s': 1.5}}]),
+        'speeds': ('the same path slowly and quickly shows what depends on speed', [
+            {'triangle': {**band, 'period_s': 8.0, 'cycles': 1}},
+            {'triangle': {**band, 'period_s': 1.2, 'cycles': 6}}]),
+        'holds': ('long holds after steps show what drifts', [
+            {'step': {'to_pa': high, 'duration_s': 7.0}},
+            {'step': {'to_pa': low, 'duration_s': 7.0}}]),
+        'frequencies': ('a multisine shows lags at every frequency', [
+            {'multisine': {'center_pa': middle, 'amplitude_pa': 0.9 * half, 'min_hz': 0.1,
+                           'max_hz': 4.0, 'lines': 12, 'duration_s': 16.0, 'seed': 8}}])}
+    if valve == 'hsv':
+        found['shut'] = ('with both valves shut only a leak changes the air in the muscle', [
+            {'step': {'to_pa': high, 'duration_s': 3.0}}, {'decay': {'duration_s': 10.0}}])
+    return {name: (why, start + segments) for name, (why, segments) in found.items()}
+
+
+def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
+    """
+    Return the experiment that separates rivals best, as gap.json states it, or None.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The given model.
+    rivals : list of (str, pam_sim.Rig, Hypothesis, theta)
+        Name, fitted model, hypothesis and its normalised parameters; the likeliest first.
+    recorded : tuple of str
+        Signals that were recorded.
+    noise : dict of str -> float
+        Standard deviation of the sensors, by signal.
+    out_of_time : callable
+        Returns whether to stop looking.
+
+    """
+    best, sensors = None, {f'{s}_noise_{u}': noise.get(s, NOISE[s]) for s, u in (
+        ('pressure', 'pa'), ('contraction', 'm'), ('force', 'n'))}
+    truth = rivals[0][1].with_(sensors=sensors)
+    for name, (why, segments) in menu(rig.valve).items():
+        if out_of_time() and best is not None:
+            break
+        plain = {'name': f'tell_apart_{name}', 'domain': 'pressure', 'segments': segments,
+                 'description': f'{why[0].upper()}{why[1:]}'}
+        try:
+            run = _simulated(plain, truth)
+            apart = {False: separation(run, rig, rivals[1:], 'force' in recorded)}
+            if 'force' not in recorded:
+                apart[True] = separation(run, rig, rivals[1:], True)
+        except InputError:
+            continue
+        for with_cell, sigma in apart.items():
+            # Without a further sensor, if that is clear enough.
+            rank = (not with_cell and sigma > CLEAR, sigma)
+            if best is None or rank > best[0]:
+                best = (rank, name, why, plain, with_cell)
+    if best is None:
+        return None
+    (_, sigma), name, why, plain, with_cell = best
+    needs = ['pressure', 'contraction', *(['force'] if with_cell else [])]
+    names = [r[0] for r in rivals]
+    text = (f'{why[0].upper()}{why[1:]}. Run with {names[0]} as the truth it leaves '
+            f'{" and ".join(names[1:])} off by {sigma:.2g} noise floors per sample after refit.')
+    if with_cell:
+        text += ' It needs a load cell, which the recording does not have.'
+    return {'name': plain['name'], 'why': text, 'separation_sigma': sigma,
+            'needs': needs, 'experiment': {**plain, 'needs': needs}}
+
+
+def separation(run, rig, rivals, with_force):
+    """Return how far the nearest rival stays off a run, in noise floors per sample (rms)."""
+    topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
+    recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
+                          rig.load != 'hanging_mass')
+    problem = Problem(rig, cuts_of(rig, [recording], own_proof=False), use=(FIT, SELECT))
+    nearest = np.inf
+    for _, _, hypothesis, theta in rivals:
+        found = problem.fit(hypothesis, theta)
+        nearest = min(nearest, np.sqrt(max(
+            sum(max(gap(c, found.errors[c.subsystem]), 0.0) for c in problem.cuts), 0.0)))
+    return float(nearest)
+
+
+def _simulated(plain, rig):
+    with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
+        simulate_experiment(load_experiment(dump_yaml(plain)), rig, None, Path(folder) / 'bag')
+        return load_run(Path(folder) / 'bag')

@@ -1,0 +1,195 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What may be missing: formulations of effects with the parameters that are fitted.
+
+Each effect of the registry is a candidate; formulations with ``variant_of`` carry the
+name of that effect. The table below gives scale and range of what is fitted where an
+amplitude times a number will not do. Ranges are narrower than those of a model file:
+at its extremes one effect turns into another (a loop without width is Coulomb
+friction), and a name would mean nothing.
+"""
+
+from dataclasses import dataclass
+import itertools
+import math
+
+from pam_sim.effects.registry import effects, get_effect
+
+
+@dataclass(frozen=True)
+class Free:
+    """
+    A parameter of an effect that is fitted.
+
+    Parameters
+    ----------
+    name : str
+    scale : float
+        Typical size; start of the screening.
+    lower, upper : float
+        Range that keeps the meaning of the effect.
+    shape : bool
+        Fitted on a logarithmic scale, from several starts.
+    starts : tuple of float
+        Values the screening tries; ``scale`` by default.
+
+    """
+
+    name: str
+    scale: float
+    lower: float
+    upper: float
+    shape: bool = False
+    starts: tuple = ()
+
+    def value(self, coordinate):
+        """Return the value of a normalised coordinate, kept within the range."""
+        value = self.scale * (math.exp(min(coordinate, 50.0)) if self.shape else coordinate)
+        return min(max(value, self.lower), self.upper)
+
+    def coordinate(self, value):
+        """Return the normalised coordinate of a value."""
+        return math.log(value / self.scale) if self.shape else value / self.scale
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """
+    One formulation with what is fitted of it.
+
+    Parameters
+    ----------
+    effect : str
+        Name in the registry.
+    free : tuple of Free
+    held : tuple of (str, float)
+        Parameters set to a value that is not their nominal one.
+
+    """
+
+    effect: str
+    free: tuple
+    held: tuple = ()
+
+    @property
+    def name(self):
+        """Name under which a result states this formulation."""
+        return get_effect(self.effect).variant_of or self.effect
+
+    @property
+    def amplitudes(self):
+        """Return the free parameters whose response is about proportional to their value."""
+        return [f for f in self.free if not f.shape]
+
+    def starts(self):
+        """Return the parameter dicts that the screening tries."""
+        grids = [f.starts or (f.scale,) for f in self.free]
+        return [dict(zip((f.name for f in self.free), values))
+                for values in itertools.product(*grids)]
+
+    def setting(self, values):
+        """Return the effect as an entry of a model file."""
+        return {'name': self.effect, 'parameters': {**dict(self.held), **values}}
+
+
+def _level(name):
+    return (Free('force_n', 1.0, 0.0, 50.0, starts=(1.0,)),
+            Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), *name)
+
+
+_RATES = (4e5, 1e6, 2.5e6)
+_TABLE = {
+    'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3),),
+    'tube_lag': (Free('time_constant_s', 0.01, 0.0, 0.5),),
+    'valve_hysteresis': (Free('half_width_pa', 2e3, 0.0, 5e4),),
+    'flow_limit': (Free('fill_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES),
+                   Free('vent_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES)),
+    'vent_asymmetry': (Free('ratio_minus_1', 0.2, -0.4, 4.0),),
+    'leakage': (Free('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),),
+    'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True, (3e-4, 3e-3)),),
+    'dead_volume': (Free('extra_volume_m3', 2e-6, 0.0, 1e-4),),
+    'thermal': (Free('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),),
+    'coulomb_friction': (Free('force_n', 1.0, 0.0, 50.0),),
+    'pressure_friction': (Free('force_at_400kpa_n', 1.0, 0.0, 100.0),),
+    'hysteresis': _level((Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5)),)),
+    'hysteresis_bouc_wen': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
+    'hysteresis_lugre': _level((Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True),)),
+    'hysteresis_prandtl_ishlinskii': (
+        Free('half_width_pa', 2e3, 0.0, 5e4), Free('half_width_per_pa', 0.02, 0.0, 0.3)),
+    'history_friction': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
+    'braid_contact_friction': (Free('friction_coefficient', 0.3, 0.0, 2.0),),
+    'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
+    'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
+              Free('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
+              Free('time_constant_1_s', 1.0, 0.15, 4.0, True),
+              Free('time_constant_2_s', 10.0, 4.0, 100.0, True)),
+    'thermal_softening': (Free('gain_loss_at_20mm_per_s', 0.02, -0.2, 0.5),
+                          Free('time_constant_s', 60.0, 10.0, 600.0, True)),
+    'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
+    'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
+    'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
+}
+_HSV = {'valve_dead_zone': (Free('open_time_s', 1e-3, 0.0, 9e-3),
+                            Free('close_time_s', 1e-3, 0.0, 9e-3))}
+_PPR = {'valve_dead_zone': (Free('half_width_pa', 2e3, 0.0, 5e4),)}
+# Left is a limit of right: where both explain the data, the simpler one is named.
+LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
+          ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}
+
+
+def candidates(rig, outputs, only=None):
+    """
+    Return the candidates that can show on a rig.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The model; an effect it already has is refitted, not added.
+    outputs : tuple of str
+        Signals that are compared.
+    only : sequence of str, optional
+        Names to try, canonical or of a formulation.
+
+    Returns
+    -------
+    list of Candidate
+
+    """
+    table = {**_TABLE, **(_HSV if rig.valve == 'hsv' else _PPR)}
+    found = []
+    for name, effect in effects().items():
+        free = table.get(name) or _plain(effect)
+        candidate = Candidate(name, free)
+        if rig.valve not in effect.valves or rig.effect(name) is not None:
+            continue
+        if only is not None and name not in only and candidate.name not in only:
+            continue
+        if effect.subsystem == 'load' and rig.load != 'hanging_mass':
+            continue
+        if effect.subsystem == 'sensor' and name.split('_')[0] not in outputs:
+            continue
+        found.append(candidate)
+    return found
+
+
+def _plain(effect):
+    """Return the amplitudes of an effect, each from its nominal size."""
+    found = []
+    for p in effect.parameters:
+        if p.name in effect.amplitude:
+            scale = abs(p.nominal) or 1e-3 * max(abs(p.lower), abs(p.upper))
+            found.append(Free(p.name, scale, p.lower, p.upper))
+    return tuple(found)

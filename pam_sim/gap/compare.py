@@ -1,0 +1,87 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which of two fitted hypotheses the held-out data prefer, and how much each explains.
+
+A share of the gap is taken inside one cut, so that a badly fitting subsystem cannot
+drown another. Rivals are compared block by block on the logarithm of their squared
+errors, in blocks where there is something to explain: a mean over everything would
+let the few blocks with the largest error decide.
+"""
+
+import numpy as np
+from pam_sim.gap.parts import SELECT
+
+ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks say nothing
+ACTIVE_SHARE = 0.05          # of the mean gap
+SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
+MIN_BLOCKS = 4
+CERTAIN_T = 3.0
+NO_TEST_T = 0.0
+
+
+def gap(cut, errors, part=SELECT):
+    """Return the mean squared error beyond the noise, in floors squared."""
+    return cut.chi2(errors, part) - cut.level
+
+
+def share(cut, base, errors, part=SELECT):
+    """Return the share of the baseline's squared gap that a hypothesis explains, at most 1."""
+    whole = gap(cut, base, part)
+    return min((whole - gap(cut, errors, part)) / whole, 1.0) if whole > 0.0 else 0.0
+
+
+def block_chi2(cut, errors, part=SELECT):
+    """Return (block numbers, mean squared error of each), signals weighted alike."""
+    mask = cut.part == part
+    blocks = np.unique(cut.block[mask])
+    total = np.zeros(blocks.size)
+    for s in range(len(cut.signals)):
+        chosen = mask & (cut.signal == s)
+        place = np.searchsorted(blocks, cut.block[chosen])
+        count = np.maximum(np.bincount(place, minlength=blocks.size), 1)
+        total += np.bincount(place, errors[chosen] ** 2, blocks.size) / count
+    return blocks, total / len(cut.signals)
+
+
+def preference(cut, base, better, worse, part=SELECT):
+    """
+    Return t of the paired log ratio of squared errors, positive where ``better`` is.
+
+    Parameters
+    ----------
+    cut : Cut
+        Where they are compared.
+    base, better, worse : numpy.ndarray
+        Errors of the baseline and of the rivals.
+    part : int
+        Part of the data that judges.
+
+    Returns
+    -------
+    float
+        0 with fewer than ``MIN_BLOCKS`` active blocks.
+
+    """
+    _, before = block_chi2(cut, base, part)
+    mean = max(float(np.mean(before)) - cut.level, 0.0)
+    least = max(min(ACTIVE_GAP, mean), ACTIVE_SHARE * mean)
+    active = before - cut.level > least
+    if active.sum() < MIN_BLOCKS:
+        return NO_TEST_T
+    first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))
+    ratio = np.log(second / first)
+    spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
+    return float(np.mean(ratio) / max(spread, 1e-9))

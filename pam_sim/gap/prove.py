@@ -1,0 +1,133 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The proof: whole-chain free runs on data that neither fit nor choice has seen.
+
+The given model, the same with its numbers calibrated, and the final one run on the
+recorded valve signal alone.
+"""
+
+import numpy as np
+from pam_sim.gap.free_run import free_run
+from pam_sim.gap.noise import noise_floor, noise_of, STAMP_SD_S
+from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
+from pam_sim.gap.result import SignalGap, Trace, UNIT
+
+INPUT_DRAWS = 3
+
+
+def numbers_of(problem, found):
+    """Return (numbers of the rig, numbers of the measurement) of a fit, name -> value."""
+    rig, measurement = {}, {}
+    for cut in problem.cuts:
+        for known, z in zip(cut.known, found.known_z[cut.subsystem]):
+            (rig if known.of_rig else measurement)[known.name] = known.value + known.sd * float(z)
+    return rig, measurement
+
+
+def model_of(problem, found):
+    """Return the rig of a fit: numbers calibrated, effects added."""
+    numbers, _ = numbers_of(problem, found)
+    return problem.with_effects(found.settings()).with_(parameters=numbers)
+
+
+def late_by(measurement):
+    """Return by how much [s] contraction and force are stamped later than pressure."""
+    skew = measurement.get('pressure_skew', 0.0)
+    return {'contraction': skew, 'force': skew + measurement.get('force_skew', 0.0)}
+
+
+class Proof:
+    """
+    Free runs of a model before and after on one recording.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        The recording the proof is made on.
+    recording : Recording
+        The same, prepared.
+    whole : bool
+        All of it is the certify part; otherwise its certify blocks.
+    problem : Problem
+        With the given model.
+    base, final : Found
+        Numbers calibrated alone, and the final model.
+    seed : int
+        Of the draws that carry stamp errors of the valve signal into the floor.
+
+    """
+
+    def __init__(self, run, recording, whole, problem, base, final, seed=0):
+        self.recording, self.problem = recording, problem
+        self.part = {s: recording.time_s[s] > SETTLE_S if whole else
+                     part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY
+                     for s in recording.signals}
+        self.before = free_run(problem.rig, recording)
+        self.refit, self.after = self.run(base, whole), self.run(final, whole)
+        self.simulations = 3
+        self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd
+                      for s in recording.signals}
+        self.floor = self._floors(run, final, seed)
+
+    def run(self, found, whole):
+        """Return the free run of a fit at the stamps, by signal."""
+        _, measurement = numbers_of(self.problem, found)
+        start = 0.0 if whole else measurement.get('start_error', 0.0)
+        return free_run(model_of(self.problem, found), self.recording, measurement['latency'],
+                        start_error_pa=start, late_s=late_by(measurement))
+
+    def signals(self):
+        """Return the SignalGap of every signal."""
+        return {s: SignalGap(UNIT[s], self.floor[s], self._rms(self.before, s),
+                             self._rms(self.refit, s), self._rms(self.after, s))
+                for s in self.recording.signals}
+
+    def traces(self):
+        """Return the Trace of every signal."""
+        r = self.recording
+        return {s: Trace(r.stamp_ns[s], r.measured[s], self.before[s], self.refit[s],
+                         self.after[s]) for s in r.signals}
+
+    def moved(self, found, whole):
+        """Return by signal how far the final model moves it from a fit's, in sensor noise."""
+        other = self.run(found, whole)
+        return {s: float(np.sqrt(np.mean((self.after[s] - other[s])[self.part[s]] ** 2))
+                         / max(self.noise[s], 1e-12)) for s in self.recording.signals}
+
+    def unexplained(self):
+        """Return the share of the squared gap left after calibration that is still there."""
+        before = after = 0.0
+        for s in self.signals().values():
+            before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+            after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+        return min(after / before, 1.0) if before > 0.0 else 0.0
+
+    def _rms(self, simulated, signal):
+        error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
+        return float(np.sqrt(np.mean(error ** 2)))
+
+    def _floors(self, run, final, seed):
+        random, r = np.random.default_rng(seed), self.recording
+        rig, squares = model_of(self.problem, final), dict.fromkeys(r.signals, 0.0)
+        _, measurement = numbers_of(self.problem, final)
+        for _ in range(INPUT_DRAWS):
+            shift = STAMP_SD_S * random.standard_normal(r.messages)
+            moved = free_run(rig, r, measurement['latency'], shift,
+                             late_s=late_by(measurement))
+            self.simulations += 1
+            for s in r.signals:
+                squares[s] += float(np.mean((moved[s] - self.after[s]) ** 2)) / INPUT_DRAWS
+        return {s: noise_floor(run, s, np.sqrt(squares[s])) for s in r.signals}

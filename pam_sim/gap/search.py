@@ -1,0 +1,439 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which effects are missing: fit what promises something, rank, keep what holds out.
+
+One effect at a time is added in each cut with a gap, the best on held-out blocks;
+then everything is refitted and the rest of the gap looked at again. Where rivals
+cannot be told apart they stay together as a set. At the end every effect must be
+missed when it is left out.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from pam_sim.gap.candidates import candidates, LIMITS
+from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.fit import BOX, Found, Hypothesis
+from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.screen import screen
+from pam_sim.rollout.batch import default_workers
+
+MAX_EFFECTS = 3
+PROMISING = 0.15             # of the best promise in a cut
+MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
+CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
+FIRST_STEP = 0.25            # least share of the gap a first effect explains
+NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+RIVAL = 0.5                  # of the best share; a name that explains less is no rival
+BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
+LATER_STEP = 0.7             # least share of what is left that a further effect explains
+DONE = 0.01                  # rest of the gap that formulations may leave
+RIVALS = 4                   # that are ranked again when further effects are in
+CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
+STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
+SAME_AS = {'viscous_damping': 'damping_n_s_per_m', 'dead_volume': 'V_dead'}
+
+
+@dataclass
+class Rival:
+    """One hypothesis with its share of the gap and, against the best, its t, by subsystem."""
+
+    name: str
+    found: Found
+    share: dict = field(default_factory=dict)
+    t: dict = field(default_factory=dict)
+
+
+@dataclass
+class Named:
+    """
+    An effect or a number that was taken in.
+
+    ``names`` explain as much, itself first; ``formulations`` are all fits under its name.
+    """
+
+    name: str
+    subsystem: str
+    rivals: list
+    names: tuple
+    formulations: list = field(default_factory=list)
+
+
+@dataclass
+class Outcome:
+    """
+    Result of the search.
+
+    Attributes
+    ----------
+    base, final : Found
+    named : list of Named
+        In the order in which they were taken in.
+    share : dict of str -> float
+        Share of the gap that is explained, by subsystem with a gap.
+    complete : bool
+        False if the time ran out.
+
+    """
+
+    base: Found
+    final: Found
+    named: list
+    share: dict
+    complete: bool = True
+
+
+class Search:
+    """
+    Search for the missing effects.
+
+    Parameters
+    ----------
+    problem : Problem
+    seen_gap, least_gap : float
+        Gaps, in floors squared: from the first on a cut needs an explanation, from the
+        second on one is looked for where an effect promises it.
+    only : sequence of str, optional
+        Names to try; all by default.
+    out_of_time : callable
+        Returns whether the search should come to an end.
+
+    """
+
+    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False):
+        self.problem, self.out_of_time = problem, out_of_time
+        self.seen_gap, self.least_gap = seen_gap, least_gap
+        outputs = sum((cut.signals for cut in problem.cuts), ())
+        self.only, self.pool = only, candidates(problem.rig, outputs, only)
+        self.base = problem.base
+        self.fitted = []
+        self.screened = screen(problem, self.base, self.pool)
+        self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
+
+    def run(self):
+        """Return the Outcome."""
+        current, named, closed = self.base, [], set()
+        while len(named) < MAX_EFFECTS and not self.out_of_time():
+            open_cuts = [c for c in self.problem.cuts
+                         if c.subsystem not in closed and self._is_open(c, current)]
+            if not open_cuts:
+                break
+            rivals = self._rivals(current, open_cuts)
+            self._set_levels(rivals, open_cuts)
+            taken = self._joint_winner(rivals, current, open_cuts)
+            if taken is None:
+                taken = [w for w in (self._winner(rivals, current, c) for c in open_cuts) if w]
+                closed |= {c.subsystem for c in open_cuts} - {w.subsystem for w in taken}
+            else:
+                taken = [taken]
+            taken = [w for i, w in enumerate(taken)
+                     if w.name not in [o.name for o in taken[:i]]]
+            if not taken:
+                break
+            current = self._other_formulations(self._take(current, taken))
+            named += taken
+            self.problem.take_slopes(current.settings(), current.known_z)
+        current, named = self._eliminate(current, named)
+        current, named = self._resolve(current, named)
+        explained = self._explained(current)
+        for w in list(named):        # what explains too little is no name
+            if explained.get(w.subsystem, 0.0) < NAMED:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
+        return Outcome(self.base, current, named, explained, not self.out_of_time())
+
+    def _first_gap(self, cut):
+        """
+        Return the gap of a cut before anything is added.
+
+        Both the fitted and the judging part must show it. One that is below the floor
+        can still be seen, if an effect promises to explain a part of the errors.
+        """
+        s = cut.subsystem
+        seen = min(gap(cut, self.base.errors[s], part) for part in (FIT, SELECT))
+        if seen > self.seen_gap:
+            return seen
+        promise = max((p.promise.get(s, 0.0) for p in self.screened), default=0.0)
+        return promise * cut.chi2(self.base.errors[s], FIT)
+
+    def _set_levels(self, rivals, cuts):
+        """Lower the level of noise to what the best rival reaches."""
+        for cut in cuts:
+            s = cut.subsystem
+            cut.level = min([cut.level] + [cut.chi2(r.found.errors[s], SELECT) for r in rivals])
+        for r in rivals:
+            r.share = self._rival(r.found, r.name).share
+
+    def _is_open(self, cut, current):
+        first = self.first_gap[cut.subsystem]
+        left = gap(cut, current.errors[cut.subsystem])
+        if not current.hypothesis.touches(cut):
+            return first > self.least_gap
+        return left > max(self.seen_gap, DONE * first)
+
+    def _explained(self, current):
+        return {c.subsystem: share(c, self.base.errors[c.subsystem],
+                                   current.errors[c.subsystem])
+                for c in self.problem.cuts if self.first_gap[c.subsystem] > self.least_gap}
+
+    # -- rivals ----------------------------------------------------------------------------
+    def _rivals(self, current, cuts):
+        """Return the fitted hypotheses that add one effect or free one number."""
+        taken = set(current.hypothesis.names)
+        pool = [c for c in self.pool if c.name not in taken]
+        screened = self.screened if current is self.base else screen(
+            self.problem, current, pool)
+        chosen = self._promising(screened, cuts)
+        rivals = self._fit_all(current, chosen)
+        for cut in cuts:
+            for known in cut.known:
+                z = current.known_z[cut.subsystem][cut.known.index(known)]
+                if known.of_rig and abs(z) > 0.5 * BOX and known.name not in taken:
+                    rivals.append(self._rival(self.problem.fit(Hypothesis(
+                        current.hypothesis.effects, (*current.hypothesis.freed, known.name)),
+                        current.theta, current), known.name))
+        best = {c.subsystem: max((r.share[c.subsystem] for r in rivals), default=0.0)
+                for c in cuts}
+        contending = {r.name for r in rivals for s, top in best.items()
+                      if r.share[s] > top - CONTENDS and r.share[s] > 0.0}
+        rivals += self._fit_all(current, [
+            s for s in screened if s.candidate.name in contending and s not in chosen])
+        self.fitted = rivals
+        return self._best_of_name(rivals)
+
+    def _promising(self, screened, cuts):
+        """Return the best formulation of every name that promises something."""
+        chosen = []
+        for cut in cuts:
+            by_name = {}
+            for s in sorted(screened, key=lambda s: -s.promise.get(cut.subsystem, 0.0)):
+                if s.promise.get(cut.subsystem, 0.0) > 0.0:
+                    by_name.setdefault(s.candidate.name, s)
+            ranked = list(by_name.values())
+            top = ranked[0].promise[cut.subsystem] if ranked else 0.0
+            for place, s in enumerate(ranked[:MAX_FITTED]):
+                if place < MIN_FITTED or s.promise[cut.subsystem] > PROMISING * top:
+                    chosen.append(s)
+        return [s for i, s in enumerate(chosen) if s not in chosen[:i]]
+
+    def _fit_all(self, current, screened):
+        """Return the rivals of screened candidates; the simulations hold no lock."""
+        with ThreadPoolExecutor(default_workers()) as pool:
+            return [r for r in pool.map(lambda s: self._fit(current, s), screened)
+                    if r is not None]
+
+    def _fit(self, current, screened):
+        if self.out_of_time():
+            return None
+        hypothesis = Hypothesis((*current.hypothesis.effects, screened.candidate),
+                                current.hypothesis.freed)
+        return self._rival(self.problem.fit(
+            hypothesis, (*current.theta, *screened.start), current), screened.candidate.name)
+
+    def _rival(self, found, name):
+        return Rival(name, found, {
+            c.subsystem: share(c, self.base.errors[c.subsystem], found.errors[c.subsystem])
+            for c in self.problem.cuts})
+
+    def _best_of_name(self, rivals):
+        best = {}
+        for r in rivals:
+            known = best.get(r.name)
+            if known is None or sum(r.share.values()) > sum(known.share.values()):
+                best[r.name] = r
+        return list(best.values())
+
+    # -- choice ----------------------------------------------------------------------------
+    def _admissible(self, rivals, current, cut):
+        """Return the rivals that act in a cut and leave no other cut worse."""
+        found = []
+        for r in rivals:
+            if not self._touches(r, current, cut):
+                continue
+            worse = any(
+                gap(c, r.found.errors[c.subsystem]) - gap(c, current.errors[c.subsystem])
+                > max(self.seen_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
+                for c in self.problem.cuts if c is not cut)
+            if not worse:
+                found.append(r)
+        return found
+
+    @staticmethod
+    def _touches(rival, current, cut):
+        h, known = rival.found.hypothesis, current.hypothesis
+        return Hypothesis(tuple(c for c in h.effects if c not in known.effects),
+                          tuple(f for f in h.freed if f not in known.freed)).touches(cut)
+
+    def _tied(self, rivals, current, cut):
+        """Return the rivals in a cut that the data cannot tell from the best, best first."""
+        s = cut.subsystem
+        ranked = sorted(self._admissible(rivals, current, cut), key=lambda r: -r.share[s])
+        if not ranked:
+            return []
+        for r in ranked:
+            if r.share[s] > ranked[0].share[s] - CLOSE and gap(
+                    cut, r.found.errors[s]) > self.seen_gap:
+                r.found = self.problem.polish(r.found)
+                r.share = self._rival(r.found, r.name).share
+        ranked.sort(key=lambda r: -r.share[s])
+        best = ranked[0].found.errors[s]
+        for r in ranked:
+            r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
+        half = RIVAL * ranked[0].share[s]
+        tied = [r for r in ranked if r is ranked[0]
+                or (r.t[s] < CERTAIN_T and r.share[s] > half)]
+        strain = min(self._strain(r.found) for r in tied)
+        tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
+        names = {r.name for r in tied}
+        as_good = {r.name for r in tied if r.t[s] < BETTER_T}
+        return [r for r in tied
+                if not any((simple, r.name) in LIMITS for simple in as_good)
+                and SAME_AS.get(r.name) not in names]
+
+    def _strain(self, found):
+        """Return the squared pulls of all numbers that should have stayed where they were."""
+        return sum(float(z) ** 2 for cut in self.problem.cuts
+                   for known, z in zip(cut.known, found.known_z[cut.subsystem])
+                   if known.of_rig and known.name not in found.hypothesis.freed)
+
+    def _winner(self, rivals, current, cut):
+        tied = self._tied(rivals, current, cut)
+        s = cut.subsystem
+        if not tied:
+            return None
+        before = share(cut, self.base.errors[s], current.errors[s])
+        gained = tied[0].share[s] - before
+        least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
+        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s])
+        if gained < least or sure < CERTAIN_T:
+            return None
+        return Named(tied[0].name, s, sorted(
+            rivals, key=lambda r: -r.share[s]), tuple(r.name for r in tied),
+            [r for r in self.fitted if r.name == tied[0].name])
+
+    def _joint_winner(self, rivals, current, cuts):
+        """Return a cause that explains several cuts as well as the best in each, or None."""
+        if len(cuts) < 2:
+            return None
+        tied = {c.subsystem: self._tied(rivals, current, c) for c in cuts}
+        for r in tied[cuts[0].subsystem]:
+            everywhere = all(
+                r in tied[s] or (tied[s] and r.share[s] > tied[s][0].share[s] - CLOSE)
+                for s in tied)
+            if everywhere and all(self._touches(r, current, c) for c in cuts) \
+                    and min(r.share[s] for s in tied) > RIVAL:
+                same = [o.name for o in tied[cuts[0].subsystem]
+                        if o in tied[cuts[1].subsystem]]
+                names = tuple(dict.fromkeys([r.name, *same]))
+                return Named(r.name, cuts[0].subsystem, rivals, names,
+                             [o for o in self.fitted if o.name == r.name])
+        return None
+
+    # -- state -----------------------------------------------------------------------------
+    def _take(self, current, taken):
+        """Return the joint fit of what was taken in on top of the present one."""
+        effects, freed = current.hypothesis.effects, current.hypothesis.freed
+        theta, near = list(current.theta), current
+        for w in taken:
+            rival = next(r for r in w.rivals if r.name == w.name)
+            h = rival.found.hypothesis
+            effects += h.effects[len(current.hypothesis.effects):]
+            freed += h.freed[len(current.hypothesis.freed):]
+            theta += list(rival.found.theta[len(current.theta):])
+            near = rival.found if len(taken) == 1 else near
+        if len(taken) == 1:
+            return near
+        return self.problem.fit(Hypothesis(effects, freed), theta, current)
+
+    def _other_formulations(self, current):
+        """Return the fit with each effect in the formulation that suits the others best."""
+        for place in range(len(current.hypothesis.effects)):
+            if not any(self._is_open(c, current) for c in self.problem.cuts):
+                break
+            h = current.hypothesis
+            old = h.effects[place]
+            first = sum(len(c.free) for c in h.effects[:place])
+            tried = [current]
+            for c in self.pool:
+                if c.name != old.name or c == old or len(h.effects) < 2:
+                    continue
+                theta = [*current.theta[:first], *(f.coordinate(f.scale) for f in c.free),
+                         *current.theta[first + len(old.free):]]
+                effects = (*h.effects[:place], c, *h.effects[place + 1:])
+                tried.append(self.problem.fit(Hypothesis(effects, h.freed), theta, current))
+            current = max(tried, key=lambda f: sum(self._explained(f).values()))
+        return current
+
+    def _swapped(self, current, out, put=None):
+        """
+        Return the fit without the effect or number called ``out``.
+
+        ``put`` is a Rival that takes its place: what it adds as the last one.
+        """
+        h, effects, theta, first = current.hypothesis, [], [], 0
+        for c in h.effects:
+            if c.name != out:
+                effects.append(c)
+                theta += list(current.theta[first:first + len(c.free)])
+            first += len(c.free)
+        freed = [f for f in h.freed if f != out]
+        if put is not None:
+            added = put.found.hypothesis
+            if put.name in added.freed:
+                freed.append(put.name)
+            else:
+                effects.append(added.effects[-1])
+                theta += list(put.found.theta[-len(added.effects[-1].free):])
+        return self.problem.fit(Hypothesis(tuple(effects), tuple(freed)), theta, current)
+
+    def _eliminate(self, current, named):
+        """Drop what is not missed when it is left out, once there are several."""
+        for w in list(named):
+            if len(named) < 2:
+                break
+            without = self._swapped(current, w.name)
+            cut = next(c for c in self.problem.cuts if c.subsystem == w.subsystem)
+            s = w.subsystem
+            rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
+            gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
+            sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
+            if gained < LATER_STEP * rest or sure < CERTAIN_T:
+                current, named = without, [o for o in named if o is not w]
+        return current, named
+
+    def _resolve(self, current, named):
+        """Rank again the rivals of each effect now that the others are in the model."""
+        found = []
+        for w in named:
+            cut = next(c for c in self.problem.cuts if c.subsystem == w.subsystem)
+            others = {o.name for o in named if o is not w}
+            beside = [o for o in named if o is not w and o.subsystem == w.subsystem]
+            if not beside:
+                found.append(w)
+                continue
+            # What the effect took in later replaced may have been ranked before it.
+            near = [r for r in w.rivals if r.name != w.name and r.name not in others
+                    and r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS]
+            swapped = [Rival(w.name, current)] + [
+                Rival(r.name, self._swapped(current, w.name, r)) for r in near]
+            for r in swapped:
+                r.share = self._rival(r.found, r.name).share
+            tied = self._tied(swapped, self._swapped(current, w.name), cut)
+            if tied:
+                current = tied[0].found
+                found.append(Named(tied[0].name, w.subsystem, swapped,
+                                   tuple(r.name for r in tied), w.formulations))
+        return current, found

@@ -1,0 +1,203 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The whole workflow: health, cuts, search, numbers, proof, verdict."""
+
+from dataclasses import replace
+import math
+import time
+
+import numpy as np
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.health import check_health
+from pam_sim.gap.locate import locate
+from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.prove import model_of, numbers_of, Proof
+from pam_sim.gap.result import Calibrated, GapResult
+from pam_sim.gap.search import Search
+from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
+from pam_sim.gap.words import explain
+from scipy.stats import norm
+
+SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
+LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
+UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
+FLOOR_ERROR = 1.2            # how far a noise floor may be too low
+PULL = 3.5                   # prior deviations beyond which a number is wrong
+
+
+def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.0, seed=0,
+             progress=lambda done: None):
+    """
+    Find what a model misses in recordings, add it, and prove it.
+
+    Parameters
+    ----------
+    runs : pam_sim.run.Run or list of Run
+        Recordings to search.
+    rig : pam_sim.Rig
+        The given model.
+    certify : Run, optional
+        Recording for the proof; by default every fifth block of the first run.
+    effects : sequence of str, optional
+        Names to try; all by default.
+    seconds : float
+        Time budget of the search.
+    materiality : float
+        An effect is named when it moves some signal of the certify data by more than
+        so many standard deviations of its sensor noise.
+    seed : int
+        Of the draws behind the noise floors.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
+
+    Returns
+    -------
+    GapResult
+        Equal inputs give equal results, ``runtime_s`` aside, as long as the time budget
+        is not used up.
+
+    """
+    started = time.perf_counter()
+    runs = list(runs) if isinstance(runs, (list, tuple)) else [runs]
+    health = [check_health(run, rig.valve) for run in [*runs, *([certify] if certify else [])]]
+    problems = list(dict.fromkeys(p for h in health for p in h.problems))
+    remarks = list(dict.fromkeys(r for h in health for r in h.remarks))
+    if problems:
+        text = '; '.join(problems)
+        return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=remarks,
+                         runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
+    driven = rig.load != 'hanging_mass'
+    recordings = [Recording(run, rig.valve, driven) for run in runs]
+    cuts = cuts_of(rig, recordings, certify is None, seed)
+    problem = Problem(rig, cuts)
+    progress(0.1)
+    deadline = started + seconds
+    outcome = Search(problem, SEEN_GAP, LEAST_GAP * min(materiality, 1.0), effects,
+                     lambda: time.perf_counter() > deadline).run()
+    progress(0.8)
+    problem.use = (FIT, SELECT)
+    final, base = problem.polish(outcome.final), problem.refit_base()
+    proof = Proof(certify or runs[0],
+                  Recording(certify, rig.valve, driven) if certify else recordings[0],
+                  certify is not None, problem, base, final, seed)
+    result = GapResult('unknown', '', remarks=remarks)
+    if not outcome.complete:
+        result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
+    _fill(result, problem, outcome, final, proof)
+    _judge(result, outcome, problem, proof, base, materiality, certify is not None)
+    result.where = locate(rig, proof.recording, proof.before, proof.floor)
+    result.traces = proof.traces()
+    result.reason = explain(result, outcome)
+    result.simulations = problem.simulations + proof.simulations
+    progress(1.0)
+    result.runtime_s = time.perf_counter() - started
+    return result
+
+
+def _fill(result, problem, outcome, final, proof):
+    """Put signals, numbers, effects and the model into a result."""
+    result.signals = proof.signals()
+    covariance = problem.covariance(final)
+    result.calibration = _calibrated(problem, final, covariance)
+    freed = set(final.hypothesis.freed)
+    result.parameters = [c for c in result.calibration if c.name in freed]
+    model = model_of(problem, final)
+    settings = list(model.effects)
+    for w in outcome.named:
+        place = next((i for i, c in enumerate(final.hypothesis.effects) if c.name == w.name), None)
+        if place is None:
+            continue
+        parameters, equivalent = effect_numbers(
+            model, final, place, covariance, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
+        effect = get_effect(w.name)
+        formulation = final.hypothesis.effects[place].effect
+        result.effects.append({
+            'name': w.name, 'family': effect.family, 'subsystem': effect.subsystem,
+            'confidence': _confidence(w, outcome), 'formulation': formulation,
+            'parameters': parameters, 'equivalent': equivalent})
+        settings = [replace(s, source={'ci95': {n: p['ci95'] for n, p in parameters.items()}})
+                    if s.name == formulation else s for s in settings]
+    result.model_yaml = model.with_(effects=settings).to_yaml()
+
+
+def _judge(result, outcome, problem, proof, base, materiality, whole):
+    """Set verdict, ambiguity set and the unexplained fraction of a result."""
+    named = outcome.named
+    moved = proof.moved(base, whole) if named else {}
+    material = max(moved.values(), default=0.0) > materiality
+    result.moved = moved
+    result.noise = proof.noise
+    unsure = next((w for w in named if len(w.names) > 1), None)
+    if unsure is not None:
+        by_name = {r.name: r.found for r in unsure.rivals}
+        result.rivals = [(name, model_of(problem, by_name[name]), by_name[name].hypothesis,
+                          by_name[name].theta) for name in unsure.names]
+    result.evidence = [
+        {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
+         't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
+    wrong = [c for c in result.parameters if abs(c.pull) > PULL]
+    left = max((beyond(s.rmse_refit, FLOOR_ERROR * s.noise_floor) / max(proof.noise[name], 1e-12)
+                for name, s in result.signals.items()), default=0.0)
+    if not outcome.share or (not material and not wrong and (
+            named or left <= UNNAMED * materiality)):
+        result.verdict, result.effects, result.parameters = 'no_gap', [], []
+        return
+    result.unexplained_fraction = proof.unexplained()
+    if not named:
+        result.verdict, result.unexplained_fraction = 'unknown', 1.0
+        return
+    result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
+    if any(len(w.names) > 1 for w in named):
+        result.verdict = 'ambiguous'
+    else:
+        result.verdict = 'effects' if result.effects else 'parameter'
+
+
+def beyond(value, floor):
+    """Return the part of an rms that the noise floor does not explain."""
+    return math.sqrt(max(value ** 2 - floor ** 2, 0.0))
+
+
+def _calibrated(problem, found, covariance):
+    """Return every known number of the rig as Calibrated."""
+    count, freed = len(found.theta), list(found.hypothesis.freed)
+    numbers, _ = numbers_of(problem, found)
+    listed = []
+    for cut in problem.cuts:
+        for known, z in zip(cut.known, found.known_z[cut.subsystem]):
+            if not known.of_rig:
+                continue
+            deviation = 1.0
+            if known.name in freed:
+                place = count + freed.index(known.name)
+                deviation = float(np.sqrt(covariance[place, place]))
+            half = NORMAL_95 * deviation * known.sd
+            value = numbers[known.name]
+            listed.append(Calibrated(known.name, known.unit, known.value, value,
+                                     (value - half, value + half), float(z)))
+    return listed
+
+
+def _confidence(named, outcome):
+    """Return how sure a name is, 0 to 1: against its nearest rival, and by what is left."""
+    s = named.subsystem
+    best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
+    rivals = [r.t[s] for r in named.rivals
+              if r.name not in named.names and s in r.t and r.share.get(s, 0.0) > 0.5 * best]
+    sure = float(norm.cdf(min(rivals, default=6.0) - 1.0))
+    return round(sure / len(named.names) * math.sqrt(max(outcome.share.get(s, 1.0), 0.0)), 3)

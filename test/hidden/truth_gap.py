@@ -1,0 +1,124 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How large a hidden effect is: what it moves, in standard deviations of the sensors, after refit.
+
+The numbers of the rig without the effect are fitted to the noise-free fit run (regularised
+least squares: prior deviations as a data sheet has them, weights tempered by misfit and memory
+of the residual, a shared latency as nuisance); the gap is what is left of the certify run, as
+rms over the run in standard deviations of the sensor, of the signal where it is largest.
+"""
+
+import numpy as np
+import truth_effects as effects
+import truth_run as runs
+import truth_sensors as sensors
+
+PRIOR = 0.02
+SUPPLY_PRIOR = 0.005
+LATENCY_SD_S = 1e-3
+EVERY = 25                    # rows of 0.2 ms: compared at 200 Hz
+ROUNDS = 3
+
+
+def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
+    """
+    Return {signal: gap in sigma} of the certify run.
+
+    Parameters
+    ----------
+    numbers : dict
+        Numbers of the true rig.
+    without : dict
+        The same rig without its effects.
+    chain : Chain
+        Sensors of the true rig; only what effects change in them is used.
+    fit, certify : Truth
+        The runs.
+    valve : {'ppr', 'hsv'}
+        Valve.
+    start : dict, optional
+        Numbers as the data sheet has them, the centre of the prior; nominal by default.
+
+    """
+    names = [effects.PARAMETERS[p][0] for p in effects.PARAMETERS_OF[valve]]
+    nominal = {effects.PARAMETERS[p][0]: effects.PARAMETERS[p][1]
+               for p in effects.PARAMETERS_OF[valve]} | dict(start or {})
+    if valve == 'hsv':
+        names.append('supply')
+        nominal.setdefault('supply', effects.PARAMETERS['supply_pa'][1])
+    sd = np.array([nominal[n] * (SUPPLY_PRIOR if n == 'supply' else PRIOR) for n in names])
+    signals = ['pressure', 'contraction'] + (['force'] if chain.with_force else [])
+    target = _scaled(fit.rows, chain, signals)
+    neutral = sensors.Chain(noise=chain.noise)
+
+    def model(theta, run):
+        changed = without | {
+            n: nominal[n] + s * z for n, s, z in zip(names, sd, theta)}
+        return _scaled(runs.replay(changed, valve, run), neutral, signals)
+
+    # The prior is about the data sheet; the fit starts at the true numbers.
+    theta = np.array([(without.get(n, nominal[n]) - nominal[n]) / s
+                      for n, s in zip(names, sd)])
+    base = model(theta, fit)
+    slopes = {s: np.empty((base[s].size, len(names) + 1)) for s in signals}
+    for k in range(len(names)):
+        moved = theta.copy()
+        moved[k] += 0.3
+        for s, values in model(moved, fit).items():
+            slopes[s][:, k] = (values - base[s]) / 0.3
+    for s in signals:
+        slopes[s][:, -1] = -np.gradient(base[s], EVERY * sensors.ROW_S) * LATENCY_SD_S
+    step = np.zeros(len(names) + 1)
+    prior = np.concatenate([theta, [0.0]])
+    for _ in range(ROUNDS):
+        matrix, right = np.eye(len(names) + 1), -prior
+        for s in signals:
+            left = target[s] - base[s]
+            weight = 1.0 / tempering(left - slopes[s] @ step)
+            matrix = matrix + weight * slopes[s].T @ slopes[s]
+            right = right + weight * slopes[s].T @ left
+        step = np.linalg.solve(matrix, right)
+    end = model(theta + step[:-1], certify)
+    truth = _scaled(certify.rows, chain, signals)
+    delay = step[-1] * LATENCY_SD_S
+    found = {}
+    for s in signals:
+        shifted = end[s] - np.gradient(end[s], EVERY * sensors.ROW_S) * delay
+        found[s] = float(np.sqrt(np.mean((truth[s] - shifted) ** 2)))
+    return found
+
+
+def tempering(residual):
+    """Return by what the weight of a residual [sigma] with unit noise is divided."""
+    square = float(np.mean(residual**2))
+    centred = residual - residual.mean()
+    size = 2 * centred.size
+    power = np.abs(np.fft.rfft(centred, size)) ** 2
+    memory = np.fft.irfft(power, size)[:centred.size]
+    if memory[0] <= 1e-12 * centred.size:
+        return 1.0
+    memory = memory / memory[0]
+    negative = np.flatnonzero(memory < 0.0)
+    long = 1.0 + 2.0 * memory[1:negative[0] if negative.size else None].sum()
+    share = square / (1.0 + square)
+    return (1.0 + square) * (1.0 + share * (long - 1.0))
+
+
+def _scaled(rows, chain, signals):
+    """Return {signal: noise-free readings in sigma at 200 Hz}; the shared filter is left out."""
+    plain = sensors.Chain(effects=chain.effects)
+    clean = sensors.readings(rows, plain)
+    return {s: clean[s][::EVERY] / (sensors.SIGMA[s] * chain.noise) for s in signals}
