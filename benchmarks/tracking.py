@@ -28,8 +28,7 @@ rigs    random rigs a data sheet does not tell of, +-6 mm about 12 mm, all start
         rules taught on the nominal rig, beside the same rules frozen
 change  1 kg more and 15 % less supply in the middle of a run at 0.5 Hz, rules taught
 
-The driver of the on/off valves is told of the latency of the loop and takes less of the
-error per period than by default (DRIVER below), since some rigs have a longer dead time.
+The valve driver is told of the nominal rig throughout.
 """
 
 import argparse
@@ -52,8 +51,6 @@ SEED = 3
 TEACHING = ((0.1, 3), (1.0, 30), (0.25, 8), (0.5, 20))      # frequency and cycles, in order
 SETTLED_M = 1e-4
 STEPS, STEP_HOLD_S = 6, 5.0
-DRIVER = {'ppr': {}, 'hsv': {
-    'hsv.dead_time_s': 0.036, 'hsv.gain': 0.2, 'hsv.correct': 0.3, 'hsv.correct_rate': 0.08}}
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ segments:
 
 def closed_loop(rig, experiment, seed=SEED, **more):
     """Return the closed loop with the driver of the nominal rig."""
-    driver = driver_config(load_rig(RIG, valve=rig.valve), DRIVER[rig.valve])
+    driver = driver_config(load_rig(RIG, valve=rig.valve))
     return ClosedLoop(rig, experiment, seed=seed, driver=driver, **more)
 
 

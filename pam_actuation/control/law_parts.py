@@ -21,6 +21,7 @@ from pam_sim.units import P_ATM_PA
 
 _STALE_S = 0.1            # a longer gap between measurements restarts the rate filter
 _OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
+_CHANGE_FLOOR_M_PER_S = 1e-12                    # the same
 
 
 @compiled
@@ -53,8 +54,8 @@ def filtered_change(change, filter_s, reference_rate, moved_m, elapsed_s, period
         return 0.0
     if elapsed_s > 0.0 and known:
         raw = reference_rate - moved_m / elapsed_s
-        return change + elapsed_s / (filter_s + elapsed_s) * (raw - change)
-    return change
+        change += elapsed_s / (filter_s + elapsed_s) * (raw - change)
+    return change if abs(change) > _CHANGE_FLOOR_M_PER_S else 0.0
 
 
 @compiled

@@ -26,6 +26,9 @@ from pam_actuation.drivers.config import DriverConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 _UNKNOWN_SWING_HZ = 5.9
+# The way of a reading to the signal; and taken too long it calms the loop, too short it swings.
+_DEAD_TIME_MARGIN_S = 0.006
+_GAIN, _GAIN_AT_ONCE = 0.6, 0.7
 _GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
 
 
@@ -49,6 +52,7 @@ def driver_config(rig, changes=(), where='parameter'):
 
     """
     values = rig.parameters
+    dead_time_s = _effect(rig, 'valve_dead_time', 'delay_s')
     told = {
         'ppr.gain_pa_per_v': values['K_m'],
         'ppr.time_constant_s': values['T_m'],
@@ -56,12 +60,12 @@ def driver_config(rig, changes=(), where='parameter'):
         'hsv.conductance_m3_per_s_pa': values['C'],
         'hsv.critical_ratio': values['b'],
         'hsv.supply_pa': values['supply_pa'],
-        'hsv.dead_time_s': _effect(rig, 'valve_dead_time', 'delay_s'),
+        'hsv.dead_time_s': dead_time_s + (_DEAD_TIME_MARGIN_S if dead_time_s > 0.0 else 0.0),
         'hsv.open_time_s': _effect(rig, 'valve_dead_zone', 'open_time_s'),
         'hsv.close_time_s': _effect(rig, 'valve_dead_zone', 'close_time_s'),
     }
     # Without a dead time to wait for, the loop can remove more of the error per period.
-    told['hsv.gain'] = 0.35 + 0.35 * max(0.0, 1.0 - told['hsv.dead_time_s'] / 0.02)
+    told['hsv.gain'] = _GAIN + (_GAIN_AT_ONCE - _GAIN) * max(0.0, 1.0 - dead_time_s / 0.02)
     told.update(_load(rig))
     config = DriverConfig.from_parameters(told, where=f'rig {rig.name}')
     return DriverConfig.from_parameters(changes, config, where)

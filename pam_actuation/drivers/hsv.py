@@ -61,13 +61,13 @@ class HsvConfig:
     open_time_s: float = 0.0017
     close_time_s: float = 0.0020
     pulse_margin_s: float = 0.0001
-    gain: float = 0.35
+    gain: float = 0.6
     band_pa: float = 1_000.0
     rest_share: float = 0.6
     look_ahead_periods: float = 3.0
-    correct: float = 0.5
+    correct: float = 0.2
     correct_volume: float = 0.0
-    correct_rate: float = 0.15
+    correct_rate: float = 0.05
     learn_drift: float = 0.01
     learn_gain: float = 0.03
     flow_scale_pa: float = 4_000.0

@@ -139,7 +139,8 @@ class SelfOrganizingFuzzyController(CompiledController):
             kept[...] = values
         change = before_pa - self._rule_output_pa()
         limit = self.settings['integral_limit_pa']
-        integral = self._state[layout.S_INTEGRAL] + change
+        shape = self._state[layout.S_INTEGRAL_SHAPE] or 1.0          # 0 before the first tick
+        integral = self._state[layout.S_INTEGRAL] + change / shape
         self._state[layout.S_INTEGRAL] = min(max(integral, -limit), limit)
 
     def _rule_output_pa(self):

@@ -34,6 +34,8 @@ from pam_sim.compiled import compiled
 
 _SLOPE_BASE_M = 5e-4      # the slope of the static inverse is taken over twice this
 _LEAST_SLOPE = 0.2        # of the mean slope of the table
+_ACCELERATION_FLOOR_M_PER_S2 = 1e-9       # then it is gone, before it becomes denormal
+_LEAST_SHAPE = 0.5        # of the integral, its inverse the largest
 
 
 @compiled
@@ -91,6 +93,19 @@ def slope_pa_per_m(table, contraction_m):
 
 
 @compiled
+def load_shape(par, contraction_m):
+    """
+    Return which part of the integral counts at a contraction, 1 in the middle of the range.
+
+    The more a muscle has contracted the less force a pascal makes: what a load beyond the
+    nominal one takes is no constant pressure but grows with contraction.
+    """
+    middle = 0.5 * (par[at.P_REFERENCE_LOWER] + par[at.P_REFERENCE_UPPER])
+    shape = 1.0 + par[at.P_INTEGRAL_GROWTH] * (contraction_m - middle)
+    return min(max(shape, _LEAST_SHAPE), 1.0 / _LEAST_SHAPE)
+
+
+@compiled
 def dynamic_pressure_pa(par, st, static_pa, rate_m_per_s, rate_jumped):
     """
     Return what moving takes beyond the static pressure [Pa]; advances the filters.
@@ -105,6 +120,8 @@ def dynamic_pressure_pa(par, st, static_pa, rate_m_per_s, rate_jumped):
     st[at.S_LEAD_RATE] = rate_m_per_s
     part = period / (par[at.P_ACCELERATION_FILTER] + period)
     st[at.S_ACCELERATION] += part * (raw - st[at.S_ACCELERATION])
+    if abs(st[at.S_ACCELERATION]) < _ACCELERATION_FLOOR_M_PER_S2:
+        st[at.S_ACCELERATION] = 0.0
     moving = (par[at.P_RATE_FEEDFORWARD] * rate_m_per_s
               + par[at.P_ACCELERATION_FEEDFORWARD] * st[at.S_ACCELERATION])
     quasi_static = static_pa + moving

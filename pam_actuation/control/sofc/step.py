@@ -61,7 +61,7 @@ def _start(par, inverse, values, kept, st, inp):
         pressure, P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE],
         P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE])
     if math.isfinite(pressure) and x > _LIFTED_M:
-        trim = pressure - inverse_pressure_pa(inverse, x)
+        trim = (pressure - inverse_pressure_pa(inverse, x)) / dynamics.load_shape(par, x)
         st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
         st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
 
@@ -87,6 +87,12 @@ def _valve_lags(par, ring, st, inp):
 
 
 @compiled
+def _surprising(par, st, error):
+    """Tell whether an error is out of proportion to those of the last window."""
+    return abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0
+
+
+@compiled
 def _reason(par, ring, st, inp, error, at_limit, lags):
     """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
     tick = int(st[at.S_TICK])
@@ -108,7 +114,7 @@ def _reason(par, ring, st, inp, error, at_limit, lags):
     then = credit.row_of(ring, tick, delay)
     if at_limit or ring[then, credit.ENTRY_VALID] < 0.5:
         return learning.FROZEN_SATURATED
-    if st[at.S_FORMER] > 0.0 and abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0:
+    if _surprising(par, st, error):
         return learning.FROZEN_SURPRISE
     if abs(error) <= par[at.P_DEAD_ZONE]:
         return learning.FROZEN_DEAD_ZONE
@@ -249,8 +255,10 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     proportional = par[at.P_PROPORTIONAL] * error
     derivative = par[at.P_DERIVATIVE] * change
     integral = st[at.S_INTEGRAL]
+    st[at.S_INTEGRAL_SHAPE] = dynamics.load_shape(par, lead)
+    trim = integral * st[at.S_INTEGRAL_SHAPE]
     wanted = (base + dynamic + feedback + feedforward + motion
-              + proportional + integral + derivative)
+              + proportional + trim + derivative)
 
     # The limits of the actuator, then of its speed.
     lowest = P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]
@@ -263,11 +271,16 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     at_limit = at_low or at_high or at_slew
     st[at.S_OUTPUT] = command
 
-    # Integral with back-calculation against those limits.
-    growth = (par[at.P_INTEGRAL] * error
-              + (command - wanted) / par[at.P_ANTI_WINDUP_TIME]) * period
-    if lags:
-        growth = 0.0      # supply, valve or driver hold the pressure back: more would not help
+    # Integral with back-calculation against the limits of pressure.
+    integral_gain = par[at.P_INTEGRAL]
+    if _surprising(par, st, error):
+        integral_gain *= par[at.P_SURPRISE_INTEGRAL]
+    growth = (integral_gain * error
+              + (inside - wanted) / par[at.P_ANTI_WINDUP_TIME]) * period
+    # Supply, valve or driver hold the pressure back, or the command is on its way: more would
+    # not help, and the way from one pressure to another is no error of the pressure at its end.
+    if lags or at_slew:
+        growth = 0.0
     st[at.S_INTEGRAL] = min(
         max(integral + growth, -par[at.P_INTEGRAL_LIMIT]), par[at.P_INTEGRAL_LIMIT])
 
@@ -305,7 +318,7 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     out[at.O_FEEDFORWARD] = feedforward
     out[at.O_MOTION] = motion
     out[at.O_PROPORTIONAL] = proportional
-    out[at.O_INTEGRAL] = integral
+    out[at.O_INTEGRAL] = trim
     out[at.O_DERIVATIVE] = derivative
     out[at.O_UNLIMITED] = wanted
     out[at.O_SAT_LOW] = 1.0 if at_low else 0.0
@@ -358,7 +371,7 @@ def _guard(par, values, kept, st, inp, error, reason, out):
         before = out[at.O_FEEDBACK] + out[at.O_FEEDFORWARD] + out[at.O_MOTION]
         limit = par[at.P_INTEGRAL_LIMIT]
         st[at.S_INTEGRAL] = min(
-            max(st[at.S_INTEGRAL] + before - restored, -limit), limit)
+            max(st[at.S_INTEGRAL] + (before - restored) / st[at.S_INTEGRAL_SHAPE], -limit), limit)
         st[at.S_HISTORY] = 1.0        # no credit for rules that are gone
     out[at.O_WINDOW] = st[at.S_FORMER]
     out[at.O_BEST] = st[at.S_BEST]
