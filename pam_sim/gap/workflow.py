@@ -28,6 +28,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import model_of, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
+from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
 from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
 from pam_sim.gap.words import explain
@@ -102,6 +103,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     _judge(result, outcome, problem, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
+    result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome)
     result.simulations = problem.simulations + proof.simulations
     progress(1.0)
