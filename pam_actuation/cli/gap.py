@@ -18,7 +18,7 @@ from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
-SECONDS = 60.0
+SECONDS = 120.0
 MODEL = 'dmsp_5_300_hanging_mass'
 
 

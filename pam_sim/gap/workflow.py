@@ -41,7 +41,7 @@ FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
-def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.0, seed=0,
+def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
              progress=lambda done: None):
     """
     Find what a model misses in recordings, add it, and prove it.
