@@ -113,11 +113,15 @@ class Search:
         Names to try; all by default.
     out_of_time : callable
         Returns whether the search should come to an end.
+    matters : callable, optional
+        ``matters(with, without)``: whether two fits differ by enough for a name, in a free
+        run; asked of every effect once there are several.
 
     """
 
-    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False):
-        self.problem, self.out_of_time = problem, out_of_time
+    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False,
+                 matters=lambda found, without: True):
+        self.problem, self.out_of_time, self.matters = problem, out_of_time, matters
         self.seen_gap, self.least_gap = seen_gap, least_gap
         outputs = sum((cut.signals for cut in problem.cuts), ())
         self.only, self.pool = only, candidates(problem.rig, outputs, only)
@@ -414,7 +418,8 @@ class Search:
             rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
             gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
             sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
-            if gained < LATER_STEP * rest or sure < CERTAIN_T:
+            if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
+                    current, without):
                 current, named = without, [o for o in named if o is not w]
         return current, named
 
