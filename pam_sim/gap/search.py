@@ -86,6 +86,8 @@ class Outcome:
         Share of the gap that is explained, by subsystem with a gap.
     complete : bool
         False if the time ran out.
+    screened : list of Screened
+        All candidates at the baseline.
 
     """
 
@@ -94,6 +96,7 @@ class Outcome:
     named: list
     share: dict
     complete: bool = True
+    screened: list = field(default_factory=list)
 
 
 class Search:
@@ -110,11 +113,15 @@ class Search:
         Names to try; all by default.
     out_of_time : callable
         Returns whether the search should come to an end.
+    matters : callable, optional
+        ``matters(with, without)``: whether two fits differ by enough for a name, in a free
+        run; asked of every effect once there are several.
 
     """
 
-    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False):
-        self.problem, self.out_of_time = problem, out_of_time
+    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False,
+                 matters=lambda found, without: True):
+        self.problem, self.out_of_time, self.matters = problem, out_of_time, matters
         self.seen_gap, self.least_gap = seen_gap, least_gap
         outputs = sum((cut.signals for cut in problem.cuts), ())
         self.only, self.pool = only, candidates(problem.rig, outputs, only)
@@ -153,7 +160,8 @@ class Search:
             if explained.get(w.subsystem, 0.0) < NAMED:
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
-        return Outcome(self.base, current, named, explained, not self.out_of_time())
+        return Outcome(self.base, current, named, explained, not self.out_of_time(),
+                       self.screened)
 
     def _first_gap(self, cut):
         """
@@ -410,7 +418,8 @@ class Search:
             rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
             gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
             sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
-            if gained < LATER_STEP * rest or sure < CERTAIN_T:
+            if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
+                    current, without):
                 current, named = without, [o for o in named if o is not w]
         return current, named
 
