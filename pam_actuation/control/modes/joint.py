@@ -213,6 +213,17 @@ class JointController(WrappedLaw):
         self._error_rad = ref_rad - angle_rad
         return tuple(self._commands.tolist())
 
+    def want_co_contraction(self, gauge_pa):
+        """
+        Ask for another mean pressure [Pa gauge]; it is approached at a limited rate.
+
+        Kept within the pressure limits. The static inverse stays the one of the co-contraction
+        the controller was made for: what that misses is left to rules and integral.
+        """
+        par = self._par
+        self._par[P_CO_CONTRACTION] = min(
+            max(P_ATM_PA + gauge_pa, par[P_LOWEST]), par[P_HIGHEST])
+
     def compiled_arguments(self):
         """Return (par, state) of this module's functions and the arguments of the law."""
         return (self._par, self._st), self.law.compiled_arguments()
