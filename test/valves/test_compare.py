@@ -88,7 +88,7 @@ def test_air_through_the_valves_is_the_mass_balance(name):
     through = record.filled_kg - record.vented_kg
     assert np.max(np.abs(through - through[0] - stored)) < 1e-6 * np.ptp(record.air_mass_kg)
     used = supplied_kg(record, chosen.rig)
-    assert used[-1] >= stored.max() and np.all(np.diff(used) >= 0.0)
+    assert used[-1] >= stored.max() * (1.0 - 1e-9) and np.all(np.diff(used) >= 0.0)
 
 
 @pytest.mark.parametrize('name', ['hsv averaged', 'hsv switching'])
