@@ -20,16 +20,16 @@ from pam_actuation.control.tick import REASONS
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import OK, WARN
+from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.units import P_ATM_PA
-from std_srvs.srv import SetBool
 
 INPUTS = ('joint_trajectory', 'joint_reference', 'co_contraction', 'joint_state')
 
 
-class JointNode(ManagedNode):
+class JointNode(LearningSwitch, ManagedNode):
     """
     Track the angle of a joint with both its muscles; on every way out ask both to be vented.
 
@@ -72,7 +72,7 @@ class JointNode(ManagedNode):
             for topic, handler in (('pressure', self.loop.on_pressure),
                                    ('force', self.loop.on_force))
             for k, side in enumerate(SIDES)]
-        self._freeze_service = self.create_service(SetBool, '~/freeze_learning', self._freeze)
+        self._freeze_service = self.create_freeze_service()
 
     def teardown(self):
         """Take the service back."""
@@ -110,13 +110,6 @@ class JointNode(ManagedNode):
         """Add whether the rules change."""
         learning = (('learning', self.learning),) if self.loop else ()
         return (*super().diagnostic_values(), *learning)
-
-    def _freeze(self, request, response):
-        with self.loops.lock:
-            self.learning = not request.data
-        response.success = True
-        response.message = 'learning is on' if self.learning else 'learning is frozen'
-        return response
 
 
 def main(args=None):

@@ -18,13 +18,12 @@ import sys
 
 from pam_actuation.joint_plant_loop import SIDES
 from pam_actuation.nodes.conversions import from_ros
-from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
-from pam_actuation.nodes.plant_simulator import MAX_SEED
+from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 
 
-class JointSimulator(ManagedNode):
+class JointSimulator(PhysicsNode):
     """
     Simulate two muscles, their valves and the limb they turn, in real time with 1 ms steps.
 
@@ -40,8 +39,6 @@ class JointSimulator(ManagedNode):
         NodeParameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
     )
-
-    plant = None
 
     def setup(self):
         """Load the joint, create the sensors' publishers."""
@@ -61,34 +58,13 @@ class JointSimulator(ManagedNode):
                 self.add_publisher(f'{side}/{topic}')
             self.signals[side] = self.add_subscription(f'{side}/valve_signal')
 
-    def start(self):
-        """Begin with the clock at the present."""
-        self.plant.advance_to(self.now_ns())
-        self._sampled_steps = None
-        self.add_loop(1.0 / self.value('publish_rate_hz'))
-
-    def diagnostic_values(self):
-        """Add how the physics keeps up with the clock."""
-        values = super().diagnostic_values()
-        if self.plant is None:
-            return values
-        return (*values, ('physics.steps', self.plant.steps),
-                ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
-
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
         now_ns = self.now_ns()
         arrived = [
-            (from_ros('valve_signal', message), self.plant.signals[side])
+            (from_ros('valve_signal', message), self.plant.signals[side].take)
             for side in SIDES for message, _ in self.signals[side].take()]
-        for plain, held in sorted(arrived, key=lambda item: item[0].stamp_ns):
-            self.plant.advance_to(min(plain.stamp_ns, now_ns))
-            held.take(plain)
-        self.plant.advance_to(now_ns)
-        if self.plant.steps == self._sampled_steps:
-            return              # right after a late tick: there is nothing new to measure
-        self._sampled_steps = self.plant.steps
-        for topic, plain in self.plant.sample(now_ns).items():
+        for topic, plain in self.measured(now_ns, arrived).items():
             self.send(topic, plain)
 
 

@@ -19,8 +19,8 @@ import sys
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.endpoints import full_name
-from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
 from pam_actuation.nodes.simulated_time import PlantTime
@@ -28,10 +28,8 @@ from pam_sim.errors import InputError
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
-MAX_SEED = 2**31 - 1
 
-
-class PlantSimulator(ManagedNode):
+class PlantSimulator(PhysicsNode):
     """
     Simulate valve, muscle, load and sensors in real time with 1 ms steps.
 
@@ -52,7 +50,6 @@ class PlantSimulator(ManagedNode):
             'only: as fast as the nodes answer.', 0.0, 1000.0),
     )
 
-    plant = None
     _clock_services = ()
 
     def check(self):
@@ -114,20 +111,10 @@ class PlantSimulator(ManagedNode):
             response.message = f'one step of {1e3 / self.value("publish_rate_hz"):g} ms'
         return response
 
-    def start(self):
-        """Begin with the clock at the present."""
-        self.plant.advance_to(self.now_ns())
-        self._sampled_steps = None
-        self.add_loop(1.0 / self.value('publish_rate_hz'))
-
     def diagnostic_values(self):
-        """Add how the physics keeps up with the clock."""
+        """Add the clock it makes."""
         values = super().diagnostic_values()
-        if self.plant is None:
-            return values
-        values = (*values, ('physics.steps', self.plant.steps),
-                  ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
-        if self.simulated_time is None:
+        if self.plant is None or self.simulated_time is None:
             return values
         return (*values, ('clock.rate', f'{self.simulated_time.achieved_rate:.3f}'),
                 ('clock.paused', self.simulated_time.paused),
@@ -140,14 +127,9 @@ class PlantSimulator(ManagedNode):
                    for message, _ in self.disturbances.take()]
         arrived += [(from_ros('valve_signal', message), self.plant.set_signal)
                     for message, _ in self.signals.take()]
-        for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
-            self.plant.advance_to(min(plain.stamp_ns, now_ns))
-            apply(plain)
-        self.plant.advance_to(now_ns)
-        if self.plant.steps == self._sampled_steps:
-            return              # right after a late tick: there is nothing new to measure
-        self._sampled_steps = self.plant.steps
-        messages = self.plant.sample(now_ns)
+        messages = self.measured(now_ns, arrived)
+        if not messages:
+            return
         if self.participants:
             self.simulated_time.publish()       # first: the others wake up and await the rest
         for topic, plain in messages.items():

@@ -18,14 +18,14 @@ import os
 import sys
 
 from pam_actuation.nodes.controller_node import ControllerNode
+from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
-from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
 
-class SofcNode(ControllerNode):
+class SofcNode(LearningSwitch, ControllerNode):
     """Control with rules that change while running, unless learning is frozen."""
 
     NAME = 'sofc_controller'
@@ -45,7 +45,7 @@ class SofcNode(ControllerNode):
         if self.value('rules_file') and os.path.exists(self._path()):
             self._load()
         self._rule_services = [
-            self.create_service(SetBool, '~/freeze_learning', self._freeze),
+            self.create_freeze_service(),
             self.create_service(Trigger, '~/save_rules', self._answered(self._save)),
             self.create_service(Trigger, '~/load_rules', self._answered(self._load)),
             self.create_service(Trigger, '~/reset_rules', self._answered(self._reset)),
@@ -59,13 +59,6 @@ class SofcNode(ControllerNode):
     def diagnostic_values(self):
         """Add whether the rules change."""
         return (*super().diagnostic_values(), ('learning', self.learning))
-
-    def _freeze(self, request, response):
-        with self.loops.lock:
-            self.learning = not request.data
-        response.success = True
-        response.message = 'learning is on' if self.learning else 'learning is frozen'
-        return response
 
     def _answered(self, action):
         """

@@ -1,0 +1,69 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the nodes of simulated physics share: they follow the clock and measure what is new."""
+
+from pam_actuation.nodes.managed import ManagedNode
+
+MAX_SEED = 2**31 - 1
+
+
+class PhysicsNode(ManagedNode):
+    """
+    Run ``plant``, a ``PlantClock``, up to the present at every tick.
+
+    What arrives acts from its own stamp on if physics has not passed it yet, else at once.
+    Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
+    """
+
+    plant = None
+
+    def start(self):
+        """Begin with the clock at the present."""
+        self.plant.advance_to(self.now_ns())
+        self._sampled_steps = None
+        self.add_loop(1.0 / self.value('publish_rate_hz'))
+
+    def measured(self, now_ns, arrived):
+        """
+        Apply what arrived, run physics to a time, measure.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of the tick.
+        arrived : list of (plain message, callable that takes it)
+
+        Returns
+        -------
+        dict
+            Messages by topic; empty right after a late tick, when there is nothing new.
+
+        """
+        for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
+            self.plant.advance_to(min(plain.stamp_ns, now_ns))
+            apply(plain)
+        self.plant.advance_to(now_ns)
+        if self.plant.steps == self._sampled_steps:
+            return {}
+        self._sampled_steps = self.plant.steps
+        return self.plant.sample(now_ns)
+
+    def diagnostic_values(self):
+        """Add how the physics keeps up with the clock."""
+        values = super().diagnostic_values()
+        if self.plant is None:
+            return values
+        return (*values, ('physics.steps', self.plant.steps),
+                ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
