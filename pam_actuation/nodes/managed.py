@@ -376,6 +376,9 @@ class ManagedNode(LifecycleNode):
             self._end_work('deactivated')
 
     def _cleanup(self):
+        if self.simulated_time is not None:
+            self.simulated_time.close()
+            self.simulated_time, self.loops.time = None, SteadyTime()
         self.teardown()
         for publisher in self.publishers_counted:
             publisher.destroy()

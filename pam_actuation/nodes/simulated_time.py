@@ -86,6 +86,8 @@ class FollowedTime:
             self._subscription.destroy()
             self._subscription = None
 
+    close = end
+
     def now_ns(self):
         """Return the simulated time [ns], 0 before the first clock message."""
         return self._now_ns
@@ -165,6 +167,10 @@ class PlantTime:
 
     def end(self):
         """Do nothing: the time stands still without loops."""
+
+    def close(self):
+        """Take the clock back."""
+        self._publisher.destroy()
 
     @property
     def waits_for(self):

@@ -24,7 +24,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
+from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
+from lifecycle_msgs.srv import ChangeState                                  # noqa: E402
+from live_rig import LiveRig, wait_for                                      # noqa: E402
 from pam_actuation.nodes.lockstep import EachTick, OneTickOld               # noqa: E402
 from pam_actuation.nodes.lockstep import participants_of, Stamped           # noqa: E402
 from pam_actuation.nodes.lockstep import TickInputs                         # noqa: E402
@@ -210,3 +212,15 @@ def test_a_driver_on_simulated_time_vents_on_its_way_out(rig):
     driver.send_signal(signal.SIGTERM)
     assert driver.wait(5.0) and driver.exit_code == 0
     wait_for(lambda: last_signal(rig) == 0.0, 2.0, 'the safe signal')
+
+
+@pytest.mark.ros
+def test_the_plant_makes_the_time_anew_after_a_cleanup(rig):
+    for transition in (
+            Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert rig.call(ChangeState, 'plant_simulator/change_state', request, 20.0).success
+    begin = len(rig.heard['force'])
+    wait_for(lambda: len(rig.heard['force']) > begin + 20, 10.0, 'the time')
+    assert rig.heard['force'][-1].plain.stamp_ns < rig.heard['force'][begin - 1].plain.stamp_ns
