@@ -43,7 +43,8 @@ class PhysicsNode(ManagedNode):
         ----------
         now_ns : int
             Time of the tick.
-        arrived : list of (plain message, callable that takes it)
+        arrived : list of tuple
+            Plain messages, each with the callable that takes it.
 
         Returns
         -------
