@@ -30,7 +30,7 @@ from pam_sim.gap.prove import free_run_of, model_of, moved, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
-from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
+from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95, NUMERICS
 from pam_sim.gap.words import explain
 from scipy.stats import norm
 
@@ -192,8 +192,8 @@ def _calibrated(problem, found, covariance):
             if known.name in freed:
                 place = count + freed.index(known.name)
                 deviation = float(np.sqrt(covariance[place, place]))
-            half = NORMAL_95 * deviation * known.sd
             value = numbers[known.name]
+            half = math.hypot(NORMAL_95 * deviation * known.sd, NUMERICS * value)
             listed.append(Calibrated(known.name, known.unit, known.value, value,
                                      (value - half, value + half), float(z)))
     return listed
