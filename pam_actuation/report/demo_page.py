@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page of the demo: several experiments, tuning and the first gap look together."""
+"""The page of the demo: several experiments, tuning and the gap together."""
 
 from dataclasses import dataclass, field
 
@@ -78,7 +78,7 @@ def demo_report(out_path, parts, tuning=None, gap=None, checks=None, notes=()):
     tuning : object or dict, optional
         See ``tuning_section``.
     gap : pam_sim.gap.GapResult, optional
-        First gap look.
+        Gap between model and recording.
     checks : list of (bag, check, outcome), optional
         What independent readers said about the bags.
     notes : iterable of str
