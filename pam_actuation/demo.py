@@ -136,7 +136,7 @@ class Demo:
             (6, 'checking the bags', self._check),
             (2, 'replaying the controller', self._replay),
             (8, 'tuning offline', self._tune),
-            (6, 'gap between model and recording', self._look_at_gap),
+            (25, 'gap between model and recording', self._look_at_gap),
             (3, 'writing the page', self._write_page),
         ]
 

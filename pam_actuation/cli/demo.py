@@ -20,7 +20,7 @@ import time
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
 
 HELP = ('Run the real nodes as separate processes on DDS for both valves: record, replay, tune, '
-        'gap between model and recording, one HTML page. Takes under three minutes.')
+        'gap between model and recording, one HTML page. Takes about three minutes.')
 EXAMPLE = 'pam demo --out runs/demo'
 
 
