@@ -192,6 +192,7 @@ def test_a_key_opens_only_after_all_answers(tmp_path):
     with pytest.raises(truth_key.SealBroken, match='no answer'):
         truth_key.open_keys(tmp_path, {'a': {}})
     assert truth_key.open_keys(tmp_path, {'a': {}, 'b': {}})['a'] == {'effects': ['creep']}
+    assert list(truth_key.open_keys(tmp_path, {'b': {}}, ['b'])) == ['b']
     text = (tmp_path / 'keys.json').read_text(encoding='utf-8')
     (tmp_path / 'keys.json').write_text(text.replace('creep', 'leakage'), encoding='utf-8')
     with pytest.raises(truth_key.SealBroken, match='not the one'):
