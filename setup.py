@@ -123,6 +123,8 @@ setup(
             'plant_simulator = pam_actuation.nodes.plant_simulator:main',
             'sofc_controller = pam_actuation.nodes.sofc_controller:main',
             'pid_controller = pam_actuation.nodes.pid_controller:main',
+            'joint_simulator = pam_actuation.nodes.joint_simulator:main',
+            'joint_controller = pam_actuation.nodes.joint_controller:main',
             'reference_generator = pam_actuation.nodes.reference_generator:main',
             'experiment_recorder = pam_actuation.nodes.experiment_recorder:main',
             'pam = pam_actuation.cli.main:main',

@@ -41,6 +41,7 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.random_rigs import random_rigs
 from pam_sim import load_rig
 from pam_sim.units import GRAVITY_M_PER_S2
 
@@ -198,28 +199,6 @@ def show_gait(valve, controllers):
               flush=True)
 
 
-def random_rig(valve, random):
-    """Return the realistic rig with what a data sheet does not tell drawn anew."""
-    rig = load_rig(RIG, valve=valve)
-    nominal = rig.parameters
-    friction, speed = 2.0 ** random.uniform(-1.0, 1.0), random.uniform(0.7, 1.3)
-    changed = {
-        'T_m': nominal['T_m'] / speed, 'C': nominal['C'] * speed,
-        'supply_pa': nominal['supply_pa'] * random.uniform(0.9, 1.0),
-        'mass_kg': random.uniform(4.0, 5.5), 'force_map_gain': random.uniform(0.85, 1.15)}
-    delay_s = random.uniform(0.020, 0.045)
-    effects = []
-    for setting in rig.effects:
-        parameters = dict(setting.parameters)
-        if setting.name == 'hysteresis':
-            parameters['force_n'] *= friction
-            parameters['force_per_pa'] *= friction
-        elif setting.name == 'valve_dead_time':
-            parameters['delay_s'] = delay_s
-        effects.append({'name': setting.name, 'parameters': parameters})
-    return rig.with_(parameters=changed, effects=effects)
-
-
 def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
     """Print how the same taught rules fare on rigs they were not taught on."""
     nominal = load_rig(RIG, valve=valve)
@@ -234,9 +213,7 @@ def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
             continue
         teacher = taught(one.build(nominal), nominal, 0.012, 0.006)
         figures = []
-        random = np.random.default_rng(SEED)
-        for k in range(count + 1):
-            rig = nominal if k == 0 else random_rig(valve, random)
+        for k, rig in enumerate((nominal, *random_rigs(nominal, count, SEED))):
             loop = closed_loop(rig, experiment, SEED + k)
             ends = []
             for learn in (True, False):

@@ -81,6 +81,38 @@ class ReferenceTrajectory:
 
 
 @dataclass(frozen=True, slots=True)
+class JointAngle:
+    """Angle of a joint [rad], flexion positive, and torque of its tendons [N m]: joint_state."""
+
+    stamp_ns: int
+    angle_rad: float
+    torque_n_m: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class AngleReference:
+    """Wanted angle of a joint [rad] and its rate [rad/s]: topic joint_reference."""
+
+    stamp_ns: int
+    angle_rad: float
+    rate_rad_per_s: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class AngleTrajectory:
+    """
+    Wanted angle of a joint known ahead: topic joint_trajectory.
+
+    Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length.
+    """
+
+    stamp_ns: int
+    time_from_start_ns: tuple
+    angle_rad: tuple = ()
+    rate_rad_per_s: tuple = ()
+
+
+@dataclass(frozen=True, slots=True)
 class ValveSignal:
     """
     What goes to the valve: topics valve_signal and, as a wish to the driver, valve_command.

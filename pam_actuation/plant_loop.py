@@ -29,60 +29,91 @@ _NS = 1_000_000_000
 _NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
 
 
-class PlantLoop:
+class HeldSignal:
     """
-    A live plant that follows a clock in integer nanoseconds.
+    The valve signal that acts: the last effort of each name, held without limit.
 
-    Attributes: ``steps`` physics steps done, ``overruns`` calls that came so late that
-    time was skipped, ``skipped_s`` that time, ``signals`` and ``signals_ignored``
-    valve messages taken and efforts not usable.
+    Parameters
+    ----------
+    valve : {'ppr', 'hsv'}
+
     """
 
-    def __init__(self, rig, seed=0, longest_catch_up_s=0.25):
-        """
-        Build the plant of a rig.
+    def __init__(self, valve):
+        self._names = _NAMES[valve]
+        self.efforts = (0.0,) * len(self._names)
+        self.taken = 0
+        self.ignored = 0
 
-        ``seed`` fixes the sensor noise; ``longest_catch_up_s`` is the most time one call
-        of ``advance_to`` simulates; more than that is skipped and counted.
-        """
-        self.rig = rig
-        self.plant = rig.plant(seed)
-        self.sensors = SensorChain(rig.sensors, seed)
-        self.dt_ns = round(self.plant.dt_s * _NS)
+    def take(self, message: ValveSignal):
+        """Take efforts by name; anything not finite or unknown is ignored and counted."""
+        self.taken += 1
+        efforts = list(self.efforts)
+        for name, effort in zip(message.names, message.efforts):
+            if name in self._names and math.isfinite(effort):
+                efforts[self._names.index(name)] = float(effort)
+            else:
+                self.ignored += 1
+        self.efforts = tuple(efforts)
+
+
+def muscle_readings(plant, sensors, stamp_ns, time_s):
+    """
+    Read the sensors of one muscle; return the messages by short topic name.
+
+    Stamped ``stamp_ns`` with the jitter of the sensor settings. Contraction carries no
+    velocity: the rig does not measure one. ``supply_pressure`` is there for the HSV only.
+    """
+    pressure_pa, contraction_m, force_n, jitter_ns = sensors.read(
+        time_s, plant.pressure_pa, plant.contraction_m, plant.force_n)
+    stamp_ns += int(jitter_ns)
+    messages = {
+        'pressure': Pressure(stamp_ns, float(pressure_pa)),
+        'contraction': Contraction(stamp_ns, float(contraction_m)),
+        'force': Force(stamp_ns, float(force_n)),
+    }
+    if plant.rig.valve == 'hsv':
+        messages['supply_pressure'] = Pressure(stamp_ns, float(plant.supply_pa))
+    return messages
+
+
+class PlantClock:
+    """
+    Physics in fixed steps that follows a clock in integer nanoseconds.
+
+    Derived classes have ``step_once``.
+
+    Parameters
+    ----------
+    dt_s : float
+        Step of the physics.
+    longest_catch_up_s : float
+        The most time one call of ``advance_to`` simulates; more than that is skipped and
+        counted.
+
+    Attributes
+    ----------
+    steps : int
+        Physics steps done.
+    overruns : int
+        Calls that came so late that time was skipped.
+    skipped_s : float
+        That time.
+
+    """
+
+    def __init__(self, dt_s, longest_catch_up_s):
+        self.dt_ns = round(dt_s * _NS)
         self.longest_catch_up_ns = round(longest_catch_up_s * _NS)
-        self._names = _NAMES[rig.valve]
-        self._signal = [0.0] * len(self._names)
-        self._external_n = 0.0
         self._start_ns = None
         self.steps = 0
         self.overruns = 0
         self.skipped_s = 0.0
-        self.signals = 0
-        self.signals_ignored = 0
-
-    @property
-    def signal(self):
-        """Return the efforts that act on the valve."""
-        return tuple(self._signal)
 
     @property
     def now_ns(self):
         """Return the time of the plant's state [ns], None before the start."""
         return None if self._start_ns is None else self._start_ns + self.steps * self.dt_ns
-
-    def set_signal(self, message: ValveSignal):
-        """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
-        self.signals += 1
-        for name, effort in zip(message.names, message.efforts):
-            if name in self._names and math.isfinite(effort):
-                self._signal[self._names.index(name)] = float(effort)
-            else:
-                self.signals_ignored += 1
-
-    def set_external_force(self, message: Force):
-        """Take the disturbance force on the load [N]; not finite is ignored."""
-        if math.isfinite(message.force_n):
-            self._external_n = float(message.force_n)
 
     def advance_to(self, now_ns):
         """
@@ -102,30 +133,68 @@ class PlantLoop:
             self.skipped_s += skipped_ns / _NS
             behind_ns -= skipped_ns
         count = max(behind_ns // self.dt_ns, 0)
-        signal = tuple(self._signal)
         for _ in range(count):
-            self.plant.step(signal, self._external_n)
+            self.step_once()
         self.steps += count
         return count
+
+
+class PlantLoop(PlantClock):
+    """
+    A live plant of one muscle on a clock.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+    seed : int
+        Of the sensor noise.
+    longest_catch_up_s : float
+        As of ``PlantClock``.
+
+    """
+
+    def __init__(self, rig, seed=0, longest_catch_up_s=0.25):
+        self.rig = rig
+        self.plant = rig.plant(seed)
+        super().__init__(self.plant.dt_s, longest_catch_up_s)
+        self.sensors = SensorChain(rig.sensors, seed)
+        self._held = HeldSignal(rig.valve)
+        self._external_n = 0.0
+
+    @property
+    def signal(self):
+        """Return the efforts that act on the valve."""
+        return self._held.efforts
+
+    @property
+    def signals(self):
+        """Return the number of valve messages taken."""
+        return self._held.taken
+
+    @property
+    def signals_ignored(self):
+        """Return the number of efforts that were not usable."""
+        return self._held.ignored
+
+    def set_signal(self, message: ValveSignal):
+        """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
+        self._held.take(message)
+
+    def set_external_force(self, message: Force):
+        """Take the disturbance force on the load [N]; not finite is ignored."""
+        if math.isfinite(message.force_n):
+            self._external_n = float(message.force_n)
+
+    def step_once(self):
+        """Advance the plant by one step with the signal held."""
+        self.plant.step(self._held.efforts, self._external_n)
 
     def sample(self, now_ns):
         """
         Read the sensors; return the messages by short topic name.
 
         Stamps are the time of the plant's state (at most one step before ``now_ns``)
-        with the jitter of the rig's sensor settings. Contraction carries no velocity:
-        the rig does not measure one. ``supply_pressure`` is there for the HSV only.
+        with the jitter of the rig's sensor settings; else as ``muscle_readings``.
         """
-        plant = self.plant
         stamp_ns = now_ns if self.now_ns is None else self.now_ns
-        pressure_pa, contraction_m, force_n, jitter_ns = self.sensors.read(
-            plant.time_s, plant.pressure_pa, plant.contraction_m, plant.force_n)
-        stamp_ns += int(jitter_ns)
-        messages = {
-            'pressure': Pressure(stamp_ns, float(pressure_pa)),
-            'contraction': Contraction(stamp_ns, float(contraction_m)),
-            'force': Force(stamp_ns, float(force_n)),
-        }
-        if self.rig.valve == 'hsv':
-            messages['supply_pressure'] = Pressure(stamp_ns, float(plant.supply_pa))
-        return messages
+        return muscle_readings(self.plant, self.sensors, stamp_ns, self.plant.time_s)

@@ -36,7 +36,7 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = (
     'valve_driver', 'plant_simulator', 'sofc_controller', 'pid_controller',
-    'reference_generator', 'experiment_recorder')
+    'reference_generator', 'experiment_recorder', 'joint_simulator', 'joint_controller')
 
 # Import name -> name in setup.py, where they differ.
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',

@@ -18,15 +18,20 @@ from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
-SECONDS = 60.0
+SECONDS = 120.0
+MODEL = 'dmsp_5_300_hanging_mass'
 
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('run', nargs='+', help='recorded bags')
-    parser.add_argument('--model', required=True, metavar='NAME|FILE',
-                        help='model YAML or rig preset to hold against the recording')
-    parser.add_argument('--out', required=True, metavar='DIR', help='folder for the results')
+    parser.add_argument('run', nargs='*', help='recorded bags')
+    parser.add_argument('--model', default=MODEL, metavar='NAME|FILE',
+                        help='model YAML or rig preset to hold against the recording '
+                        '(default: %(default)s)')
+    parser.add_argument('--out', default=None, metavar='DIR', help='folder for the results')
+    parser.add_argument('--explain', default=None, metavar='EFFECT',
+                        help='say what an effect is, from which size on it shows and what looks '
+                        'like it; in the bag, or without one in a simulated identification')
     parser.add_argument('--certify', default=None, metavar='RUN',
                         help='bag for the proof (default: every fifth block of the first bag)')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
@@ -44,6 +49,11 @@ def run(args):
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.gap import write_gap
     from pam_sim.effects.registry import get_effect
+    from pam_sim.errors import InputError
+    if args.explain is not None:
+        return _explain(args)
+    if not args.run or args.out is None:
+        raise InputError('needs at least one recorded bag and --out DIR')
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
@@ -55,3 +65,31 @@ def run(args):
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
     emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+
+
+def _explain(args):
+    """Say what an effect is, from which size on it shows, and what looks like it."""
+    from pam_actuation.bags.load import load_run
+    from pam_actuation.experiments.separating import identification_run
+    from pam_actuation.models.text import in_full
+    from pam_actuation.report.gap import model_for
+    from pam_sim import load_rig
+    from pam_sim.catalogue import catalogue, find
+    from pam_sim.gap.look_alikes import look_alikes
+    entry = find(catalogue(), args.explain)
+    if args.run:
+        run = load_run(args.run[0], namespace=args.namespace)
+        rig = model_for(run, args.model)
+    else:
+        rig = load_rig(args.model)
+        run = identification_run(rig)
+    found = look_alikes(run, rig, args.explain)
+    least = found['least']
+    lines = [in_full(entry)]
+    if least:
+        lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g} {least["unit"]} on '
+                     '(one noise floor, rms, after calibration)')
+    lines.append('looks like: ' + (', '.join(
+        f'{name} ({cosine:.2f})' for name, cosine in found['alike']) or 'no other effect here'))
+    emit(args, {'schema': 1, 'effect': args.explain, **found}, '\n'.join(lines))
+    return EXIT_DONE

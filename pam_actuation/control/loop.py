@@ -56,6 +56,43 @@ _REASONS = {
     FORCE: (codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD, codes.FORCE_NOT_FINITE,
             codes.FORCE_IMPLAUSIBLE)}
 
+REFERENCE_REASONS = {
+    reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
+    reference_buffer.HELD: codes.REFERENCE_HELD, reference_buffer.LOST: codes.REFERENCE_LOST}
+
+
+def fresh(message, now_ns):
+    """Return whether a message is neither too old nor too far ahead."""
+    return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS
+
+
+def measurement_reason(message, value, allowed, reasons, now_ns):
+    """
+    Return the code for the newest measurement of what is tracked, ``codes.OK`` if usable.
+
+    Parameters
+    ----------
+    message, value
+        The message, None before the first, and its value.
+    allowed : tuple of float
+        Lowest and highest plausible value.
+    reasons : tuple of int
+        Codes of: none yet, too old, too far ahead, not finite, implausible.
+    now_ns : int
+        Time on the clock of the stamps.
+
+    """
+    none, old, ahead, not_finite, implausible = reasons
+    if message is None:
+        return none
+    if now_ns - message.stamp_ns > MAX_AGE_NS:
+        return old
+    if message.stamp_ns - now_ns > MAX_AHEAD_NS:
+        return ahead
+    if not math.isfinite(value):
+        return not_finite
+    return codes.OK if allowed[0] <= value <= allowed[1] else implausible
+
 
 class ControllerLoop:
     """
@@ -87,7 +124,7 @@ class ControllerLoop:
             self._range = (
                 -0.5 * controller.upper_force_n, _FORCE_MARGIN * controller.upper_force_n)
         self._reasons = _REASONS[self.tracked]
-        self.references = ReferenceBuffer(force=self.tracked == FORCE)
+        self.references = ReferenceBuffer(self.tracked)
         self.rejected_references = 0
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
@@ -164,17 +201,7 @@ class ControllerLoop:
     def _measured_reason(self, now_ns):
         """Return the code for the newest measurement of what is tracked, OK if usable."""
         message, value = self._measured()
-        none, old, ahead, not_finite, implausible = self._reasons
-        if message is None:
-            return none
-        if now_ns - message.stamp_ns > MAX_AGE_NS:
-            return old
-        if message.stamp_ns - now_ns > MAX_AHEAD_NS:
-            return ahead
-        if not math.isfinite(value):
-            return not_finite
-        lowest, highest = self._range
-        return codes.OK if lowest <= value <= highest else implausible
+        return measurement_reason(message, value, self._range, self._reasons, now_ns)
 
     def _gather(self, now_ns, learning):
         """Return the ``TickInputs`` of now."""
@@ -183,11 +210,7 @@ class ControllerLoop:
         reason = self._measured_reason(now_ns)
         references = self.references
         if reason == codes.OK:
-            reason = {
-                reference_buffer.NONE: codes.NO_REFERENCE,
-                reference_buffer.FRESH: codes.OK,
-                reference_buffer.HELD: codes.REFERENCE_HELD,
-                reference_buffer.LOST: codes.REFERENCE_LOST}[references.state(now_ns)]
+            reason = REFERENCE_REASONS[references.state(now_ns)]
         may_learn = bool(
             learning and reason == codes.OK and not self.controller.freeze_learning)
         inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
@@ -203,14 +226,14 @@ class ControllerLoop:
             inputs.elapsed_s = (measured_ns - self._used_ns) * 1e-9
         self._used_ns = measured_ns
         contraction_ns = pressure_ns = force_ns = reference_ns = trajectory_ns = -1
-        if self._fresh(self._contraction, now_ns) and math.isfinite(
+        if fresh(self._contraction, now_ns) and math.isfinite(
                 self._contraction.contraction_m):
             inputs.contraction_m = self._contraction.contraction_m
             contraction_ns = self._contraction.stamp_ns
-        if self._fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
+        if fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
             inputs.pressure_pa = self._pressure.pressure_pa
             pressure_ns = self._pressure.stamp_ns
-        if self._fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
+        if fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
             inputs.force_n = self._force.force_n
             force_ns = self._force.stamp_ns
         if references.uses_trajectory(now_ns) or references.reference is None:
@@ -219,8 +242,3 @@ class ControllerLoop:
             reference_ns = references.reference.stamp_ns
         inputs.stamps_ns = (contraction_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
         return inputs
-
-    @staticmethod
-    def _fresh(message, now_ns):
-        """Return whether a message is neither too old nor too far ahead."""
-        return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS

@@ -23,16 +23,14 @@ limits and bumpless start as the PID's, and the same interface; there are no
 rules to learn.
 """
 
-import math
-
 from numba import njit
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.fixed_law import FixedLawController
+from pam_actuation.control.law_parts import faded_offset, first_command_pa, limited
 from pam_actuation.control.lqi_gains import (
     M_CONTRACTION, M_DELAY, M_HEAD, M_INTEGRAL_GAIN, M_ORDER, M_PA_PER_M, M_PRESSURE, pack)
 from pam_actuation.control.settings import checked_settings, Setting
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
@@ -62,7 +60,6 @@ STATE_NAMES = (
 # they contained (delay), oldest first.
 (S_STARTED, S_OFFSET, S_INTEGRAL, S_OUTPUT, S_HEAD) = range(5)
 _STALE_S = 0.1              # a longer gap between measurements restarts the estimate
-_OFFSET_FLOOR_M = 1e-9      # then it is gone, before it becomes a denormal number
 
 
 @compiled
@@ -112,10 +109,8 @@ def _start(par, model, st, inp, feedforward):
     y = inp[place.IN_CONTRACTION] - model[M_CONTRACTION]
     st[S_STARTED] = 1.0
     _rest(model, st, y)
-    pressure = inp[place.IN_PRESSURE]
-    st[S_OUTPUT] = P_ATM_PA
-    if math.isfinite(pressure):
-        st[S_OUTPUT] = min(max(pressure, P_ATM_PA + par[P_MIN]), P_ATM_PA + par[P_MAX])
+    st[S_OUTPUT] = first_command_pa(
+        inp[place.IN_PRESSURE], P_ATM_PA + par[P_MIN], P_ATM_PA + par[P_MAX])
     deviation = st[S_OUTPUT] - model[M_PRESSURE]
     for i in range(d):
         st[S_HEAD + n + i] = deviation
@@ -139,9 +134,7 @@ def _tick(par, model, st, inp, out):
         inp[place.IN_LEAD_REFERENCE] - offset - model[M_CONTRACTION])
     if begins:
         _start(par, model, st, inp, feedforward)
-    st[S_OFFSET] = 0.0
-    if abs(offset) > _OFFSET_FLOOR_M:
-        st[S_OFFSET] = offset * (par[P_START_TIME] / (par[P_START_TIME] + period))
+    st[S_OFFSET] = faded_offset(offset, par[P_START_TIME], period)
 
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp[place.IN_ELAPSED]
@@ -160,9 +153,7 @@ def _tick(par, model, st, inp, out):
     wanted = model[M_PRESSURE] + feedforward + feedback + integral
     lowest = P_ATM_PA + par[P_MIN]
     highest = P_ATM_PA + par[P_MAX]
-    inside = min(max(wanted, lowest), highest)
-    reach = par[P_SLEW] * period
-    command = min(max(inside, st[S_OUTPUT] - reach), st[S_OUTPUT] + reach)
+    inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
     st[S_OUTPUT] = command
     st[S_INTEGRAL] = integral + period * (
         model[M_INTEGRAL_GAIN] * error + (command - wanted) / par[P_ANTI_WINDUP_TIME])
@@ -199,8 +190,7 @@ def _entry(key):
     return lqi_step
 
 
-SOURCES = ('inputs.py', 'lqi_gains.py', 'lqi.py')
-lqi_step = _entry(source_key(*SOURCES))
+lqi_step = _entry(source_key(_tick))
 
 
 class LqiController(FixedLawController):

@@ -20,16 +20,15 @@ limits of pressure and of its rate, bumpless start. Same interface as the
 self-organizing controller; it has no rules to learn.
 """
 
-import math
-
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.fixed_law import FixedLawController
+from pam_actuation.control.law_parts import (
+    faded_offset, filtered_change, first_command_pa, limited)
 from pam_actuation.control.settings import checked_settings, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
@@ -51,7 +50,6 @@ SETTINGS = (
  P_CHANGE_FILTER, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
 (S_STARTED, S_OFFSET, S_CONTRACTION, S_RATE, S_INTEGRAL, S_OUTPUT, S_HISTORY) = range(7)
 STATE_COUNT = 7
-_OFFSET_FLOOR_M = 1e-9      # then it is gone, before it becomes a denormal number
 STATE_NAMES = (
     'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
     'integral_pa', 'derivative_pa', 'unlimited_command_pa', 'saturated_low', 'saturated_high',
@@ -65,10 +63,8 @@ def _start(par, inverse, st, inp):
     st[S_OFFSET] = inp[place.IN_REFERENCE] - inp[place.IN_CONTRACTION]
     st[S_RATE] = 0.0
     st[S_HISTORY] = 0.0
-    pressure = inp[place.IN_PRESSURE]
-    st[S_OUTPUT] = P_ATM_PA
-    if math.isfinite(pressure):
-        st[S_OUTPUT] = min(max(pressure, P_ATM_PA + par[P_MIN]), P_ATM_PA + par[P_MAX])
+    st[S_OUTPUT] = first_command_pa(
+        inp[place.IN_PRESSURE], P_ATM_PA + par[P_MIN], P_ATM_PA + par[P_MAX])
     st[S_INTEGRAL] = 0.0
     if par[P_INVERSE] < 0.5:
         st[S_INTEGRAL] = st[S_OUTPUT] - P_ATM_PA
@@ -81,20 +77,13 @@ def _tick(par, inverse, st, inp, out):
     if st[S_STARTED] < 0.5:
         _start(par, inverse, st, inp)
     x = inp[place.IN_CONTRACTION]
-    elapsed = inp[place.IN_ELAPSED]
-    if not math.isfinite(elapsed):
-        elapsed = period
-    if elapsed > 0.1:
-        st[S_RATE] = 0.0
-    elif elapsed > 0.0 and st[S_HISTORY] > 0.0:
-        raw = inp[place.IN_REFERENCE_RATE] - (x - st[S_CONTRACTION]) / elapsed
-        st[S_RATE] += elapsed / (par[P_CHANGE_FILTER] + elapsed) * (raw - st[S_RATE])
+    st[S_RATE] = filtered_change(
+        st[S_RATE], par[P_CHANGE_FILTER], inp[place.IN_REFERENCE_RATE],
+        x - st[S_CONTRACTION], inp[place.IN_ELAPSED], period, st[S_HISTORY] > 0.0)
     st[S_CONTRACTION] = x
     st[S_HISTORY] += 1.0
     offset = st[S_OFFSET]
-    st[S_OFFSET] = 0.0
-    if abs(offset) > _OFFSET_FLOOR_M:
-        st[S_OFFSET] = offset * (par[P_START_TIME] / (par[P_START_TIME] + period))
+    st[S_OFFSET] = faded_offset(offset, par[P_START_TIME], period)
     error = inp[place.IN_REFERENCE] - offset - x
     base = P_ATM_PA
     if par[P_INVERSE] > 0.5:
@@ -105,9 +94,7 @@ def _tick(par, inverse, st, inp, out):
     wanted = base + proportional + integral + derivative
     lowest = P_ATM_PA + par[P_MIN]
     highest = P_ATM_PA + par[P_MAX]
-    inside = min(max(wanted, lowest), highest)
-    reach = par[P_SLEW] * period
-    command = min(max(inside, st[S_OUTPUT] - reach), st[S_OUTPUT] + reach)
+    inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
     st[S_OUTPUT] = command
     st[S_INTEGRAL] = integral + period * (
         par[P_INTEGRAL] * error + (command - wanted) / par[P_ANTI_WINDUP_TIME])
@@ -143,8 +130,7 @@ def _entry(key):
     return pid_step
 
 
-SOURCES = ('inputs.py', 'static_inverse.py', 'pid.py')
-pid_step = _entry(source_key(*SOURCES))
+pid_step = _entry(source_key(_tick))
 
 
 class PidController(FixedLawController):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The wanted contraction (or force) now and a little ahead, from what was published.
+The wanted contraction (or force, or joint angle) now and a little ahead, from what was published.
 
 ``reference`` alone is extrapolated with its rate; a ``reference_trajectory``
 is interpolated (cubic through positions and rates). Rules:
@@ -21,7 +21,7 @@ is interpolated (cubic through positions and rates). Rules:
 * A trajectory counts while its stamp is at most ``TRAJECTORY_LIFE_S`` old and its end
   has not passed; then its times are absolute and each message replaces the former.
   Beyond its end the last point goes on with its rate. Where it moves faster, by
-  ``JUMP_M_PER_S``, than both its points say, it jumps: the first point goes on until the
+  ``JUMP_PER_S``, than both its points say, it jumps: the first point goes on until the
   second one's time, so that the controller sees a jump and not a steep ramp.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, after
   that the position stands still; the preview fades out until ``LOST_S``.
@@ -33,11 +33,19 @@ is interpolated (cubic through positions and rates). Rules:
 from bisect import bisect_right
 import math
 
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT
+
 TRAJECTORY_LIFE_S = 1.0
-JUMP_M_PER_S = 0.05
 TRUST_S = 0.2
 LOST_S = 0.5
 HOLD_S = 2.0
+
+# By what is tracked: fields of value and rate in the messages, and the rate [unit/s] beyond
+# what the points say that is a jump. 4 rad/s are about 0.05 m/s on a small pulley.
+_FIELDS = {
+    CONTRACTION: ('contraction_m', 'velocity_m_per_s'), FORCE: ('force_n', None),
+    JOINT: ('angle_rad', 'rate_rad_per_s')}
+JUMP_PER_S = {CONTRACTION: 0.05, FORCE: math.inf, JOINT: 4.0}
 
 NONE, FRESH, HELD, LOST = range(4)      # what ``state`` can be
 
@@ -48,14 +56,15 @@ class ReferenceBuffer:
 
     Parameters
     ----------
-    force : bool
-        The messages ask for a force [N]. They carry no rate of it; between points of a
-        trajectory it is that of the line through them, without a trajectory 0.
+    tracked : Tracked
+        What the messages ask for. Those that ask for a force carry no rate of it; between
+        points of a trajectory it is that of the line through them, without a trajectory 0.
 
     """
 
-    def __init__(self, force=False):
-        self._force = force
+    def __init__(self, tracked=CONTRACTION):
+        self._field, self._rate_field = _FIELDS[tracked]
+        self._jump_per_s = JUMP_PER_S[tracked]
         self.clear()
 
     def clear(self):
@@ -87,12 +96,12 @@ class ReferenceBuffer:
             self.trajectory = message
             self._times_ns = times
             self._values = values
-            self._rates = () if self._force else message.velocity_m_per_s
+            self._rates = getattr(message, self._rate_field) if self._rate_field else ()
         return usable
 
     def _value(self, message):
         """Return what a message asks for, of the quantity that counts here."""
-        return message.force_n if self._force else message.contraction_m
+        return getattr(message, self._field)
 
     def uses_trajectory(self, now_ns):
         """Return whether the trajectory is the one that counts now."""
@@ -134,7 +143,7 @@ class ReferenceBuffer:
         if self.reference is None:
             return self._values[-1], 0.0
         reference = self.reference
-        rate = 0.0 if self._force else reference.velocity_m_per_s
+        rate = getattr(reference, self._rate_field) if self._rate_field else 0.0
         if not math.isfinite(rate):
             rate = 0.0
         age_s = (now_ns - reference.stamp_ns) * 1e-9
@@ -159,7 +168,7 @@ class ReferenceBuffer:
         v0, v1 = self._rate(i, None), self._rate(after, None)
         if v0 is None or v1 is None:
             return x0 + (x1 - x0) * part, (x1 - x0) / span_s
-        if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > JUMP_M_PER_S:
+        if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > self._jump_per_s:
             return x0 + v0 * part * span_s, v0
         a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
         bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)

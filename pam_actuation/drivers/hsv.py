@@ -155,6 +155,11 @@ class HsvLaw:
         self.par = self.config.par()
         self.state = initial_state()
         self.out = np.zeros(kernel.OUT_SIZE)
+        # Compiled before time counts: the first vent of a live driver must not wait for it.
+        spare = initial_state()
+        hsv_step(spare, self.par, P_ATM_PA, P_ATM_PA, math.nan, self.out)
+        hsv_hold(spare, self.par, 0.0, 0.0, P_ATM_PA, math.nan)
+        self.out[:] = 0.0
 
     def step(self, p_cmd_pa, p_meas_pa, supply_pa=math.nan, age_s=0.0):
         """

@@ -35,8 +35,8 @@ on: open from on-delay to off-delay, nothing if shorter than the on-delay.
 
 import math
 
-import numba
-
+from numba import njit
+from pam_sim.compiled import compiled, source_key
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
@@ -99,7 +99,7 @@ O_TARGET = 4            # the command after the limits of atmosphere and supply 
 OUT_SIZE = 5
 
 
-@numba.njit(cache=True)
+@compiled
 def _full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
     """Return the pressure change [Pa] in one period with one valve fully open."""
     if filling:
@@ -113,7 +113,7 @@ def _full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
     return GAS_CONSTANT_AIR * TEMPERATURE_K * flow * par[P_PERIOD] / volume_m3
 
 
-@numba.njit(cache=True)
+@compiled
 def _volume_pull(par, p_pa, volume_m3, rate_m3):
     """
     Return the volume's acceleration [m^3 per period^2].
@@ -126,7 +126,7 @@ def _volume_pull(par, p_pa, volume_m3, rate_m3):
     return omega * (omega * (rest - volume_m3) - 2.0 * par[P_DAMPING] * rate_m3)
 
 
-@numba.njit(cache=True)
+@compiled
 def _advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
     """
     Bring the model forward by a part of a period with a constant opening.
@@ -157,7 +157,7 @@ def _advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
     return p_pa, volume_m3, rate_m3, flow_pa
 
 
-@numba.njit(cache=True)
+@compiled
 def duty_of_opening(opening, open_part, close_part, margin):
     """Return the duty whose pulse is effectively open for ``opening`` (0..1) of a period."""
     # A valve that has no time to shut before the next pulse stays open: between the
@@ -169,7 +169,7 @@ def duty_of_opening(opening, open_part, close_part, margin):
     return min(max(duty, open_part + margin), longest)
 
 
-@numba.njit(cache=True)
+@compiled
 def opening_of_duty(duty, open_part, close_part):
     """Return the effective opening (0..1 of a period) of a duty."""
     if duty <= 0.0:
@@ -181,7 +181,7 @@ def opening_of_duty(duty, open_part, close_part):
     return min(duty - open_part + close_part, 1.0)
 
 
-@numba.njit(cache=True)
+@compiled
 def observe(state, par, p_meas_pa, supply_pa):
     """
     Bring the model one period further and correct it by a measurement.
@@ -234,14 +234,14 @@ def observe(state, par, p_meas_pa, supply_pa):
     state[S_DRIFT] = min(max(drift, -par[P_DRIFT_LIMIT]), par[P_DRIFT_LIMIT])
 
 
-@numba.njit(cache=True)
+@compiled
 def _push(state, opening):
     for i in range(S_SENT + SENT_SIZE - 1, S_SENT, -1):
         state[i] = state[i - 1]
     state[S_SENT] = opening
 
 
-@numba.njit(cache=True)
+@compiled
 def predict(state, par, supply_pa):
     """
     Run the model over all openings under way.
@@ -259,7 +259,7 @@ def predict(state, par, supply_pa):
     return p_pa, vol, vrate
 
 
-@numba.njit(cache=True)
+@compiled
 def _command_slope(state, par, p_cmd_pa):
     """
     Return the change [Pa per period] to feed forward.
@@ -278,7 +278,7 @@ def _command_slope(state, par, p_cmd_pa):
     return par[P_SLOPE] * (slope if abs(slope) < abs(former) else former)
 
 
-@numba.njit(cache=True)
+@compiled
 def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
     """
     Return the error [Pa] that stays if the valves do nothing from now on.
@@ -300,7 +300,7 @@ def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
     return error
 
 
-@numba.njit(cache=True)
+@compiled
 def _wanted_opening(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     """
     Return the signed opening for the next period.
@@ -330,21 +330,8 @@ def _wanted_opening(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     return opening if filling else -opening
 
 
-@numba.njit(cache=True)
-def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
-    """
-    One PWM period of the pressure loop.
-
-    Parameters
-    ----------
-    state, par, out : float64 arrays
-        Laid out as the ``S_*``, ``P_*`` and ``O_*`` constants; ``state`` and ``out`` are
-        written. ``state[S_AGE]`` may be set before to the age of the measurement [s].
-    p_cmd_pa, p_meas_pa, supply_pa : float
-        Wanted, measured and supply pressure, absolute [Pa]. A measurement of NaN means
-        none this period, a supply of NaN the nominal one.
-
-    """
+@compiled
+def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     if not math.isfinite(supply_pa):
         supply_pa = par[P_SUPPLY]
     observe(state, par, p_meas_pa, supply_pa)
@@ -371,13 +358,8 @@ def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     _push(state, opening)
 
 
-@numba.njit(cache=True)
-def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
-    """
-    One PWM period with imposed duties (venting, missed tick): only the model goes on.
-
-    The open valve of larger effect counts where both are open.
-    """
+@compiled
+def _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
     if not math.isfinite(supply_pa):
         supply_pa = par[P_SUPPLY]
     observe(state, par, p_meas_pa, supply_pa)
@@ -386,3 +368,39 @@ def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
     _push(state, fill - vent)
     state[S_COMMAND] = math.nan
     state[S_SLOPE] = 0.0
+
+
+def _entries(key):
+    """Return both entry points as units of compiled code, stored under ``key``."""
+    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+    def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+        """
+        One PWM period of the pressure loop.
+
+        Parameters
+        ----------
+        state, par, out : float64 arrays
+            Laid out as the ``S_*``, ``P_*`` and ``O_*`` constants; ``state`` and ``out`` are
+            written. ``state[S_AGE]`` may be set before to the age of the measurement [s].
+        p_cmd_pa, p_meas_pa, supply_pa : float
+            Wanted, measured and supply pressure, absolute [Pa]. A measurement of NaN means
+            none this period, a supply of NaN the nominal one.
+
+        """
+        if key >= 0:      # always; makes the key part of what is stored
+            _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out)
+
+    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+    def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
+        """
+        One PWM period with imposed duties (venting, missed tick): only the model goes on.
+
+        The open valve of larger effect counts where both are open.
+        """
+        if key >= 0:
+            _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa)
+
+    return hsv_step, hsv_hold
+
+
+hsv_step, hsv_hold = _entries(source_key(_step, _hold))

@@ -37,7 +37,7 @@ class Experiment:
         What the values are: wanted contraction [m], wanted force [N], wanted joint angle
         [rad], wanted pressure [Pa absolute], or the raw valve signal (``ppr_voltage`` [V],
         ``hsv_duty``); pressure and valve signal run without a controller, an angle is
-        tracked offline only.
+        for a joint.
     segments : list of (name, arguments, where)
         The primitives in order, with the keys of the file and ``file:line``.
     where : str
@@ -94,9 +94,14 @@ class Experiment:
 
     def sends_valve_command(self, valve):
         """Tell whether some part of it speaks to a valve of this type directly."""
-        if self.domain in (*TRACKED, 'pressure'):
+        if self.asks_for_motion or self.domain == 'pressure':
             return valve == 'hsv' and any(s.SHUTS_VALVE for s in self.chain.segments)
         return True
+
+    @property
+    def asks_for_motion(self):
+        """Whether the values are a reference for a controller, of a muscle or of a joint."""
+        return self.tracked or self.domain == 'joint_angle'
 
     @property
     def tracked(self):

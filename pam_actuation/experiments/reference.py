@@ -14,8 +14,9 @@
 
 """Turn an experiment into reference messages on a clock."""
 
+from pam_actuation.control.modes.tracked import FORCE, JOINT
 from pam_actuation.messages import (
-    Force, Pressure, Reference, ReferenceTrajectory, ValveSignal)
+    AngleReference, AngleTrajectory, Force, Pressure, Reference, ReferenceTrajectory, ValveSignal)
 
 POINT_NS = 20_000_000          # points of the trajectory, at most 20 ms apart on the wire
 POINTS = 31                    # horizon 0.6 s; the wire asks for 0.5 s or more
@@ -46,7 +47,9 @@ class ReferenceLoop:
         self.valve = valve
         self.rate_hz = float(rate_hz)
         self._speaks_to_valve = experiment.sends_valve_command(valve)
-        self._force = experiment.domain == 'force'
+        self._tracked_topics = (
+            ('joint_reference', 'joint_trajectory') if experiment.domain == JOINT.topic
+            else ('reference', 'reference_trajectory'))
         self.start_ns = None
         self._next_trajectory_ns = 0
 
@@ -63,7 +66,7 @@ class ReferenceLoop:
         Return the messages due now as a dict of short topic name to message.
 
         Domain ``contraction`` or ``force``: ``reference``, and every 0.1 s
-        ``reference_trajectory``.
+        ``reference_trajectory``; ``joint_angle``: ``joint_reference`` and ``joint_trajectory``.
         Domain ``pressure``: ``pressure_command``, or ``valve_command`` while a pair of valves
         is to be shut. Raw valve signals: ``valve_command``, after the end the one that vents.
         With a disturbance ``external_force`` as well, first.
@@ -75,11 +78,11 @@ class ReferenceLoop:
         out = {}
         if self.experiment.disturbance:
             out['external_force'] = Force(now_ns, self.experiment.external_force_n(elapsed_s))
-        if self.experiment.tracked:
-            out['reference'] = (Reference(now_ns, force_n=value) if self._force
-                                else Reference(now_ns, value, rate))
+        if self.experiment.asks_for_motion:
+            wanted, ahead = self._tracked_topics
+            out[wanted] = self._wanted(now_ns, value, rate)
             if now_ns >= self._next_trajectory_ns:
-                out['reference_trajectory'] = self.trajectory(now_ns)
+                out[ahead] = self.trajectory(now_ns)
                 self._next_trajectory_ns += TRAJECTORY_EVERY_NS
         elif self.experiment.domain != 'pressure':
             out['valve_command'] = self._valve_command(now_ns, value)
@@ -93,8 +96,8 @@ class ReferenceLoop:
     def topics(self):
         """Return the topics it may send on, the one with the wanted value first."""
         domain = self.experiment.domain
-        if self.experiment.tracked:
-            topics = ('reference', 'reference_trajectory')
+        if self.experiment.asks_for_motion:
+            topics = self._tracked_topics
         else:
             topics = ('pressure_command',) if domain == 'pressure' else ()
             topics += ('valve_command',) if self._speaks_to_valve else ()
@@ -132,10 +135,19 @@ class ReferenceLoop:
         begin_ns = now_ns - (now_ns - self.start_ns) % POINT_NS
         offsets = tuple(k * POINT_NS for k in range(POINTS))
         points = [self.experiment.at(self.elapsed_s(begin_ns + o)) for o in offsets]
-        if self._force:
-            return ReferenceTrajectory(begin_ns, offsets, force_n=tuple(p[0] for p in points))
-        return ReferenceTrajectory(
-            begin_ns, offsets, tuple(p[0] for p in points), tuple(p[1] for p in points))
+        values, rates = (tuple(column) for column in zip(*points))
+        if self.experiment.domain == FORCE.topic:
+            return ReferenceTrajectory(begin_ns, offsets, force_n=values)
+        if self.experiment.domain == JOINT.topic:
+            return AngleTrajectory(begin_ns, offsets, values, rates)
+        return ReferenceTrajectory(begin_ns, offsets, values, rates)
+
+    def _wanted(self, now_ns, value, rate):
+        if self.experiment.domain == FORCE.topic:
+            return Reference(now_ns, force_n=value)
+        if self.experiment.domain == JOINT.topic:
+            return AngleReference(now_ns, value, rate)
+        return Reference(now_ns, value, rate)
 
 
 def _duty_command(now_ns, duty):

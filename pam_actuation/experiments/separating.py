@@ -96,9 +96,7 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
         Returns whether to stop looking.
 
     """
-    best, sensors = None, {f'{s}_noise_{u}': noise.get(s, NOISE[s]) for s, u in (
-        ('pressure', 'pa'), ('contraction', 'm'), ('force', 'n'))}
-    truth = rivals[0][1].with_(sensors=sensors)
+    best, truth = None, rivals[0][1].with_(sensors=_sensors(noise))
     for name, (why, segments) in menu(rig.valve).items():
         if out_of_time() and best is not None:
             break
@@ -141,6 +139,17 @@ def separation(run, rig, rivals, with_force):
         nearest = min(nearest, np.sqrt(max(
             sum(max(gap(c, found.errors[c.subsystem]), 0.0) for c in problem.cuts), 0.0)))
     return float(nearest)
+
+
+def identification_run(rig):
+    """Return a simulated run of the experiment ``pressure_identification`` with sensor noise."""
+    return _simulated(load_experiment('pressure_identification').to_dict(), rig.with_(
+        sensors=_sensors({})))
+
+
+def _sensors(noise):
+    return {f'{s}_noise_{u}': noise.get(s, NOISE[s]) for s, u in (
+        ('pressure', 'pa'), ('contraction', 'm'), ('force', 'n'))}
 
 
 def _simulated(plain, rig):

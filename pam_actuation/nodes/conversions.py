@@ -15,7 +15,8 @@
 """
 Plain messages to ROS messages and back.
 
-``MESSAGE_TYPES`` gives the ROS type of each topic of the rig. ``RosWriter`` keeps
+``MESSAGE_TYPES`` gives the ROS type of each topic of a muscle, ``JOINT_MESSAGE_TYPES``
+of those of a joint; a topic in a namespace goes by its last part. ``RosWriter`` keeps
 one preallocated message per publisher and only sets what changes: building a
 message afresh costs more than sending it. ``from_ros`` reads a message into the
 plain class of its topic.
@@ -28,9 +29,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import WrenchStamped
+from pam_actuation.messages import AngleReference
+from pam_actuation.messages import AngleTrajectory
 from pam_actuation.messages import Contraction
 from pam_actuation.messages import ControllerState
 from pam_actuation.messages import Force
+from pam_actuation.messages import JointAngle
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import Reference
 from pam_actuation.messages import ReferenceTrajectory
@@ -55,6 +59,21 @@ MESSAGE_TYPES = {
     'external_force': WrenchStamped,
     'controller_state': JointState,
 }
+JOINT_MESSAGE_TYPES = {
+    'joint_state': JointState,
+    'joint_reference': JointState,
+    'joint_trajectory': JointTrajectory,
+    'co_contraction': FluidPressure,
+}
+
+
+def type_of(topic):
+    """Return the ROS type of a topic, which may stand in a namespace."""
+    return {**MESSAGE_TYPES, **JOINT_MESSAGE_TYPES}[_kind(topic)]
+
+
+def _kind(topic):
+    return topic.rsplit('/', 1)[-1]
 
 
 def stamp_ns(message):
@@ -92,17 +111,40 @@ def _read_reference(message):
     return Reference(stamp_ns(message), _first(message.position), velocity)
 
 
+def _times_ns(points):
+    return tuple(
+        p.time_from_start.sec * NANOSECONDS + p.time_from_start.nanosec for p in points)
+
+
 def _read_trajectory(message):
     points = message.points
-    times_ns = tuple(
-        p.time_from_start.sec * NANOSECONDS + p.time_from_start.nanosec for p in points)
+    times_ns = _times_ns(points)
     if not any(len(p.positions) for p in points):
         return ReferenceTrajectory(
             stamp_ns(message), times_ns, force_n=tuple(_first(p.effort) for p in points))
     return ReferenceTrajectory(
         stamp_ns(message), times_ns,
-        tuple(_first(p.positions) for p in points),
-        tuple(p.velocities[0] if len(p.velocities) else 0.0 for p in points))
+        *_motion(points))
+
+
+def _motion(points):
+    """Return positions and rates; a rate that is left out is 0."""
+    return (tuple(_first(p.positions) for p in points),
+            tuple(p.velocities[0] if len(p.velocities) else 0.0 for p in points))
+
+
+def _read_joint_state(message):
+    return JointAngle(stamp_ns(message), _first(message.position), _first(message.effort))
+
+
+def _read_joint_reference(message):
+    velocity = message.velocity[0] if len(message.velocity) else 0.0
+    return AngleReference(stamp_ns(message), _first(message.position), velocity)
+
+
+def _read_joint_trajectory(message):
+    points = message.points
+    return AngleTrajectory(stamp_ns(message), _times_ns(points), *_motion(points))
 
 
 def _read_valve_signal(message):
@@ -125,6 +167,10 @@ _READERS = {
     'force': _read_force,
     'external_force': _read_force,
     'controller_state': _read_controller_state,
+    'joint_state': _read_joint_state,
+    'joint_reference': _read_joint_reference,
+    'joint_trajectory': _read_joint_trajectory,
+    'co_contraction': _read_pressure,
 }
 
 
@@ -135,13 +181,13 @@ def from_ros(topic, message):
     Parameters
     ----------
     topic : str
-        Short topic name, a key of ``MESSAGE_TYPES``.
+        Name of a topic of a muscle or joint.
     message : ROS message
         Message of that topic's type. A value that is missing becomes NaN (a missing
         reference velocity is 0).
 
     """
-    return _READERS[topic](message)
+    return _READERS[_kind(topic)](message)
 
 
 class RosWriter:
@@ -151,25 +197,27 @@ class RosWriter:
     Parameters
     ----------
     topic : str
-        Short topic name, a key of ``MESSAGE_TYPES``.
+        Name of a topic of a muscle or joint.
     muscle : str
-        Name of the muscle, the only entry of ``name`` in reference and contraction.
+        Name of the muscle or joint, the only entry of ``name`` where it is measured or wanted.
     frame_id : str
         ``header.frame_id``: where the sensor sits.
 
     """
 
     def __init__(self, topic, muscle='muscle', frame_id=''):
-        self._message = MESSAGE_TYPES[topic]()
+        self._message = type_of(topic)()
+        topic = _kind(topic)
         self._message.header.frame_id = frame_id
         self._names = ()
         self._points = []
         self._fill = getattr(self, '_fill_' + {
             'pressure_command': 'pressure', 'supply_pressure': 'pressure',
-            'external_force': 'force', 'valve_command': 'valve_signal'}.get(topic, topic))
-        if topic in ('reference', 'contraction'):
+            'co_contraction': 'pressure', 'external_force': 'force',
+            'valve_command': 'valve_signal'}.get(topic, topic))
+        if topic in ('reference', 'contraction', 'joint_state', 'joint_reference'):
             self._message.name = [muscle]
-        elif topic == 'reference_trajectory':
+        elif topic in ('reference_trajectory', 'joint_trajectory'):
             self._message.joint_names = [muscle]
 
     def fill(self, plain):
@@ -196,6 +244,15 @@ class RosWriter:
         message.position = array('d', (plain.contraction_m,))
         message.velocity = array('d', (plain.velocity_m_per_s,))
 
+    def _fill_joint_state(self, message, plain):
+        message.position = array('d', (plain.angle_rad,))
+        torque = plain.torque_n_m
+        message.effort = array('d', () if math.isnan(torque) else (torque,))
+
+    def _fill_joint_reference(self, message, plain):
+        message.position = array('d', (plain.angle_rad,))
+        message.velocity = array('d', (plain.rate_rad_per_s,))
+
     def _set_names(self, message, names):
         if names != self._names:
             self._names = names
@@ -210,15 +267,23 @@ class RosWriter:
         message.position = array('d', plain.values)
 
     def _fill_reference_trajectory(self, message, plain):
+        self._fill_points(message, plain.time_from_start_ns, plain.contraction_m,
+                          plain.velocity_m_per_s, plain.force_n)
+
+    def _fill_joint_trajectory(self, message, plain):
+        self._fill_points(
+            message, plain.time_from_start_ns, plain.angle_rad, plain.rate_rad_per_s)
+
+    def _fill_points(self, message, times_ns, positions, velocities, efforts=()):
         points = self._points
-        while len(points) < len(plain.time_from_start_ns):
+        while len(points) < len(times_ns):
             points.append(JointTrajectoryPoint())
-        for i, (point, time_ns) in enumerate(zip(points, plain.time_from_start_ns)):
+        for i, (point, time_ns) in enumerate(zip(points, times_ns)):
             set_stamp(point.time_from_start, time_ns)
-            point.positions = array('d', plain.contraction_m[i:i + 1])
-            point.velocities = array('d', plain.velocity_m_per_s[i:i + 1])
-            point.effort = array('d', plain.force_n[i:i + 1])
-        message.points = points[:len(plain.time_from_start_ns)]
+            point.positions = array('d', positions[i:i + 1])
+            point.velocities = array('d', velocities[i:i + 1])
+            point.effort = array('d', efforts[i:i + 1])
+        message.points = points[:len(times_ns)]
 
 
 def diagnostic_array(status):

@@ -28,8 +28,8 @@ import gc
 import time
 import traceback
 
-from pam_actuation.nodes.conversions import MESSAGE_TYPES
 from pam_actuation.nodes.conversions import RosWriter
+from pam_actuation.nodes.conversions import type_of
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
@@ -61,7 +61,7 @@ COMMON_PARAMETERS = (
     NodeParameter(
         'realtime_priority', 0, 'Real-time priority of this process (Linux, SCHED_RR); 0: none. '
         'Without the right to it the node runs as before.', 0, 99),
-    NodeParameter('muscle', 'muscle', 'Name of the muscle in the messages sent.'),
+    NodeParameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
 )
 
 
@@ -141,7 +141,7 @@ class ManagedNode(LifecycleNode):
 
     def add_publisher(self, topic):
         """Create the publisher of a topic of the rig; ``send`` publishes on it."""
-        publisher = CountedPublisher(self, MESSAGE_TYPES[topic], topic)
+        publisher = CountedPublisher(self, type_of(topic), topic)
         self.publishers_counted.append(publisher)
         self._writers[topic] = (publisher, RosWriter(topic, self.value('muscle')))
 
@@ -152,7 +152,7 @@ class ManagedNode(LifecycleNode):
 
     def add_subscription(self, topic, **options):
         """Create and return a polled subscription of a topic of the rig."""
-        subscription = PolledSubscription(self, MESSAGE_TYPES[topic], topic, **options)
+        subscription = PolledSubscription(self, type_of(topic), topic, **options)
         self.subscriptions_polled.append(subscription)
         return subscription
 

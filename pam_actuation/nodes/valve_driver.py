@@ -45,8 +45,9 @@ class ValveDriver(ManagedNode):
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
             'high-speed valves.', choices=('ppr', 'hsv')),
         NodeParameter(
-            'rig', '', 'Rig preset or model file that tells the driver valves, volume and load; '
-            'numbers given beside it win. Empty: the defaults of the parameters.'),
+            'rig', '', 'Rig preset or model file, or JOINT/flexor and JOINT/extensor, that tells '
+            'the driver valves, volume and load; numbers given beside it win. Empty: the '
+            'defaults of the parameters.'),
         NodeParameter(
             'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
             'pressure_command; supervised alike.'),
@@ -80,11 +81,11 @@ class ValveDriver(ManagedNode):
             return DriverConfig.from_parameters(
                 {p.name: self.value(p.name) for p in DRIVER_PARAMETERS})
         from pam_actuation.drivers.for_rig import driver_config
-        from pam_sim import load_rig
+        from pam_sim.joint import load_rig_or_side
         given = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS
                  if p.name in self._parameter_overrides}
         config = driver_config(
-            load_rig(self.value('rig'), valve=self.value('valve_type')), given)
+            load_rig_or_side(self.value('rig'), valve=self.value('valve_type')), given)
         told = {name: value for name, value in config.as_parameters().items()
                 if value != self.value(name)}
         self.get_logger().info(f'numbers told by rig {self.value("rig")}: ' + (

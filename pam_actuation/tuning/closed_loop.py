@@ -22,38 +22,31 @@ controller on it. The same compiled steps as in the live nodes are used
 
 from dataclasses import dataclass, field
 import functools
-import hashlib
 import math
-from pathlib import Path
 
 import numpy as np
-from pam_actuation.control import compiled_entry, lqi, pid
-from pam_actuation.control.sofc import step as sofc_step_module
-from pam_actuation.drivers import hsv_kernel, ppr
+from pam_actuation.control.lqi import lqi_step
+from pam_actuation.control.pid import pid_step
+from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning import loop_parts
+from pam_actuation.tuning.loop_module import load_loops
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+from pam_actuation.tuning.tracking_errors import TrackingErrors
 from pam_sim.errors import InputError
 from pam_sim.rollout import layout
-from pam_sim.rollout.generate import kernel_hash, load_cached_module
 
 
 @functools.cache
 def compiled_rollouts():
     """Return the module with a rollout per kind of controller, compiled for this kernel."""
-    source = (Path(__file__).parent / 'rollout_template.py').read_text(encoding='utf-8')
-    key = hashlib.sha256(source.encode())
-    key.update(kernel_hash().encode())
-    for names in (sofc_step_module.SOURCES, pid.SOURCES, lqi.SOURCES):
-        key.update(str(compiled_entry.source_key(*names)).encode())
-    for module in (hsv_kernel, ppr, loop_parts):
-        key.update(Path(module.__file__).read_bytes())
-    return load_cached_module('pam_closed_loop', source, key.hexdigest()[:12])
+    return load_loops(
+        'pam_closed_loop', 'rollout_template.py',
+        (sofc_step, pid_step, lqi_step))
 
 
 @dataclass
-class LoopResult:
+class LoopResult(TrackingErrors):
     """
     One tracked experiment, sampled at the controller's ticks.
 
@@ -76,21 +69,15 @@ class LoopResult:
         """Reference minus contraction [m]."""
         return self.reference_m - self.contraction_m
 
+    error = error_m
+
     def rmse_m(self, start_s=0.0, end_s=math.inf):
         """Return the root mean square error [m] within a span of time."""
-        chosen = (self.time_s >= start_s) & (self.time_s < end_s)
-        if not chosen.any():
-            raise InputError(f'no samples between {start_s} and {end_s} s')
-        return float(np.sqrt(np.mean(self.error_m[chosen] ** 2)))
+        return self.rmse(start_s, end_s)
 
     def cycle_rmse_m(self):
         """Return the root mean square error [m] of every cycle, shape (cycles,)."""
-        if self.cycle_s is None:
-            raise InputError('the experiment has no periodic part')
-        start_s, period_s, count = self.cycle_s
-        return np.array([
-            self.rmse_m(start_s + k * period_s, start_s + (k + 1) * period_s)
-            for k in range(count)])
+        return self.cycle_rmse()
 
 
 class ClosedLoop:
@@ -207,20 +194,21 @@ class ClosedLoop:
         """Return the log (ticks, LOG_SIZE) of ``rollout_template`` for a controller."""
         module = compiled_rollouts()
         controller.pause()
-        may = controller.freeze_learning is False
-        if callable(learn):
-            mask = np.array([float(may and learn(k / self.rate_hz)) for k in range(self.ticks)])
-        else:
-            mask = np.full(self.ticks, float(may and learn))
-        state = self._state.copy()
-        plant_inp, plant_out = np.zeros(layout.INP_SIZE), np.zeros(layout.OUT_SIZE)
-        from pam_sim.rollout.kernel import look
-        look(state, self._par, plant_inp, plant_out)
         log = np.empty((self.ticks, module.LOG_SIZE))
         rollout = getattr(module, f'{controller.kind}_rollout')
         rollout(
-            (state, self._par.copy(), plant_inp, plant_out), self.hsv, self._driver.fresh(),
+            self._fresh_plant(), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
-            self._noise, self._quantum, self._disturbance, mask,
+            self._noise, self._quantum, self._disturbance,
+            learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.compiled_arguments(), log)
         return log
+
+    def _fresh_plant(self, contraction_m=0.0):
+        """Return new state, par, inp, out of the plant at its start."""
+        from pam_sim.rollout.kernel import look
+        plant = (self._state.copy(), self._par.copy(), np.zeros(layout.INP_SIZE),
+                 np.zeros(layout.OUT_SIZE))
+        plant[2][layout.INP_CONTRACTION] = contraction_m
+        look(*plant)
+        return plant

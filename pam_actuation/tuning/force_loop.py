@@ -21,11 +21,11 @@ The same compiled steps as in the live nodes, as in ``closed_loop``.
 import numpy as np
 from pam_actuation.control.modes.tracked import FORCE, tracked_by
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.loop_setup import learning_mask
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.rollout import layout
 
 
 class ForceLoop(ClosedLoop):
@@ -115,15 +115,10 @@ class ForceLoop(ClosedLoop):
         check_controller(controller, FORCE, self.rate_hz)
         module = compiled_modes()
         controller.pause()
-        state = self._state.copy()
-        plant_inp, plant_out = np.zeros(layout.INP_SIZE), np.zeros(layout.OUT_SIZE)
-        plant_inp[layout.INP_CONTRACTION] = self._way_m[0]
-        from pam_sim.rollout.kernel import look
-        look(state, self._par, plant_inp, plant_out)
         log = np.empty((self.ticks, module.FORCE_LOG_SIZE))
         mode, law = controller.compiled_arguments()
         module.force_rollout(
-            (state, self._par, plant_inp, plant_out), self.hsv, self._driver.fresh(),
+            self._fresh_plant(self._way_m[0]), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
             self._noise, self._quantum, self._way_m,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
@@ -145,11 +140,3 @@ def check_controller(controller, tracked, rate_hz):
     if controller.rate_hz != rate_hz:
         raise InputError(
             f'the controller runs at {controller.rate_hz:g} Hz, this loop at {rate_hz:g} Hz')
-
-
-def learning_mask(controller, learn, ticks, rate_hz):
-    """Return 1.0 at every tick in which the rules may change, else 0.0."""
-    may = controller.freeze_learning is False
-    if callable(learn):
-        return np.array([float(may and learn(k / rate_hz)) for k in range(ticks)])
-    return np.full(ticks, float(may and learn))

@@ -62,7 +62,7 @@ def initial_rules(workers, problem, settings):
 def mean_rules(several):
     """Return a rule base whose every rule is the mean of those of several."""
     mean = several[0].copy()
-    for name in _bases(mean):
+    for name in mean.NAMES:
         getattr(mean, name)[...] = np.mean([getattr(one, name) for one in several], axis=0)
     return mean
 
@@ -70,15 +70,10 @@ def mean_rules(several):
 def as_initial(rules):
     """Return a copy whose present rules are its initial ones and which never fired."""
     fresh = rules.copy()
-    for name in _bases(fresh):
+    for name in fresh.NAMES:
         getattr(fresh, f'{name}_initial')[...] = getattr(fresh, name)
         getattr(fresh, f'{name}_fired')[...] = 0.0
     return fresh
-
-
-def _bases(rules):
-    """Return the names of the tables of a rule base."""
-    return [name.removesuffix('_initial') for name in vars(rules) if name.endswith('_initial')]
 
 
 def _learn(problem, task):

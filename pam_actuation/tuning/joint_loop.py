@@ -18,20 +18,16 @@ Closed-loop rollouts in joint mode: two muscles turn a limb, the angle is tracke
 The same compiled steps as in the controller, drivers and joint, as in ``closed_loop``.
 """
 
-import math
-
 import numpy as np
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning.force_loop import check_controller, learning_mask
+from pam_actuation.joint_plant_loop import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
+from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
-
-ANGLE_NOISE_RAD = 5e-4                      # design value of an encoder on the joint
-ANGLE_STEP_RAD = 2.0 * math.pi / 2 ** 14    # of 14 bit a turn
 
 
 class JointLoop:

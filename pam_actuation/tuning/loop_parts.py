@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the compiled closed loops share: reading a sensor, running a driver law."""
+"""What the compiled closed loops share: sensor, reference, driver law."""
 
 import numpy as np
+from pam_actuation.control import inputs as place
 from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
 from pam_actuation.drivers.ppr import ppr_step
 from pam_sim.compiled import compiled
@@ -34,6 +35,25 @@ def look_up(values, place):
     whole = min(int(place), values.shape[0] - 2)
     part = min(place - whole, 1.0)
     return (1.0 - part) * values[whole] + part * values[whole + 1]
+
+
+@compiled
+def want(tick, position, rate, lead_ticks, learn, inp):
+    """
+    Fill what is wanted of a controller at a tick.
+
+    ``position``, ``rate`` per tick, longer than the run by the preview of ``lead_ticks``;
+    ``learn`` is 1 where the rules may change.
+    """
+    inp[place.IN_REFERENCE] = position[tick]
+    inp[place.IN_REFERENCE_RATE] = rate[tick]
+    whole = int(lead_ticks)
+    part = lead_ticks - whole
+    at = min(tick + whole, position.shape[0] - 2)
+    inp[place.IN_LEAD_REFERENCE] = (1.0 - part) * position[at] + part * position[at + 1]
+    inp[place.IN_LEAD_RATE] = (1.0 - part) * rate[at] + part * rate[at + 1]
+    inp[place.IN_LEARN] = learn[tick]
+    inp[place.IN_ELAPSED] = np.nan
 
 
 @compiled

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the compiled closed loops are given: timing, reference, sensor noise, driver laws."""
+"""What a closed loop gets: timing, reference, sensor noise, where rules learn, driver laws."""
 
 from dataclasses import replace
 import math
@@ -60,6 +60,18 @@ def sensor_noise(rig, ticks, seed):
     sigma = np.array([sensors.get(noise, 0.0) for noise, _ in _SENSORS])
     steps = np.array([float(sensors.get(step, 0.0)) for _, step in _SENSORS])
     return np.random.default_rng(seed).standard_normal((ticks, 3)) * sigma, steps
+
+
+def learning_mask(controller, learn, ticks, rate_hz):
+    """
+    Return 1.0 at every tick in which the rules may change, else 0.0.
+
+    ``learn``: bool, or callable of the time [s].
+    """
+    may = controller.freeze_learning is False
+    if callable(learn):
+        return np.array([float(may and learn(k / rate_hz)) for k in range(ticks)])
+    return np.full(ticks, float(may and learn))
 
 
 class DriverLaw:

@@ -15,14 +15,13 @@
 """What a closed loop of force mode or joint mode returns."""
 
 from dataclasses import dataclass, field
-import math
 
 import numpy as np
-from pam_sim.errors import InputError
+from pam_actuation.tuning.tracking_errors import TrackingErrors
 
 
 @dataclass
-class ModeResult:
+class ModeResult(TrackingErrors):
     """
     One tracked experiment, sampled at the controller's ticks; SI, pressures absolute.
 
@@ -42,19 +41,3 @@ class ModeResult:
     def error(self):
         """Reference minus what was reached, in ``unit``."""
         return self.reference - self.value
-
-    def rmse(self, start_s=0.0, end_s=math.inf):
-        """Return the root mean square error within a span of time."""
-        chosen = (self.time_s >= start_s) & (self.time_s < end_s)
-        if not chosen.any():
-            raise InputError(f'no samples between {start_s} and {end_s} s')
-        return float(np.sqrt(np.mean(self.error[chosen] ** 2)))
-
-    def cycle_rmse(self):
-        """Return the root mean square error of every cycle, shape (cycles,)."""
-        if self.cycle_s is None:
-            raise InputError('the experiment has no periodic part')
-        start_s, period_s, count = self.cycle_s
-        return np.array([
-            self.rmse(start_s + k * period_s, start_s + (k + 1) * period_s)
-            for k in range(count)])

@@ -15,27 +15,17 @@
 """The compiled closed loops of ``modes_template``, made anew whenever a part of them changes."""
 
 import functools
-import hashlib
-from pathlib import Path
 
-from pam_actuation.control import compiled_entry
 from pam_actuation.control.modes import force, joint
-from pam_actuation.control.sofc import step as sofc_step_module
-from pam_actuation.drivers import hsv_kernel, ppr
-from pam_actuation.tuning import loop_parts
+from pam_actuation.control.sofc.step import sofc_step
+from pam_actuation.tuning.loop_module import load_loops
 from pam_sim.joint import kernel as joint_kernel
-from pam_sim.rollout.generate import kernel_hash, load_cached_module
 
 
 @functools.cache
 def compiled_modes():
     """Return the module with ``force_rollout`` and ``joint_rollout``."""
-    source = (Path(__file__).parent / 'modes_template.py').read_text(encoding='utf-8')
-    key = hashlib.sha256(source.encode())
-    key.update(kernel_hash().encode())
-    key.update(joint_kernel.joint_step.__module__.encode())      # named after its own hash
-    for names in (sofc_step_module.SOURCES, force.SOURCES, joint.SOURCES):
-        key.update(str(compiled_entry.source_key(*names)).encode())
-    for module in (hsv_kernel, ppr, loop_parts):
-        key.update(Path(module.__file__).read_bytes())
-    return load_cached_module('pam_modes_loop', source, key.hexdigest()[:12])
+    return load_loops(
+        'pam_modes_loop', 'modes_template.py',
+        (sofc_step, force, joint),
+        also=joint_kernel.joint_step.__module__)        # named after its own hash

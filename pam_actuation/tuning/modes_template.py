@@ -26,7 +26,7 @@ from pam_actuation.control import inputs as place
 from pam_actuation.control.modes.force import force_inputs
 from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR, joint_inputs, joint_outputs
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.tuning.loop_parts import drive, look_up, read
+from pam_actuation.tuning.loop_parts import drive, look_up, read, want
 from pam_sim.joint import layout as joint_layout
 from pam_sim.joint.kernel import joint_step
 from pam_sim.rollout import layout
@@ -46,18 +46,6 @@ JOINT_LOG_EXTENSOR_COMMAND = 4
 JOINT_LOG_FLEXOR_FORCE = 5      # N
 JOINT_LOG_EXTENSOR_FORCE = 6
 JOINT_LOG_SIZE = 7
-
-
-@njit(error_model='numpy', nogil=True)
-def _want(tick, reference, lead_ticks, learn, raw):
-    """Fill what is wanted of the controller."""
-    position, rate = reference
-    raw[place.IN_REFERENCE] = position[tick]
-    raw[place.IN_REFERENCE_RATE] = rate[tick]
-    raw[place.IN_LEAD_REFERENCE] = look_up(position, tick + lead_ticks)
-    raw[place.IN_LEAD_RATE] = look_up(rate, tick + lead_ticks)
-    raw[place.IN_LEARN] = learn[tick]
-    raw[place.IN_ELAPSED] = np.nan
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
@@ -83,6 +71,7 @@ def force_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quan
     """
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
+    position, rate = reference
     raw = np.zeros(inp.shape[0])
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
     signal_1 = plant_inp[layout.INP_SIGNAL_1]
@@ -96,7 +85,7 @@ def force_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quan
         raw[place.IN_CONTRACTION] = read(
             plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
         raw[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
-        _want(tick, reference, lead_ticks, learn, raw)
+        want(tick, position, rate, lead_ticks, learn, raw)
         force_inputs(mode[0], mode[1], mode[2], raw, law[1], inp)
         command_pa = sofc_step(*law)
         row[FORCE_LOG_COMMAND] = command_pa
@@ -138,6 +127,7 @@ def joint_rollout(plant, hsv, drivers, timing, lead_ticks, reference, noise, qua
     """
     joint, flexor, extensor = plant
     steps, driver_every, latency_steps = timing
+    position, rate = reference
     raw = np.zeros(inp.shape[0])
     pressures_pa = np.zeros(2)
     forces_n = np.zeros(2)
@@ -159,7 +149,7 @@ def joint_rollout(plant, hsv, drivers, timing, lead_ticks, reference, noise, qua
             extensor[3][layout.OUT_PRESSURE] + noise[tick, 2], quantum[2])
         forces_n[FLEXOR] = read(flexor[3][layout.OUT_FORCE] + noise[tick, 3], quantum[3])
         forces_n[EXTENSOR] = read(extensor[3][layout.OUT_FORCE] + noise[tick, 4], quantum[4])
-        _want(tick, reference, lead_ticks, learn, raw)
+        want(tick, position, rate, lead_ticks, learn, raw)
         joint_inputs(mode[0], raw, pressures_pa, forces_n, inp)
         u_pa = sofc_step(*law)
         joint_outputs(mode[0], mode[1], u_pa, pressures_pa, commands_pa)

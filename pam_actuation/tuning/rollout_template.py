@@ -25,12 +25,11 @@ signal arrives after ``latency_steps`` of them.
 """
 
 from numba import njit
-import numpy as np
 from pam_actuation.control import inputs as place
 from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.tuning.loop_parts import drive, read
+from pam_actuation.tuning.loop_parts import drive, read, want
 from pam_sim.compiled import compiled
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
@@ -52,15 +51,7 @@ def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, i
         plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
     inp[place.IN_PRESSURE] = read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
     inp[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
-    inp[place.IN_REFERENCE] = position[tick]
-    inp[place.IN_REFERENCE_RATE] = rate[tick]
-    whole = int(lead_ticks)
-    part = lead_ticks - whole
-    at = min(tick + whole, position.shape[0] - 2)
-    inp[place.IN_LEAD_REFERENCE] = (1.0 - part) * position[at] + part * position[at + 1]
-    inp[place.IN_LEAD_RATE] = (1.0 - part) * rate[at] + part * rate[at + 1]
-    inp[place.IN_LEARN] = learn[tick]
-    inp[place.IN_ELAPSED] = np.nan
+    want(tick, position, rate, lead_ticks, learn, inp)
     log[tick, LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
     log[tick, LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
     log[tick, LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
@@ -137,7 +128,7 @@ def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
     inp = controller[3]
     for tick in range(log.shape[0]):
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
-        command_pa = pid_step(controller[0], controller[1], controller[2], inp, controller[4])
+        command_pa = pid_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
                  latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
 
@@ -152,6 +143,6 @@ def lqi_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantu
     inp = controller[3]
     for tick in range(log.shape[0]):
         _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
-        command_pa = lqi_step(controller[0], controller[1], controller[2], inp, controller[4])
+        command_pa = lqi_step(*controller)
         _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
                  latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)

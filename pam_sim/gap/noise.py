@@ -107,8 +107,10 @@ def noise_of(time_s, values):
     quiet = rows[means.std(axis=1) < QUIET_MEANS * white]
     if len(quiet) < 2:
         return Noise(white)
-    total = float(np.mean(quiet ** 2))
-    together = [float(np.mean(quiet[:, k:] * quiet[:, :-k])) for k in (lag, 2 * lag)]
+    # Medians: a window in which a motion just begins must not count.
+    total = float(np.median(np.mean(quiet ** 2, axis=1)))
+    together = [float(np.median(np.mean(quiet[:, k:] * quiet[:, :-k], axis=1)))
+                for k in (lag, 2 * lag)]
     if total < (1.0 + SLOW_SHARE) * white ** 2 or together[0] <= SLOW_SHARE * white ** 2:
         return Noise(white)
     ratio = min(max(together[1] / together[0], 0.05), 0.95)

@@ -21,9 +21,10 @@ its projection on the remaining errors gives amplitude and promise in closed for
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.gap.candidates import Candidate
 from pam_sim.gap.cuts import acts_on
@@ -34,11 +35,18 @@ AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a 
 
 @dataclass(frozen=True)
 class Screened:
-    """A candidate with its best start and the share of the squared errors it promises."""
+    """
+    A candidate with its best start and the share of the squared errors it promises.
+
+    ``seen`` is the rms of its signature in noise floors, of the signal that shows it most,
+    for ``size``, the parameters that were tried first.
+    """
 
     candidate: Candidate
     start: tuple
     promise: dict
+    seen: float = 0.0
+    size: dict = field(default_factory=dict)
 
 
 def screen(problem, near, found):
@@ -60,15 +68,21 @@ def screen(problem, near, found):
         In the order given; ``promise`` by subsystem, 0 where a candidate does not act.
 
     """
-    spaces = {cut.subsystem: _Space(problem, cut, near) for cut in problem.cuts}
+    spaces = spaces_of(problem, near)
     with ThreadPoolExecutor(default_workers()) as pool:
         return list(pool.map(lambda c: _best_start(problem, near, c, spaces), found))
 
 
-def signature(problem, near, candidate, values, cut):
-    """Return the change of a cut's errors that an effect makes, shape (N,)."""
+def spaces_of(problem, near):
+    """Return by subsystem the fitted errors with what the known numbers can do taken out."""
+    return {cut.subsystem: _Space(problem, cut, near) for cut in problem.cuts}
+
+
+def free_signature(problem, near, candidate, values, cut, space):
+    """Return what an effect does to the weighted errors of a cut that known numbers cannot."""
     rig = problem.with_effects([*near.settings(), candidate.setting(values)])
-    return cut.errors(rig, near.known_z[cut.subsystem]) - near.errors[cut.subsystem]
+    change = cut.errors(rig, near.known_z[cut.subsystem]) - near.errors[cut.subsystem]
+    return space.free_of_known(change)
 
 
 class _Space:
@@ -89,22 +103,56 @@ class _Space:
         y = np.concatenate([errors[self.mask] * self.weight, tail])
         return y - self.basis @ (self.basis.T @ y)
 
+    def rms(self, change):
+        """Return the rms of a weighted change in floors, of the signal where it is largest."""
+        plain = change[:self.weight.size] / self.weight
+        signal = self.cut.signal[self.mask]
+        return max(float(np.sqrt(np.mean(plain[signal == s] ** 2)))
+                   for s in range(len(self.cut.signals)))
+
+
+def least_sizes(screened, rig, floors=1.0):
+    """
+    Return the smallest size of each effect that shows, as ``minimum_detectable`` of gap.json.
+
+    A size shows when its signature, freed of what the known numbers can do, has an rms of
+    ``floors`` noise floors. Effects whose response is not about proportional to their
+    size are left out.
+    """
+    found = {}
+    for s in screened:
+        effect = get_effect(s.candidate.effect)
+        if effect.variant_of or not s.candidate.amplitudes or s.seen <= 0.0:
+            continue
+        factor = floors / s.seen
+        values = {f.name: s.size[f.name] * (1.0 if f.shape else factor)
+                  for f in s.candidate.free}
+        values = {f.name: min(max(values[f.name], f.lower), f.upper) for f in s.candidate.free}
+        report = effect.report(effect.values(s.candidate.setting(values)['parameters']), rig)
+        quantity, (value, unit) = next(iter(report.items()))
+        found[effect.name] = {'value': float(value), 'unit': unit, 'quantity': quantity}
+    return found
+
 
 def _best_start(problem, near, candidate, spaces):
     best = Screened(candidate, tuple(f.coordinate(f.scale) for f in candidate.free), {})
-    for values in candidate.starts():
+    starts, seen = candidate.starts(), 0.0
+    first = starts[0]
+    for values in starts:
         promise, factors = {}, []
         for cut in problem.cuts:
             if not acts_on(candidate.effect, cut.subsystem):
                 continue
             space = spaces[cut.subsystem]
             try:
-                change = space.free_of_known(signature(problem, near, candidate, values, cut))
+                change = free_signature(problem, near, candidate, values, cut, space)
             except InputError:
                 continue
             size = float(change @ change)
             if size <= 0.0:
                 continue
+            if values is first:
+                seen = max(seen, space.rms(change))
             factor = -float(change @ space.left) / size
             if candidate.amplitudes:
                 low = min(f.lower / values[f.name] for f in candidate.amplitudes)
@@ -122,4 +170,4 @@ def _best_start(problem, near, candidate, spaces):
             start = tuple(f.coordinate(values[f.name] * (1.0 if f.shape else factor))
                           for f in candidate.free)
             best = Screened(candidate, start, promise)
-    return best
+    return replace(best, seen=seen, size=first)

@@ -86,6 +86,8 @@ class Outcome:
         Share of the gap that is explained, by subsystem with a gap.
     complete : bool
         False if the time ran out.
+    screened : list of Screened
+        All candidates at the baseline.
 
     """
 
@@ -94,6 +96,7 @@ class Outcome:
     named: list
     share: dict
     complete: bool = True
+    screened: list = field(default_factory=list)
 
 
 class Search:
@@ -153,7 +156,8 @@ class Search:
             if explained.get(w.subsystem, 0.0) < NAMED:
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
-        return Outcome(self.base, current, named, explained, not self.out_of_time())
+        return Outcome(self.base, current, named, explained, not self.out_of_time(),
+                       self.screened)
 
     def _first_gap(self, cut):
         """

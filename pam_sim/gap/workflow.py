@@ -28,6 +28,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import model_of, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
+from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
 from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
 from pam_sim.gap.words import explain
@@ -40,7 +41,7 @@ FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
-def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.0, seed=0,
+def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
              progress=lambda done: None):
     """
     Find what a model misses in recordings, add it, and prove it.
@@ -102,6 +103,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=60.0, materiality=1.
     _judge(result, outcome, problem, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
+    result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome)
     result.simulations = problem.simulations + proof.simulations
     progress(1.0)

@@ -19,12 +19,12 @@ Load ``antagonistic_joint``: two muscles against each other over a pulley, turni
 runs it on arrays, ``JointRig.plant`` step by step.
 """
 
-__all__ = ['JointPlant', 'JointRig', 'joint_preset_names', 'load_joint']
+__all__ = ['JointPlant', 'JointRig', 'joint_preset_names', 'load_joint', 'load_rig_or_side']
 
 
 def __getattr__(name):
     """Import the simulation only when it is asked for: it brings the compiler with it."""
-    if name in ('load_joint', 'joint_preset_names'):
+    if name in ('load_joint', 'joint_preset_names', 'load_rig_or_side'):
         from pam_sim.joint import model_file
         return getattr(model_file, name)
     if name == 'JointRig':

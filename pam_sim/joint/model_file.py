@@ -59,6 +59,29 @@ def load_joint(source, valve=None, fidelity=None):
     return joint.with_(valve=valve, fidelity=fidelity)
 
 
+def load_rig_or_side(source, valve=None):
+    """
+    Return a rig by its preset or path, or one side of a joint by ``JOINT/flexor``.
+
+    Parameters
+    ----------
+    source : str
+        For example ``dmsp_5_300_realistic`` or ``knee_dmsp_20_300/extensor``.
+    valve : str, optional
+        Instead of that of the model.
+
+    Raises
+    ------
+    InputError
+        As of ``load_rig`` and ``load_joint``.
+
+    """
+    joint, _, side = str(source).rpartition('/')
+    if joint and side in ('flexor', 'extensor'):
+        return getattr(load_joint(joint, valve=valve), side)
+    return load_rig(source, valve=valve)
+
+
 def _from_mapping(data, name):
     data.check_keys(KEYS)
     name = data.get('name', str, name)

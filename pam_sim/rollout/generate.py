@@ -248,8 +248,8 @@ def kernel_hash():
     digest = hashlib.sha256()
     digest.update(f'{sys.version_info[:2]} {numba.__version__}'.encode())
     digest.update(kernel_source().encode())
-    files = [_PACKAGE / 'compiled.py', _PACKAGE / 'rollout' / 'layout.py',
-             _PACKAGE / 'rollout' / 'hooks.py']
+    files = [_PACKAGE / 'compiled.py', _PACKAGE / 'units.py',
+             _PACKAGE / 'rollout' / 'layout.py', _PACKAGE / 'rollout' / 'hooks.py']
     for folder in ('muscle', 'valve', 'load'):
         files += sorted((_PACKAGE / folder).glob('*.py'))
     for path in files + law_files() + registry.effect_files():

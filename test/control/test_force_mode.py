@@ -20,6 +20,7 @@ import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.modes.force_surface import nominal_stiffness_n_per_m
+from pam_actuation.control.modes.tracked import FORCE
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.sofc.words import ranked
 from pam_actuation.control.static_inverse import inverse_pressure_pa
@@ -171,7 +172,7 @@ def test_a_reference_in_metres_says_nothing_to_force_mode(rig):
 
 
 def test_a_trajectory_of_forces_is_followed_along_straight_lines():
-    buffer = ReferenceBuffer(force=True)
+    buffer = ReferenceBuffer(FORCE)
     message = ReferenceTrajectory(START, (0, 20 * MS, 600 * MS), force_n=(20.0, 22.0, 22.0))
     assert buffer.set_trajectory(message)
     assert buffer.at(START, START + 5 * MS) == pytest.approx((20.5, 100.0))

@@ -46,11 +46,18 @@ class LiveRig:
         self.health = collections.defaultdict(list)
         self._context = None
 
-    def start(self, name, **parameters):
-        """Start a node; real-time, where allowed, makes the tests bear a busy machine."""
+    def start(self, name, below='', **parameters):
+        """
+        Start a node; real-time, where allowed, makes the tests bear a busy machine.
+
+        ``below`` is a namespace under that of the rig; the process is ``below/name`` then.
+        """
         parameters = {'realtime_priority': 1, **parameters}
-        self.processes[name] = NodeProcess(
-            name, self._namespace, parameters, self.environment, self._log_dir)
+        log_dir = self._log_dir / below
+        log_dir.mkdir(exist_ok=True)
+        self.processes[f'{below}/{name}' if below else name] = NodeProcess(
+            name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
+            log_dir)
 
     def listen(self):
         """Join the graph; processes are started before (forking with threads is unsafe)."""

@@ -41,6 +41,26 @@ SAMPLES = {
     'controller_state': messages.ControllerState(STAMP_NS, ('tick', 'error_m'), (7.0, 1e-4)),
 }
 
+JOINT_SAMPLES = {
+    'joint_state': messages.JointAngle(STAMP_NS, 0.25, -1.5),
+    'joint_reference': messages.AngleReference(STAMP_NS, 0.25, -0.1),
+    'joint_trajectory': messages.AngleTrajectory(
+        STAMP_NS, (0, 20_000_000), (0.2, 0.3), (0.0, 5.0)),
+    'co_contraction': messages.Pressure(STAMP_NS, 401_325.0),
+}
+
+
+@pytest.mark.parametrize('topic', JOINT_SAMPLES)
+def test_there_and_back_for_a_joint(topic):
+    full = f'/left_knee/{topic}'
+    assert from_ros(full, RosWriter(full).fill(JOINT_SAMPLES[topic])) == JOINT_SAMPLES[topic]
+
+
+def test_a_torque_not_known_is_empty_on_the_wire():
+    message = RosWriter('joint_state', 'knee').fill(messages.JointAngle(STAMP_NS, 0.25))
+    assert (list(message.name), list(message.effort)) == (['knee'], [])
+    assert math.isnan(from_ros('joint_state', message).torque_n_m)
+
 
 def test_every_topic_of_a_bag_has_a_ros_message():
     assert {*MESSAGE_TYPES, 'diagnostics'} == set(TOPIC_TYPES)

@@ -27,13 +27,12 @@ import math
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.modes.force_surface import (
     fill_inverse, nominal_stiffness_n_per_m, surface_from_tree, surface_to_mapping,
     tabulate_force_surface)
 from pam_actuation.control.modes.tracked import FORCE
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.errors import InputError
 
 P_STIFFNESS = 0         # N/m
@@ -120,8 +119,7 @@ def _entry(key):
     return entry
 
 
-SOURCES = ('inputs.py', 'modes/force_surface.py', 'modes/force.py')
-_force_inputs = _entry(source_key(*SOURCES))
+_force_inputs = _entry(source_key(force_inputs))
 
 
 class ForceController(WrappedLaw):

@@ -26,12 +26,11 @@ import math
 from numba import njit
 import numpy as np
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
 from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
@@ -121,8 +120,7 @@ def _entries(key):
     return inputs, outputs
 
 
-SOURCES = ('inputs.py', 'modes/joint_statics.py', 'modes/joint.py')
-_joint_inputs, _joint_outputs = _entries(source_key(*SOURCES))
+_joint_inputs, _joint_outputs = _entries(source_key(joint_inputs, joint_outputs))
 
 
 class JointController(WrappedLaw):
@@ -214,6 +212,17 @@ class JointController(WrappedLaw):
         _joint_outputs(self._par, self._st, u_pa, self._pressures, self._commands)
         self._error_rad = ref_rad - angle_rad
         return tuple(self._commands.tolist())
+
+    def want_co_contraction(self, gauge_pa):
+        """
+        Ask for another mean pressure [Pa gauge]; it is approached at a limited rate.
+
+        Kept within the pressure limits. The static inverse stays the one of the co-contraction
+        the controller was made for: what that misses is left to rules and integral.
+        """
+        par = self._par
+        self._par[P_CO_CONTRACTION] = min(
+            max(P_ATM_PA + gauge_pa, par[P_LOWEST]), par[P_HIGHEST])
 
     def compiled_arguments(self):
         """Return (par, state) of this module's functions and the arguments of the law."""

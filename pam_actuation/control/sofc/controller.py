@@ -14,10 +14,8 @@
 
 """The self-organizing fuzzy controller as a class: owner of the arrays of ``sofc_step``."""
 
-import math
-
 import numpy as np
-from pam_actuation.control.inputs import INPUT_COUNT
+from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc import layout
 from pam_actuation.control.sofc.credit import ENTRY_SIZE, ring_rows
@@ -30,7 +28,7 @@ from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.errors import InputError
 
 
-class SelfOrganizingFuzzyController:
+class SelfOrganizingFuzzyController(CompiledController):
     """
     Fuzzy controller whose rules change while it runs (Procyk and Mamdani, 1979).
 
@@ -58,7 +56,8 @@ class SelfOrganizingFuzzyController:
     state_names = layout.STATE_NAMES
 
     def __init__(self, static_inverse, settings=None, rules=None, rig_name='', where=None):
-        self.settings = checked_settings(SETTINGS, settings or {}, where)
+        settings = checked_settings(SETTINGS, settings or {}, where)
+        super().__init__(settings, layout.STATE_COUNT, rig_name)
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
             self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
@@ -70,7 +69,6 @@ class SelfOrganizingFuzzyController:
                 'max_pressure_gauge_pa must be larger than min_pressure_gauge_pa',
                 where('max_pressure_gauge_pa') if where else 'max_pressure_gauge_pa')
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self.rig_name = rig_name
         scaling = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
         self.rules = RuleBase(
@@ -80,16 +78,12 @@ class SelfOrganizingFuzzyController:
         if rules is not None:
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)
-        self.freeze_learning = False
-        self.rules_replaced = 0       # times the rules were exchanged from outside
         self.parameters = parameter_vector(self.settings)
         rows = ring_rows(*(int(self.parameters[index]) for index in (
             layout.P_DELAY, layout.P_SPREAD, layout.P_ANSWER)))
         self._ring = np.zeros((rows, ENTRY_SIZE))
-        self._state = np.zeros(layout.STATE_COUNT)
-        self._inputs = np.zeros(INPUT_COUNT)
-        self._outputs = np.zeros(layout.OUTPUT_COUNT)
         rules = self.rules
+        self._step = sofc_step
         self._arguments = (
             self.parameters, self.static_inverse, rules.arrays(), rules.arrays('_initial'),
             rules.arrays('_fired'), tuple(array.copy() for array in rules.arrays()), self._ring,
@@ -98,77 +92,14 @@ class SelfOrganizingFuzzyController:
         sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)
                     else array.copy() for array in self._arguments))
 
-    @property
-    def rate_hz(self):
-        """Rate [Hz] at which ``step`` is to be called."""
-        return self.settings['rate_hz']
-
-    @property
-    def lead_s(self):
-        """Preview [s]: how far ahead the lead reference is to be taken."""
-        return self.settings['lead_s']
-
-    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
-        """
-        Run one tick.
-
-        Parameters
-        ----------
-        x_m : float
-            Measured contraction [m].
-        ref_m, ref_vel_m_per_s : float
-            Wanted contraction [m] and rate [m/s] at the time of that measurement.
-        ref_lead_m, ref_lead_vel_m_per_s : float
-            The same ``lead_s`` ahead of now.
-        learn : bool
-            Whether the rules may change.
-        elapsed_s : float
-            Time between the measurements of this and the former tick; NaN: one period.
-        pressure_pa, force_n : float
-            Measured absolute pressure [Pa] and force [N]; NaN where not known. Used for the
-            bumpless start and for freezing the learning only.
-
-        Returns
-        -------
-        float
-            Wanted muscle pressure, absolute Pa, never below atmosphere.
-
-        """
-        inputs = self._inputs
-        inputs[0] = x_m
-        inputs[1] = ref_m
-        inputs[2] = ref_vel_m_per_s
-        inputs[3] = ref_lead_m
-        inputs[4] = ref_lead_vel_m_per_s
-        inputs[5] = 1.0 if learn and not self.freeze_learning else 0.0
-        inputs[6] = elapsed_s
-        inputs[7] = pressure_pa
-        inputs[8] = force_n
-        return sofc_step(*self._arguments)
-
-    def compiled_arguments(self):
-        """Return the arrays ``sofc_step`` takes, for compiled closed loops."""
-        return self._arguments
-
-    @property
-    def input_array(self):
-        """The array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
-        return self._inputs
-
-    def state_values(self):
-        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return tuple(self._outputs.tolist())
-
     def learning_reason(self):
         """Return in words whether the last tick learned, or why not."""
         return REASONS[int(self._outputs[layout.O_REASON])]
 
     def pause(self):
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
-        self._state[:] = 0.0
+        super().pause()
         self._ring[:] = 0.0
-        self._outputs[:] = 0.0
 
     def reset(self):
         """Return to the initial rules and forget the motion."""
@@ -227,8 +158,3 @@ class SelfOrganizingFuzzyController:
                 self.rules.motion,
                 int(out[layout.O_MOTION_KNOT]), out[layout.O_MOTION_KNOT_DEGREE],
                 int(out[layout.O_RATE_KNOT]), out[layout.O_RATE_KNOT_DEGREE]))
-
-    def to_yaml(self):
-        """Return YAML text from which ``load_controller`` builds an identical controller."""
-        from pam_actuation.control.config import controller_to_yaml
-        return controller_to_yaml(self)

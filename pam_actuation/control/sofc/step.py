@@ -25,7 +25,8 @@ import math
 
 from numba import njit
 from pam_actuation.control import inputs as place
-from pam_actuation.control.compiled_entry import source_key
+from pam_actuation.control.law_parts import (
+    faded_offset, filtered_change, first_command_pa, limited)
 from pam_actuation.control.sofc import credit, dynamics, guard, layout as at, learning
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
@@ -33,12 +34,10 @@ from pam_actuation.control.sofc.performance_index import index_linear, index_tab
 from pam_actuation.control.sofc.rule_table import (
     contracting_share, infer_feedback, infer_feedforward, infer_motion)
 from pam_actuation.control.static_inverse import inverse_pressure_pa
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, source_key
 from pam_sim.units import P_ATM_PA
 
-_STALE_RATE_S = 0.1       # a longer gap between measurements restarts the rate filter
 _START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
-_OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
 _START_TRIM_PA = 1e4      # largest integral taken over at the start: what dry friction explains
 _LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
 
@@ -54,36 +53,17 @@ def _start(par, inverse, values, kept, st, inp):
     st[at.S_SHARE] = 0.5
     st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
     st[at.S_CONTRACTION] = x
-    st[at.S_OUTPUT] = P_ATM_PA
     st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
     st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
     guard.keep(values, kept)
     pressure = inp[place.IN_PRESSURE]
-    if math.isfinite(pressure):
-        st[at.S_OUTPUT] = min(
-            max(pressure, P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]),
-            P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE])
-        if x > _LIFTED_M:
-            trim = pressure - inverse_pressure_pa(inverse, x)
-            st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
-            st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
-
-
-@compiled
-def _update_rate(par, st, inp, reference_rate):
-    """Update and return the filtered change of error [m/s] from the contraction alone."""
-    elapsed = inp[place.IN_ELAPSED]
-    if not math.isfinite(elapsed):
-        elapsed = par[at.P_PERIOD]
-    x = inp[place.IN_CONTRACTION]
-    if elapsed > _STALE_RATE_S:
-        st[at.S_RATE] = 0.0
-    elif elapsed > 0.0 and st[at.S_HISTORY] > 0.0:
-        raw = reference_rate - (x - st[at.S_CONTRACTION]) / elapsed
-        part = elapsed / (par[at.P_CHANGE_FILTER] + elapsed)
-        st[at.S_RATE] += part * (raw - st[at.S_RATE])
-    st[at.S_CONTRACTION] = x
-    return st[at.S_RATE]
+    st[at.S_OUTPUT] = first_command_pa(
+        pressure, P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE],
+        P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE])
+    if math.isfinite(pressure) and x > _LIFTED_M:
+        trim = pressure - inverse_pressure_pa(inverse, x)
+        st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
+        st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
 
 
 @compiled
@@ -107,7 +87,7 @@ def _valve_lags(par, ring, st, inp):
 
 
 @compiled
-def _reason(par, ring, st, inp, error, limited, lags):
+def _reason(par, ring, st, inp, error, at_limit, lags):
     """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
     tick = int(st[at.S_TICK])
     delay = int(par[at.P_DELAY])
@@ -126,7 +106,7 @@ def _reason(par, ring, st, inp, error, limited, lags):
     if force < par[at.P_SLACK_FORCE]:         # False for NaN: force is optional
         return learning.FROZEN_SLACK
     then = credit.row_of(ring, tick, delay)
-    if limited or ring[then, credit.ENTRY_VALID] < 0.5:
+    if at_limit or ring[then, credit.ENTRY_VALID] < 0.5:
         return learning.FROZEN_SATURATED
     if st[at.S_FORMER] > 0.0 and abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0:
         return learning.FROZEN_SURPRISE
@@ -224,7 +204,12 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     to_go, extra_rate = dynamics.smooth_jump(par, st, jump, wait, at.S_JUMP, at.S_JUMP_LEFT)
     lead_to_go, lead_extra_rate = dynamics.smooth_jump(
         par, st, lead_jump, 0.0, at.S_LEAD_JUMP, at.S_LEAD_JUMP_LEFT)
-    change = _update_rate(par, st, inp, inp[place.IN_REFERENCE_RATE] + extra_rate)
+    change = filtered_change(
+        st[at.S_RATE], par[at.P_CHANGE_FILTER], inp[place.IN_REFERENCE_RATE] + extra_rate,
+        inp[place.IN_CONTRACTION] - st[at.S_CONTRACTION], inp[place.IN_ELAPSED], period,
+        st[at.S_HISTORY] > 0.0)
+    st[at.S_RATE] = change
+    st[at.S_CONTRACTION] = inp[place.IN_CONTRACTION]
     lags = _valve_lags(par, ring, st, inp)
     if lags or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
@@ -232,9 +217,7 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     error = inp[place.IN_REFERENCE] - to_go - offset - inp[place.IN_CONTRACTION]
     lead = inp[place.IN_LEAD_REFERENCE] - lead_to_go - offset
     lead_rate = inp[place.IN_LEAD_RATE] + lead_extra_rate
-    st[at.S_OFFSET] = 0.0
-    if abs(offset) > _OFFSET_FLOOR_M:
-        st[at.S_OFFSET] = offset * (par[at.P_START_TIME] / (par[at.P_START_TIME] + period))
+    st[at.S_OFFSET] = faded_offset(offset, par[at.P_START_TIME], period)
 
     # Fuzzification.
     error_scaled = error / par[at.P_ERROR_UNIVERSE]
@@ -272,14 +255,12 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     # The limits of the actuator, then of its speed.
     lowest = P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]
     highest = P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE]
-    command = min(max(wanted, lowest), highest)
+    inside, command = limited(
+        wanted, st[at.S_OUTPUT], lowest, highest, par[at.P_SLEW] * period)
     at_low = wanted < lowest
     at_high = wanted > highest
-    reach = par[at.P_SLEW] * period
-    slewed = min(max(command, st[at.S_OUTPUT] - reach), st[at.S_OUTPUT] + reach)
-    at_slew = slewed != command
-    command = slewed
-    limited = at_low or at_high or at_slew
+    at_slew = command != inside
+    at_limit = at_low or at_high or at_slew
     st[at.S_OUTPUT] = command
 
     # Integral with back-calculation against those limits.
@@ -301,12 +282,12 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     if not correction > 0.0:
         correction = dynamics.slope_pa_per_m(inverse, lead)
     credit.push_outcome(ring, row, a_pass, motion_pass, correction, integral - mean,
-                        0.0 if limited or not undisturbed else 1.0, command)
+                        0.0 if at_limit or not undisturbed else 1.0, command)
     if par[at.P_INDEX_FORM] < 0.5:
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
     else:
         index = index_table(error_scaled, change_scaled, par[at.P_INDEX_LIMIT])
-    reason = _reason(par, ring, st, inp, error, limited, lags)
+    reason = _reason(par, ring, st, inp, error, at_limit, lags)
     fb_squares = 0.0
     ff_squares = 0.0
     motion_squares = 0.0
@@ -412,8 +393,4 @@ def _entry(key):
     return sofc_step
 
 
-SOURCES = (
-    'inputs.py', 'static_inverse.py', 'sofc/layout.py', 'sofc/membership.py',
-    'sofc/rule_table.py', 'sofc/performance_index.py', 'sofc/credit.py', 'sofc/learning.py',
-    'sofc/dynamics.py', 'sofc/guard.py', 'sofc/step.py')
-sofc_step = _entry(source_key(*SOURCES))
+sofc_step = _entry(source_key(_tick))

@@ -45,12 +45,13 @@ def gap_section(result, key='gap', title='Recording against model', remark='',
     body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
     if result.signals:
         body += table(['signal', 'noise floor', 'given model', 'numbers calibrated',
-                       'given model, in floors'],
+                       'final model', 'gap closed'],
                       [_size(name, s) for name, s in result.signals.items()])
         body += paragraph(
             'RMS difference of whole free runs of the model on the recorded valve signal, on '
-            'time blocks the calibration did not use. The noise floor is what sensor noise '
-            'and stamps explain.', 'note')
+            'data that neither the fit nor the choice used. The noise floor is what sensor noise '
+            'and stamps explain. Gap closed: of what calibrating the numbers left.', 'note')
+    body += _effects(result) + _evidence(result) + _next(result)
     body += _where(result) + _calibration(result)
     for note in result.remarks:
         body += paragraph(note, 'note')
@@ -65,7 +66,47 @@ def _size(name, s):
     def shown(value):
         return None if value is None else f'{value * factor:.3g} {unit}'
     return [name, shown(s.noise_floor), shown(s.rmse_before), shown(s.rmse_refit),
-            f'{s.rmse_before / s.noise_floor:.1f}' if s.noise_floor else None]
+            shown(s.rmse_after),
+            None if s.shrink_percent is None else f'{s.shrink_percent:.0f} %']
+
+
+def _effects(result):
+    if not result.effects:
+        return ''
+    rows = []
+    for e in result.effects:
+        for name, q in e['equivalent'].items():
+            rows.append([e['name'], e['family'], e['subsystem'], f'{e["confidence"]:.2f}', name,
+                         f'{q["value"]:.4g} {q["unit"]}',
+                         f'{q["ci95"][0]:.4g} … {q["ci95"][1]:.4g}'])
+    body = '<h3>What is missing in the model</h3>'
+    body += table(['effect', 'family', 'subsystem', 'confidence', 'quantity', 'value',
+                   '95 % interval'], rows)
+    moved = ', '.join(f'{name} by {value:.3g}' for name, value in result.moved.items())
+    return body + paragraph(
+        f'With it the model moves {moved} standard deviations of the sensor (rms). '
+        f'{100 * result.unexplained_fraction:.1f} % of the squared gap are left unexplained.')
+
+
+def _evidence(result):
+    if not result.evidence:
+        return ''
+    body = '<h3>Evidence against each rival</h3>'
+    body += table(['subsystem', 'name', 'share of the gap it explains', 'worse by t'],
+                  [[e['subsystem'], e['name'], f'{100 * e["share"]:.1f} %',
+                    None if e['t'] is None else f'{e["t"]:.1f}']
+                   for e in result.evidence])
+    return body + paragraph(
+        'Every name was fitted to one part of the data and judged on another. t compares squared '
+        'errors block by block; below 3 the data do not tell two names apart.', 'note')
+
+
+def _next(result):
+    if not result.next_experiment:
+        return ''
+    return '<h3>What to measure next</h3>' + paragraph(
+        f'{result.next_experiment["why"]} Run it with: '
+        'pam run next_experiment.yaml (beside this page).')
 
 
 def _where(result):
@@ -110,7 +151,8 @@ def _overlay(result, max_points):
         factor, offset, unit, label = SHOWN[name]
         time_s = (trace.stamp_ns - start) * 1e-9
         curves = [('recorded', trace.measured, 'measured', None),
-                  ('given model', trace.before, 'simulated', 'dash')]
+                  ('given model', trace.before, 'simulated', 'dash'),
+                  ('final model', trace.after, 'after', None)]
         rows.append((label, [figures.line(
             time_s, (y + offset) * factor, text, role, dash=dash, width=1.4,
             max_points=max_points) for text, y, role, dash in curves]))
@@ -120,5 +162,7 @@ def _overlay(result, max_points):
                          max_points=max_points),
             figures.line(time_s, (trace.measured - trace.refit) * factor,
                          'recorded − calibrated', 'green', width=1.0,
-                         max_points=max_points)]))
+                         max_points=max_points),
+            figures.line(time_s, (trace.measured - trace.after) * factor,
+                         'recorded − final', 'after', width=1.0, max_points=max_points)]))
     return figures.stack(rows, 'time [s]', row_px=170)

@@ -1,0 +1,55 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Both knees of an exoskeleton, each in a namespace of its own, waiting for their references.
+
+    ros2 launch pam_actuation exo.launch.py valve:=ppr
+
+A larger stack sends ``/left_knee/joint_trajectory`` and ``/right_knee/joint_trajectory``.
+"""
+
+from pathlib import Path
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.actions import GroupAction
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+
+KNEES = ('left_knee', 'right_knee')
+HANDED_ON = {
+    'valve': ('ppr', 'Proportional pressure regulators (ppr) or high-speed valves (hsv).'),
+    'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
+    'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),
+    'learning': ('true', 'Whether the rules of the controllers may change.'),
+    'experiment': ('', 'Experiment both knees play; empty: they wait for references.'),
+    'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 99; 0: none.'),
+}
+
+
+def generate_launch_description():
+    """Return the arguments and two knees."""
+    arguments = [DeclareLaunchArgument(name, default_value=default, description=text)
+                 for name, (default, text) in HANDED_ON.items()]
+    file = str(Path(__file__).with_name('knee.launch.py'))
+    # A source of its own for each: a source describes its nodes once, and they start once.
+    knees = [
+        GroupAction([IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(file), launch_arguments={
+                **{name: LaunchConfiguration(name) for name in HANDED_ON},
+                'namespace': namespace, 'seed': str(k)}.items())])
+        for k, namespace in enumerate(KNEES)]
+    return LaunchDescription([*arguments, *knees])

@@ -1,0 +1,122 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What all control laws have in common: the arrays of a compiled step function."""
+
+import math
+
+import numpy as np
+from pam_actuation.control.inputs import INPUT_COUNT
+
+
+class CompiledController:
+    """
+    A control law as a class: owner of the arrays its compiled step works on.
+
+    Subclasses have ``kind`` and ``state_names``, set ``_step`` and ``_arguments`` (what it
+    takes, ``_inputs`` and ``_outputs`` among them) and know what ``learning_reason`` is.
+
+    Parameters
+    ----------
+    settings : dict
+        Checked settings; has ``rate_hz`` and ``lead_s``.
+    state_size : int
+        Length of the state.
+    rig_name : str
+        Identity of the rig.
+
+    """
+
+    rules = None
+
+    def __init__(self, settings, state_size, rig_name=''):
+        self.settings = settings
+        self.rig_name = rig_name
+        self.freeze_learning = False
+        self.rules_replaced = 0       # times the rules were exchanged from outside
+        self._state = np.zeros(state_size)
+        self._inputs = np.zeros(INPUT_COUNT)
+        self._outputs = np.zeros(len(self.state_names))
+
+    @property
+    def rate_hz(self):
+        """Rate [Hz] at which ``step`` is to be called."""
+        return self.settings['rate_hz']
+
+    @property
+    def lead_s(self):
+        """Preview [s]: how far ahead the lead reference is to be taken."""
+        return self.settings['lead_s']
+
+    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
+             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
+        """
+        Run one tick.
+
+        Parameters
+        ----------
+        x_m : float
+            Measured contraction [m].
+        ref_m, ref_vel_m_per_s : float
+            Wanted contraction [m] and rate [m/s] at the time of that measurement.
+        ref_lead_m, ref_lead_vel_m_per_s : float
+            The same ``lead_s`` ahead of now.
+        learn : bool
+            Whether the rules may change.
+        elapsed_s : float
+            Time between the measurements of this and the former tick; NaN: one period.
+        pressure_pa, force_n : float
+            Measured absolute pressure [Pa] and force [N]; NaN where not known. Used for the
+            bumpless start and for freezing the learning only.
+
+        Returns
+        -------
+        float
+            Wanted muscle pressure, absolute Pa, never below atmosphere.
+
+        """
+        inputs = self._inputs
+        inputs[0] = x_m
+        inputs[1] = ref_m
+        inputs[2] = ref_vel_m_per_s
+        inputs[3] = ref_lead_m
+        inputs[4] = ref_lead_vel_m_per_s
+        inputs[5] = 1.0 if learn and not self.freeze_learning else 0.0
+        inputs[6] = elapsed_s
+        inputs[7] = pressure_pa
+        inputs[8] = force_n
+        return self._step(*self._arguments)
+
+    def compiled_arguments(self):
+        """Return the arrays the compiled step takes, for compiled closed loops."""
+        return self._arguments
+
+    @property
+    def input_array(self):
+        """The array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
+        return self._inputs
+
+    def state_values(self):
+        """Return the values of ``state_names`` of the last tick as a tuple of floats."""
+        return tuple(self._outputs.tolist())
+
+    def pause(self):
+        """Forget the motion, keep the rules: the next tick starts bumplessly."""
+        self._state[:] = 0.0
+        self._outputs[:] = 0.0
+
+    def to_yaml(self):
+        """Return YAML text from which ``load_controller`` builds an identical controller."""
+        from pam_actuation.control.config import controller_to_yaml
+        return controller_to_yaml(self)

@@ -1,0 +1,64 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What compiled control laws share: start, change of error, limits of the actuator."""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.units import P_ATM_PA
+
+_STALE_S = 0.1            # a longer gap between measurements restarts the rate filter
+_OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
+
+
+@compiled
+def first_command_pa(pressure_pa, lowest_pa, highest_pa):
+    """Return where a bumpless start begins: at the measured pressure, NaN = atmosphere."""
+    if not math.isfinite(pressure_pa):
+        return P_ATM_PA
+    return min(max(pressure_pa, lowest_pa), highest_pa)
+
+
+@compiled
+def faded_offset(offset_m, time_s, period_s):
+    """Return the offset of a bumpless start one period later."""
+    if abs(offset_m) > _OFFSET_FLOOR_M:
+        return offset_m * (time_s / (time_s + period_s))
+    return 0.0
+
+
+@compiled
+def filtered_change(change, filter_s, reference_rate, moved_m, elapsed_s, period_s, known):
+    """
+    Return the filtered change of error [m/s], from the contraction alone.
+
+    ``change`` is the former one, ``moved_m`` what the contraction did in ``elapsed_s`` (NaN:
+    one period), ``known`` whether there was a former contraction.
+    """
+    if not math.isfinite(elapsed_s):
+        elapsed_s = period_s
+    if elapsed_s > _STALE_S:
+        return 0.0
+    if elapsed_s > 0.0 and known:
+        raw = reference_rate - moved_m / elapsed_s
+        return change + elapsed_s / (filter_s + elapsed_s) * (raw - change)
+    return change
+
+
+@compiled
+def limited(wanted_pa, former_pa, lowest_pa, highest_pa, reach_pa):
+    """Return a command within its limits, and the same within reach of the former command."""
+    inside = min(max(wanted_pa, lowest_pa), highest_pa)
+    return inside, min(max(inside, former_pa - reach_pa), former_pa + reach_pa)

@@ -1,0 +1,128 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The controller of a joint on ROS: angle and reference in, two pressure commands out."""
+
+import sys
+
+from pam_actuation.control.tick import REASONS
+from pam_actuation.messages import Pressure
+from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.diagnostics import OK, WARN
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.runner import run
+from pam_sim.units import P_ATM_PA
+from std_srvs.srv import SetBool
+
+INPUTS = ('joint_trajectory', 'joint_reference', 'co_contraction', 'joint_state')
+
+
+class JointNode(ManagedNode):
+    """
+    Track the angle of a joint with both its muscles; on every way out ask both to be vented.
+
+    Its own namespace is that of the joint; the drivers of the muscles run in ``flexor`` and
+    ``extensor`` below it.
+    """
+
+    NAME = 'joint_controller'
+    PARAMETERS = (
+        NodeParameter(
+            'controller', '', 'Controller preset or file with mode joint. Empty: the preset '
+            'that fits the valve.'),
+        NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint the controller is made for: '
+                      'preset or path.'),
+        NodeParameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
+        NodeParameter('learning', True, 'Whether the rules change while running.'),
+    )
+
+    loop = None
+
+    def setup(self):
+        """Load the controller, create the topics."""
+        from pam_actuation.control.config import load_controller
+        from pam_actuation.control.joint_loop import JointControllerLoop, SIDES
+        from pam_sim.joint import load_joint
+        valve = self.value('valve_type')
+        joint = load_joint(self.value('joint'), valve=valve)
+        name = self.value('controller') or f'sofc_joint_{valve}'
+        load_controller(name, joint).step(0.0, 0.0, 0.0, 0.0, 0.0)  # compiled before time counts
+        self.loop = JointControllerLoop(load_controller(name, joint), joint.range_rad)
+        self.learning = self.value('learning')
+        self._commands = [f'{side}/pressure_command' for side in SIDES]
+        for topic in (*self._commands, 'controller_state'):
+            self.add_publisher(topic)
+        self._inputs = [
+            (topic, self.add_subscription(topic), getattr(self.loop, f'on_{topic}'))
+            for topic in INPUTS]
+        self._sides = [
+            (topic, k, self.add_subscription(f'{side}/{topic}'), handler)
+            for topic, handler in (('pressure', self.loop.on_pressure),
+                                   ('force', self.loop.on_force))
+            for k, side in enumerate(SIDES)]
+        self._freeze_service = self.create_service(SetBool, '~/freeze_learning', self._freeze)
+
+    def teardown(self):
+        """Take the service back."""
+        self.destroy_service(self._freeze_service)
+        self.loop = None
+
+    def start(self):
+        """Begin without memory of a former run; what was learned stays."""
+        self.add_loop(1.0 / self.loop.rate_hz)
+
+    def tick(self):
+        """Take the newest inputs, compute, send both commands and internals."""
+        for topic, subscription, handler in self._inputs:
+            for message, _ in subscription.take():
+                handler(from_ros(topic, message))
+        for topic, side, subscription, handler in self._sides:
+            for message, _ in subscription.take():
+                handler(side, from_ros(topic, message))
+        commands, state = self.loop.tick(self.now_ns(), self.learning)
+        for topic, command in zip(self._commands, commands):
+            self.send(topic, command)
+        self.send('controller_state', state)
+        if self.loop.reason == REASONS[0]:
+            self.diagnostics.update(OK, 'following the reference')
+        else:
+            self.diagnostics.update(WARN, self.loop.reason)
+
+    def safe_stop(self, why):
+        """Command atmospheric pressure: both drivers vent."""
+        if self.publishers_counted:
+            for topic in self._commands:
+                self.send(topic, Pressure(self.now_ns(), P_ATM_PA))
+
+    def diagnostic_values(self):
+        """Add whether the rules change."""
+        learning = (('learning', self.learning),) if self.loop else ()
+        return (*super().diagnostic_values(), *learning)
+
+    def _freeze(self, request, response):
+        with self.loops.lock:
+            self.learning = not request.data
+        response.success = True
+        response.message = 'learning is on' if self.learning else 'learning is frozen'
+        return response
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(JointNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

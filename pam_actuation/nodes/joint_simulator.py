@@ -1,0 +1,101 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The joint on ROS: valve signals of two muscles in, angle and their measurements out."""
+
+import sys
+
+from pam_actuation.joint_plant_loop import SIDES
+from pam_actuation.nodes.conversions import from_ros
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.plant_simulator import MAX_SEED
+from pam_actuation.nodes.runner import run
+
+
+class JointSimulator(ManagedNode):
+    """
+    Simulate two muscles, their valves and the limb they turn, in real time with 1 ms steps.
+
+    Its own namespace is that of the joint; the muscles have ``flexor`` and ``extensor``
+    below it, each with the topics of a rig. Timing is that of the plant simulator.
+    """
+
+    NAME = 'joint_simulator'
+    PARAMETERS = (
+        NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint preset, or path of its file.'),
+        NodeParameter('valve_type', 'ppr', 'Valves of both muscles.', choices=('ppr', 'hsv')),
+        NodeParameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED - 1),
+        NodeParameter(
+            'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
+    )
+
+    plant = None
+
+    def setup(self):
+        """Load the joint, create the sensors' publishers."""
+        from pam_actuation.joint_plant_loop import JointPlantLoop
+        from pam_sim.joint import load_joint
+        joint = load_joint(self.value('joint'), valve=self.value('valve_type'))
+        resting = (0.0,) * len(joint.flexor.signal_names)
+        joint.plant().step(resting, resting)                 # compiled before time counts
+        self.plant = JointPlantLoop(joint, seed=self.value('seed'))
+        self.add_publisher('joint_state')
+        self.signals = {}
+        for side in SIDES:
+            topics = ('pressure', 'contraction', 'force')
+            if joint.flexor.valve == 'hsv':
+                topics += ('supply_pressure',)
+            for topic in topics:
+                self.add_publisher(f'{side}/{topic}')
+            self.signals[side] = self.add_subscription(f'{side}/valve_signal')
+
+    def start(self):
+        """Begin with the clock at the present."""
+        self.plant.advance_to(self.now_ns())
+        self._sampled_steps = None
+        self.add_loop(1.0 / self.value('publish_rate_hz'))
+
+    def diagnostic_values(self):
+        """Add how the physics keeps up with the clock."""
+        values = super().diagnostic_values()
+        if self.plant is None:
+            return values
+        return (*values, ('physics.steps', self.plant.steps),
+                ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))
+
+    def tick(self):
+        """Apply what arrived, run physics to the present, measure."""
+        now_ns = self.now_ns()
+        arrived = [
+            (from_ros('valve_signal', message), self.plant.signals[side])
+            for side in SIDES for message, _ in self.signals[side].take()]
+        for plain, held in sorted(arrived, key=lambda item: item[0].stamp_ns):
+            self.plant.advance_to(min(plain.stamp_ns, now_ns))
+            held.take(plain)
+        self.plant.advance_to(now_ns)
+        if self.plant.steps == self._sampled_steps:
+            return              # right after a late tick: there is nothing new to measure
+        self._sampled_steps = self.plant.steps
+        for topic, plain in self.plant.sample(now_ns).items():
+            self.send(topic, plain)
+
+
+def main(args=None):
+    """Run the node; return its exit code."""
+    return run(JointSimulator, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,170 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The joint's controller on a clock: it tracks, vents on every fault, and holds what is asked."""
+
+import math
+
+import numpy as np
+from pam_actuation.control import tick as codes
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.joint_loop import JointControllerLoop
+from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.reference import ReferenceLoop
+from pam_actuation.joint_plant_loop import JointPlantLoop, SIDES
+from pam_actuation.messages import AngleReference, JointAngle, Pressure
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+from pam_sim.units import P_ATM_PA
+import pytest
+
+MS_NS = 1_000_000
+PERIOD_NS = 5 * MS_NS
+START_NS = 1_000_000_000
+
+
+@pytest.fixture(scope='module')
+def joint():
+    return load_joint('joint_dmsp_5_300_realistic', valve='ppr')
+
+
+@pytest.fixture
+def loop(joint):
+    return JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint.range_rad)
+
+
+class Bench:
+    """Plant, two drivers, controller and reference, tick by tick as the nodes run them."""
+
+    def __init__(self, joint, loop, reference=None, seed=3):
+        self.joint, self.loop, self.reference = joint, loop, reference
+        self.plant = JointPlantLoop(joint, seed=seed)
+        self.drivers = [DriverLoop('ppr', driver_config(rig))
+                        for rig in (joint.flexor, joint.extensor)]
+        self.now_ns = START_NS
+        self.plant.advance_to(self.now_ns)
+        self.ticks = 0
+
+    def tick(self, angle=None):
+        """Run one period; return the true angle [rad] and the commands."""
+        self.now_ns += PERIOD_NS
+        self.plant.advance_to(self.now_ns)
+        messages = self.plant.sample(self.now_ns)
+        if self.reference is not None:
+            for topic, plain in self.reference.tick(self.now_ns).items():
+                getattr(self.loop, f'on_{topic}')(plain)
+        state = messages['joint_state']
+        self.loop.on_joint_state(state if angle is None else angle)
+        for k, side in enumerate(SIDES):
+            self.loop.on_pressure(k, messages[f'{side}/pressure'])
+            self.loop.on_force(k, messages[f'{side}/force'])
+        commands, self.state = self.loop.tick(self.now_ns)
+        self.ticks += 1
+        for k, (side, driver) in enumerate(zip(SIDES, self.drivers)):
+            driver.on_pressure(messages[f'{side}/pressure'])
+            driver.on_command(commands[k], self.ticks)
+            self.plant.signals[side].take(driver.tick(self.now_ns)[0])
+        return self.plant.plant.angle_rad, commands
+
+
+def internal(state, name):
+    return state.values[state.names.index(name)]
+
+
+def test_it_tracks_a_sine_of_the_joint(joint, loop):
+    experiment = load_experiment('joint_sine')
+    bench = Bench(joint, loop, ReferenceLoop(experiment, 200.0))
+    errors = []
+    for _ in range(11 * 400):       # eight cycles of the sine
+        angle, _ = bench.tick()
+        errors.append(experiment.at(bench.reference.elapsed_s(bench.now_ns))[0] - angle)
+    degrees = np.degrees(errors)
+    first, last = (math.sqrt(np.mean(part ** 2)) for part in (degrees[1200:1600], degrees[-400:]))
+    assert last < 0.3 < first
+    assert loop.reason == codes.REASONS[codes.OK]
+    assert internal(bench.state, 'extensor_pressure_pa') > P_ATM_PA + 50e3
+
+
+@pytest.mark.parametrize('spoiled, reason', [
+    (lambda now: JointAngle(now, math.nan), codes.ANGLE_NOT_FINITE),
+    (lambda now: JointAngle(now, 2.5), codes.ANGLE_IMPLAUSIBLE),
+    (lambda now: JointAngle(now - 200 * MS_NS, 0.0), codes.ANGLE_OLD),
+    (lambda now: JointAngle(now + 200 * MS_NS, 0.0), codes.ANGLE_AHEAD)])
+def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, reason):
+    bench = Bench(joint, loop)
+    loop.on_joint_reference(AngleReference(START_NS, 0.1, 0.0))
+    for _ in range(20):
+        _, commands = bench.tick()
+    assert min(command.pressure_pa for command in commands) > P_ATM_PA + 10e3
+    _, commands = bench.tick(spoiled(bench.now_ns + PERIOD_NS))
+    assert [command.pressure_pa for command in commands] == [P_ATM_PA] * 2
+    assert loop.reason == codes.REASONS[reason]
+    _, commands = bench.tick()
+    assert loop.reason == codes.REASONS[codes.OK]
+    assert internal(bench.state, 'tick') == 21
+
+
+def test_without_reference_or_with_one_long_lost_it_vents(joint, loop):
+    bench = Bench(joint, loop)
+    bench.tick()
+    assert loop.reason == codes.REASONS[codes.NO_REFERENCE]
+    loop.on_joint_reference(AngleReference(bench.now_ns, 0.1, 0.0))
+    seen = []
+    for _ in range(460):
+        _, commands = bench.tick()
+        seen.append(loop.reason)
+    assert list(dict.fromkeys(seen)) == [codes.REASONS[code] for code in (
+        codes.OK, codes.REFERENCE_HELD, codes.REFERENCE_LOST)]
+    assert [command.pressure_pa for command in commands] == [P_ATM_PA] * 2
+
+
+def test_a_reference_that_is_not_finite_is_counted_and_ignored(loop):
+    loop.on_joint_reference(AngleReference(START_NS, math.inf, 0.0))
+    assert loop.rejected_references == 1
+    assert loop.references.reference is None
+
+
+def test_co_contraction_follows_what_is_asked_within_the_limits(joint, loop):
+    bench = Bench(joint, loop)
+    means = []
+    for wanted in (300e3, 200e3, math.nan, 5e6):
+        loop.on_co_contraction(Pressure(bench.now_ns, P_ATM_PA + wanted))
+        for _ in range(300):
+            loop.on_joint_reference(AngleReference(bench.now_ns, 0.0, 0.0))
+            _, commands = bench.tick()
+        means.append(np.mean([command.pressure_pa for command in commands]) - P_ATM_PA)
+    assert means[0] == pytest.approx(300e3, abs=1.0)
+    assert means[1:3] == pytest.approx([200e3, 200e3], abs=1.0)
+    # As far up as the difference that holds the angle leaves room for.
+    assert means[2] < means[3] <= loop.controller.settings['max_pressure_gauge_pa']
+
+
+def test_each_loop_refuses_the_controller_of_the_other(joint):
+    with pytest.raises(InputError, match='single muscle'):
+        JointControllerLoop(load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic')))
+    with pytest.raises(InputError, match='joint'):
+        ControllerLoop(load_controller('sofc_joint_ppr', joint))
+
+
+def test_a_reference_step_of_the_angle_is_a_jump_and_no_steep_ramp(loop):
+    from pam_actuation.messages import AngleTrajectory
+    assert loop.references.set_trajectory(AngleTrajectory(
+        START_NS, (0, 20 * MS_NS), (0.0, 0.2), (0.0, 0.0)))
+    now_ns = START_NS + 10 * MS_NS
+    assert loop.references.at(now_ns, START_NS + 19 * MS_NS) == (0.0, 0.0)
+    assert loop.references.at(now_ns, START_NS + 20 * MS_NS) == (0.2, 0.0)

@@ -1,0 +1,96 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The rig cut at measured signals: what is missing in one part leaves no trace in the other."""
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_sim.gap.cuts import acts_on, cuts_of
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.noise import noise_of
+from pam_sim.gap.parts import FIT, SELECT
+import pytest
+
+
+def errors(rig, given=None, **options):
+    """Return subsystem -> (cut, errors of the given model on a recording of the rig)."""
+    given = given or nominal()
+    recording = Recording(recorded(rig, voltages(12.0), **options), 'ppr')
+    found = {}
+    for cut in cuts_of(given, [recording]):
+        known = np.zeros(len(cut.known))
+        if cut.subsystem == 'valve':
+            known[[k.name for k in cut.known].index('latency')] = -1.0     # there is none
+        found[cut.subsystem] = (cut, cut.errors(given, known))
+    return found
+
+
+def with_effect(name, **parameters):
+    return nominal().with_(effects=[{'name': name, 'parameters': parameters}])
+
+
+def test_the_true_model_leaves_noise_in_both_cuts():
+    for cut, left in errors(nominal()).values():
+        assert 0.4 < cut.chi2(left, FIT) < 1.1 and 0.4 < cut.chi2(left, SELECT) < 1.1
+
+
+@pytest.mark.parametrize('effect, here, there', [
+    ('valve_dead_time', 'valve', 'muscle'), ('coulomb_friction', 'muscle', 'valve'),
+    ('guide_friction', 'muscle', 'valve')])
+def test_an_effect_shows_in_its_own_cut_only(effect, here, there):
+    found = errors(with_effect(effect))
+    cut, left = found[here]
+    assert cut.chi2(left, SELECT) > 50.0
+    cut, left = found[there]
+    assert cut.chi2(left, SELECT) < 1.1
+    assert acts_on(effect, here) and not acts_on(effect, there)
+
+
+@pytest.mark.parametrize('sensor, parameters', [
+    ('pressure_bias', {'bias_pa': 4e3}), ('pressure_gain', {'gain_error': 0.03}),
+    ('pressure_lag', {'time_constant_s': 0.006}), ('contraction_bias', {'bias_m': 3e-4})])
+def test_a_known_sensor_effect_is_taken_out_of_the_input(sensor, parameters):
+    rig = with_effect(sensor, **parameters)
+    cut, left = errors(rig)['muscle']
+    assert cut.chi2(left, SELECT) > 2.0
+    cut, left = errors(rig, given=rig)['muscle']
+    assert cut.chi2(left, SELECT) < 1.5
+
+
+def test_a_force_recorded_in_one_of_two_runs_is_used():
+    first = Recording(recorded(nominal(), voltages(8.0), topics=('pressure', 'contraction')),
+                      'ppr')
+    second = Recording(recorded(nominal(), voltages(8.0), seed=1), 'ppr')
+    cut = cuts_of(nominal(), [first, second])[1]
+    assert cut.signals == ('contraction', 'force')
+    # At 200 Hz: 8 s of contraction in both, of force in one.
+    assert [int((cut.signal == s).sum() // 800) for s in range(2)] == [3, 1]
+
+
+def test_noise_with_a_memory_is_measured_where_the_signal_rests():
+    random = np.random.default_rng(0)
+    time_s = np.arange(0.0, 40.0, 0.002)
+    keep = np.exp(-0.002 / 0.015)
+    slow = np.zeros(time_s.size)
+    drive = np.sqrt(0.5 * (1.0 - keep ** 2)) * random.standard_normal(time_s.size)
+    for k in range(1, time_s.size):
+        slow[k] = keep * slow[k - 1] + drive[k]
+    noise = slow + np.sqrt(0.5) * random.standard_normal(time_s.size)
+    motion = np.where(time_s % 8.0 < 3.0, 0.0, 200.0 * np.sin(np.pi * time_s))
+    found = noise_of(time_s, motion + noise)
+    assert found.sd == pytest.approx(1.0, rel=0.15)
+    assert found.white_sd == pytest.approx(np.sqrt(0.5), rel=0.1)
+    assert np.std(found.draw(time_s, random)) == pytest.approx(found.sd, rel=0.1)
+    white = noise_of(time_s, motion + random.standard_normal(time_s.size))
+    assert white.slow_sd == 0.0 and white.sd == pytest.approx(1.0, rel=0.05)

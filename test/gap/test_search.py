@@ -1,0 +1,97 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Naming: one effect of every kind, rivals that stay together, abstention."""
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.effects.registry import effects
+from pam_sim.gap import find_gap
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.compare import preference, share
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Hypothesis, Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.look_alikes import look_alikes
+from pam_sim.gap.parts import SELECT
+import pytest
+
+
+def result_of(name, seconds=20.0, **parameters):
+    rig = nominal().with_(effects=[{'name': name, 'parameters': parameters}])
+    return find_gap(recorded(rig, voltages(seconds)), nominal())
+
+
+@pytest.mark.parametrize('formulation, parameters, name, quantity, truth', [
+    ('tube_lag', {'time_constant_s': 0.015}, 'tube_lag', 'time_constant_s', 0.015),
+    ('hysteresis_lugre', {}, 'hysteresis', 'loop_half_width_at_400kpa_n', None),
+    ('end_taper', {'k_minus_1': 0.06}, 'end_taper', 'k_minus_1', 0.06),
+    ('pressure_bias', {'bias_pa': 4e3}, 'pressure_bias', 'bias_pa', 4e3)])
+def test_an_effect_is_named_with_its_size(formulation, parameters, name, quantity, truth):
+    result = result_of(formulation, **parameters)
+    assert result.verdict == 'effects'
+    assert [e['name'] for e in result.effects] == [name]
+    assert result.ambiguity_set == [name]
+    said = result.effects[0]['equivalent'][quantity]
+    if truth is not None:
+        assert said['value'] == pytest.approx(truth, rel=0.1)
+        assert said['ci95'][0] <= truth <= said['ci95'][1]
+    added = load_rig(result.model_yaml).effects
+    assert [effects()[e.name].variant_of or e.name for e in added] == [name]
+    assert 'ci95' in added[0].source
+
+
+def test_a_cause_that_no_effect_explains_stays_unknown():
+    run = recorded(nominal(), voltages(20.0))
+    at = run.topics['contraction'].time_s(run.start_ns)
+    # A second body touches now and then; nothing in the model knows when.
+    run.topics['contraction'].values['contraction_m'] += 4e-4 * (np.sin(7.3 * at) > 0.8)
+    result = find_gap(run, nominal())
+    assert result.verdict == 'unknown' and result.effects == []
+    assert result.unexplained_fraction == 1.0
+    assert load_rig(result.model_yaml).effects == []
+
+
+def test_names_can_be_limited():
+    rig = nominal().with_(effects=[
+        {'name': 'valve_hysteresis', 'parameters': {'half_width_pa': 3e3}}])
+    result = find_gap(recorded(rig, voltages(12.0)), nominal(), effects=['valve_hysteresis'])
+    assert [e['name'] for e in result.effects] == ['valve_hysteresis']
+    assert {e['name'] for e in result.evidence} <= {'valve_hysteresis', 'T_m', 'K_m'}
+
+
+def test_a_formulation_never_fits_worse_than_the_one_it_contains():
+    rig = nominal().with_(effects=[
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 1.0}}])
+    recording = Recording(recorded(rig, voltages(12.0)), 'ppr')
+    problem = Problem(nominal(), cuts_of(nominal(), [recording]))
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
+    coulomb = by_name['coulomb_friction']
+    one = problem.fit(Hypothesis((coulomb,)), [0.5])
+    two = problem.fit(Hypothesis((coulomb, by_name['end_taper'])), [*one.theta, 0.0], one)
+    assert problem.cost(one) < 0.05 * problem.cost(problem.base)
+    assert problem.cost(two) < 1.01 * problem.cost(one)
+    cut = problem.cuts[1]
+    base = problem.base.errors['muscle']
+    assert share(cut, base, one.errors['muscle']) > 0.95
+    assert preference(cut, base, one.errors['muscle'], base, SELECT) > 3.0
+    assert preference(cut, base, base, one.errors['muscle'], SELECT) < -3.0
+
+
+def test_an_effect_knows_its_look_alikes_and_its_least_size():
+    run = recorded(nominal(), voltages(12.0))
+    found = look_alikes(run, nominal(), 'coulomb_friction')
+    assert 'pressure_friction' in [name for name, _ in found['alike']]
+    assert 0.0 < found['least']['value'] < 0.5 and found['least']['unit'] == 'N'

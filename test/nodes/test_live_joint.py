@@ -1,0 +1,116 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A joint on real nodes: two drivers, one controller, one simulated limb."""
+
+import math
+import signal
+import time
+
+from live_rig import LiveRig, wait_for
+from pam_actuation.messages import Pressure
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import from_ros, RosWriter, type_of
+from pam_sim.units import P_ATM_PA
+import pytest
+
+pytestmark = pytest.mark.ros
+
+EXPERIMENT = """
+name: to_an_angle
+domain: joint_angle
+segments:
+  - rest: {duration_s: 1.0}
+  - ramp: {to_rad: 0.3, duration_s: 1.5}
+  - hold: {duration_s: 60.0}
+"""
+SIDES = ('flexor', 'extensor')
+TOPICS = ('joint_state', 'joint_reference', *(
+    f'{side}/{topic}' for side in SIDES
+    for topic in ('pressure', 'pressure_command', 'valve_signal')))
+
+
+@pytest.fixture
+def knee(tmp_path):
+    """Return the running joint; ``heard`` of a topic is its messages in order."""
+    file = tmp_path / 'experiment.yaml'
+    file.write_text(EXPERIMENT)
+    rig = LiveRig(tmp_path, namespace='/knee')
+    try:
+        for side in SIDES:
+            rig.start('valve_driver', below=side, rig='dmsp_5_300_realistic')
+        rig.start('joint_simulator', seed=5)
+        rig.start('joint_controller')
+        rig.start('reference_generator', experiment=str(file), await_receiver=True)
+        rig.listen()
+        rig.heard.update({topic: [] for topic in TOPICS})
+        for topic in TOPICS:
+            rig.node.create_subscription(
+                type_of(topic), topic,
+                lambda message, topic=topic: rig.heard[topic].append(from_ros(topic, message)),
+                qos.reliable(1000))
+        yield rig
+    finally:
+        rig.close()
+
+
+def send(rig, topic, plain_at):
+    """Return a function that publishes what ``plain_at`` makes of the present time."""
+    publisher, writer = rig.node.create_publisher(type_of(topic), topic, 10), RosWriter(topic)
+    return lambda: publisher.publish(writer.fill(plain_at(time.time_ns())))
+
+
+def newest(rig, topic):
+    return rig.heard[topic][-1]
+
+
+def vented(rig):
+    return all(newest(rig, f'{side}/valve_signal').efforts == (0.0,) for side in SIDES)
+
+
+def holds(rig, angle_rad):
+    recent = rig.heard['joint_state'][-100:]
+    return len(recent) == 100 and all(abs(m.angle_rad - angle_rad) < 0.03 for m in recent)
+
+
+def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(knee):
+    wait_for(lambda: holds(knee, 0.3), 90.0, 'the angle of the experiment')
+    assert math.isclose(newest(knee, 'joint_reference').angle_rad, 0.3)
+    for side in SIDES:      # both pull: co-contraction
+        assert newest(knee, f'{side}/pressure').pressure_pa > P_ATM_PA + 100e3
+
+    # Stiffer at the same angle.
+    stiffen = send(knee, 'co_contraction', lambda now: Pressure(now, P_ATM_PA + 400e3))
+
+    def stiff():
+        stiffen()
+        mean = sum(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES) / 2.0
+        return mean > P_ATM_PA + 380e3
+    wait_for(stiff, 30.0, 'the wanted co-contraction')
+    wait_for(lambda: holds(knee, 0.3), 30.0, 'the angle after the change of stiffness')
+
+    knee.processes['joint_controller'].send_signal(signal.SIGKILL)
+    wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')
+    wait_for(lambda: max(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES)
+             < P_ATM_PA + 20e3, 30.0, 'the air of both muscles to leave')
+
+
+def test_both_muscles_are_vented_when_the_controller_is_ended(knee):
+    commands = [f'{side}/pressure_command' for side in SIDES]
+    wait_for(lambda: all(knee.heard[topic] and newest(knee, topic).pressure_pa > P_ATM_PA + 50e3
+                         for topic in commands), 90.0, 'commands for both muscles')
+    process = knee.processes['joint_controller']
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(20.0) and process.exit_code == 0
+    wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')

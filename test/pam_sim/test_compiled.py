@@ -1,0 +1,114 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Machine code stored on disk is made anew when any of its sources changes."""
+
+import importlib
+import inspect
+from pathlib import Path
+import pkgutil
+import subprocess
+import sys
+
+from numba.core.caching import NullCache
+import pam_actuation
+import pam_sim
+from pam_sim.compiled import source_key, sources
+import pytest
+
+FLOW = """
+from pam_sim.compiled import compiled
+
+@compiled
+def flow(x):
+    return {factor} * x
+"""
+DRIVER = """
+from numba import njit
+from pam_sim.compiled import compiled, source_key
+{imported}
+
+LIMIT = 5.0
+
+@compiled
+def _step(x):
+    return min({called}(x), LIMIT)
+
+def _entry(key):
+    @njit(cache=True)
+    def step(x):
+        return _step(x) if key >= 0 else 0.0
+    return step
+
+step = _entry(source_key(_step))
+"""
+
+
+def stepped(folder):
+    """Return what ``step(1.0)`` is in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, '-c', 'import stored_driver; print(stored_driver.step(1.0))'],
+        cwd=folder, capture_output=True, text=True, check=True)
+    return float(done.stdout)
+
+
+@pytest.mark.parametrize('imported, called', [
+    ('from stored_flow import flow', 'flow'), ('import pam_stored.flow as law', 'law.flow')])
+def test_a_changed_source_of_a_stored_function_is_noticed(
+        tmp_path, monkeypatch, imported, called):
+    monkeypatch.setenv('PYTHONPATH', str(Path(pam_sim.__file__).parents[1]))
+    (tmp_path / 'pam_stored').mkdir()
+    (tmp_path / 'pam_stored' / '__init__.py').touch()
+    (tmp_path / 'stored_driver.py').write_text(DRIVER.format(imported=imported, called=called))
+    for factor in (2.0, 3.0):
+        for flow in ('stored_flow.py', 'pam_stored/flow.py'):
+            (tmp_path / flow).write_text(FLOW.format(factor=factor))
+        assert stepped(tmp_path) == factor
+    assert list(tmp_path.glob('__pycache__/stored_driver*.nbi'))     # stored it was
+
+
+def every_module():
+    """Import every module of both packages; return them."""
+    found = []
+    for package in (pam_sim, pam_actuation):
+        for info in pkgutil.walk_packages(package.__path__, f'{package.__name__}.'):
+            # Templates become modules of the cache folder, keyed by the hash of their sources.
+            if not info.name.endswith('_template'):
+                found.append(pytest.importorskip(info.name) if '.nodes' in info.name
+                             else importlib.import_module(info.name))
+    return found
+
+
+def test_every_stored_function_knows_its_sources():
+    stored = 0
+    for module in every_module():
+        for name, function in vars(module).items():
+            if isinstance(getattr(function, '_cache', None), NullCache) \
+                    or not hasattr(function, 'py_func') \
+                    or function.py_func.__module__ != module.__name__:
+                continue
+            stored += 1
+            files, _ = sources(function)
+            if len(files) > 1:
+                keyed = inspect.getclosurevars(function.py_func).nonlocals
+                assert 'key' in keyed, f'{module.__name__}.{name} is stored without a key'
+    assert stored > 5
+
+
+def test_the_key_tells_of_files_and_constants():
+    from pam_actuation.drivers.hsv_kernel import hsv_step
+    files, constants = sources(hsv_step)
+    assert {'hsv_kernel.py', 'flow.py'} <= {file.name for file in files}
+    assert 'GAS_CONSTANT_AIR = 287.0' in ''.join(constants)
+    assert source_key(hsv_step) == source_key(hsv_step)
