@@ -49,6 +49,24 @@ def late_by(measurement):
     return {'contraction': skew, 'force': skew + measurement.get('force_skew', 0.0)}
 
 
+def free_run_of(problem, found, recording, start_error_pa=0.0):
+    """Return the whole-chain free run of a fit at the stamps of a recording, by signal."""
+    _, measurement = numbers_of(problem, found)
+    return free_run(model_of(problem, found), recording, measurement['latency'],
+                    start_error_pa=start_error_pa, late_s=late_by(measurement))
+
+
+def moved(recording, first, second, chosen=None):
+    """Return by signal how far two runs are apart (rms), in standard deviations of its sensor."""
+    found = {}
+    for s in recording.signals:
+        noise = noise_of(recording.time_s[s], recording.measured[s]).sd
+        apart = first[s] - second[s]
+        apart = apart[recording.time_s[s] > SETTLE_S] if chosen is None else apart[chosen[s]]
+        found[s] = float(np.sqrt(np.mean(apart ** 2)) / max(noise, 1e-12))
+    return found
+
+
 class Proof:
     """
     Free runs of a model before and after on one recording.
@@ -86,8 +104,7 @@ class Proof:
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.problem, found)
         start = 0.0 if whole else measurement.get('start_error', 0.0)
-        return free_run(model_of(self.problem, found), self.recording, measurement['latency'],
-                        start_error_pa=start, late_s=late_by(measurement))
+        return free_run_of(self.problem, found, self.recording, start)
 
     def signals(self):
         """Return the SignalGap of every signal."""
@@ -103,9 +120,7 @@ class Proof:
 
     def moved(self, found, whole):
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
-        other = self.run(found, whole)
-        return {s: float(np.sqrt(np.mean((self.after[s] - other[s])[self.part[s]] ** 2))
-                         / max(self.noise[s], 1e-12)) for s in self.recording.signals}
+        return moved(self.recording, self.after, self.run(found, whole), self.part)
 
     def unexplained(self):
         """Return the share of the squared gap left after calibration that is still there."""

@@ -37,6 +37,7 @@ MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 FIRST_STEP = 0.25            # least share of the gap a first effect explains
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
@@ -113,11 +114,15 @@ class Search:
         Names to try; all by default.
     out_of_time : callable
         Returns whether the search should come to an end.
+    matters : callable, optional
+        ``matters(with, without)``: whether two fits differ by enough for a name, in a free
+        run; asked of every effect once there are several.
 
     """
 
-    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False):
-        self.problem, self.out_of_time = problem, out_of_time
+    def __init__(self, problem, seen_gap, least_gap, only=None, out_of_time=lambda: False,
+                 matters=lambda found, without: True):
+        self.problem, self.out_of_time, self.matters = problem, out_of_time, matters
         self.seen_gap, self.least_gap = seen_gap, least_gap
         outputs = sum((cut.signals for cut in problem.cuts), ())
         self.only, self.pool = only, candidates(problem.rig, outputs, only)
@@ -152,8 +157,11 @@ class Search:
         current, named = self._eliminate(current, named)
         current, named = self._resolve(current, named)
         explained = self._explained(current)
+        small = {c.subsystem for c in self.problem.cuts
+                 if gap(c, current.errors[c.subsystem]) < NEAR_FLOOR}
         for w in list(named):        # what explains too little is no name
-            if explained.get(w.subsystem, 0.0) < NAMED:
+            least = RIVAL if w.subsystem in small else NAMED
+            if explained.get(w.subsystem, 0.0) < least:
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
@@ -414,7 +422,8 @@ class Search:
             rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
             gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
             sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
-            if gained < LATER_STEP * rest or sure < CERTAIN_T:
+            if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
+                    current, without):
                 current, named = without, [o for o in named if o is not w]
         return current, named
 

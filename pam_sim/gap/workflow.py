@@ -26,11 +26,11 @@ from pam_sim.gap.free_run import Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
-from pam_sim.gap.prove import model_of, numbers_of, Proof
+from pam_sim.gap.prove import free_run_of, model_of, moved, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
-from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95
+from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95, NUMERICS
 from pam_sim.gap.words import explain
 from scipy.stats import norm
 
@@ -88,14 +88,19 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     problem = Problem(rig, cuts)
     progress(0.1)
     deadline = started + seconds
+    # Its valve signal alone: what was measured on it stays untouched until the proof.
+    witness = Recording(certify, rig.valve, driven) if certify else recordings[0]
+
+    def matters(found, without):
+        runs = (free_run_of(problem, f, witness) for f in (found, without))
+        return max(moved(witness, *runs).values()) > materiality
+
     outcome = Search(problem, SEEN_GAP, LEAST_GAP * min(materiality, 1.0), effects,
-                     lambda: time.perf_counter() > deadline).run()
+                     lambda: time.perf_counter() > deadline, matters).run()
     progress(0.8)
     problem.use = (FIT, SELECT)
     final, base = problem.polish(outcome.final), problem.refit_base()
-    proof = Proof(certify or runs[0],
-                  Recording(certify, rig.valve, driven) if certify else recordings[0],
-                  certify is not None, problem, base, final, seed)
+    proof = Proof(certify or runs[0], witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
@@ -140,9 +145,8 @@ def _fill(result, problem, outcome, final, proof):
 def _judge(result, outcome, problem, proof, base, materiality, whole):
     """Set verdict, ambiguity set and the unexplained fraction of a result."""
     named = outcome.named
-    moved = proof.moved(base, whole) if named else {}
-    material = max(moved.values(), default=0.0) > materiality
-    result.moved = moved
+    result.moved = proof.moved(base, whole) if named else {}
+    material = max(result.moved.values(), default=0.0) > materiality
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:
@@ -188,8 +192,8 @@ def _calibrated(problem, found, covariance):
             if known.name in freed:
                 place = count + freed.index(known.name)
                 deviation = float(np.sqrt(covariance[place, place]))
-            half = NORMAL_95 * deviation * known.sd
             value = numbers[known.name]
+            half = math.hypot(NORMAL_95 * deviation * known.sd, NUMERICS * value)
             listed.append(Calibrated(known.name, known.unit, known.value, value,
                                      (value - half, value + half), float(z)))
     return listed
