@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The generator and the scorer live beside their tests; runs from the source tree as it stands.
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
-from asking import pam_gap  # noqa: E402
+from asking import pam_gap  # noqa: E402, I100
 from scoring_table import scored, table  # noqa: E402
 from scoring_text import report  # noqa: E402
 import truth_cases  # noqa: E402
