@@ -24,6 +24,9 @@ them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
 from dataclasses import dataclass
 import math
 
+# Virtual clocks start here, not at the date of the run.
+START_NS = 1_000_000_000 * 1_000_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Pressure:
