@@ -26,6 +26,9 @@ import math
 
 # Virtual clocks start here, not at the date of the run.
 START_NS = 1_000_000_000 * 1_000_000_000
+# Of a valve signal, by valve type: the names of its efforts, and the efforts that vent.
+VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
+SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 
 
 @dataclass(frozen=True, slots=True)
