@@ -121,6 +121,7 @@ setup(
     entry_points={
         'console_scripts': [
             'valve_driver = pam_actuation.nodes.valve_driver:main',
+            'valve_watchdog = pam_actuation.nodes.valve_watchdog:main',
             'plant_simulator = pam_actuation.nodes.plant_simulator:main',
             'sofc_controller = pam_actuation.nodes.sofc_controller:main',
             'pid_controller = pam_actuation.nodes.pid_controller:main',
