@@ -36,12 +36,14 @@ from scipy.optimize import least_squares
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
 FREE_BOX = 60.0
+HELD_BOX = 1e-3
 FREE_SD = 30.0               # factor on the deviation of the prior of a freed number
 EFFECT_STEP = 0.01           # of a parameter of an effect, relative
 ROUNDS = 4
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
+SCORE_BLOCKS = 4             # test blocks whose scores are summed
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
@@ -113,6 +115,29 @@ class Found:
         return [c.setting(v) for c, v in zip(self.hypothesis.effects, self.values())]
 
 
+@dataclass(frozen=True)
+class Precision:
+    """
+    How well what a hypothesis adds is known: theta, then freed numbers in deviations.
+
+    Attributes
+    ----------
+    likelihood : numpy.ndarray, shape (K, K)
+        Covariance by the tempered likelihood and the priors.
+    blocks : numpy.ndarray, shape (K, K)
+        Covariance by how much the scores of time blocks differ: errors that last through a
+        block count once (White 1980, for clusters).
+    held : numpy.ndarray, shape (K,)
+        Solution with latency and skew of the measurement at their prior. What they took
+        up of a delay may have been the effect's own.
+
+    """
+
+    likelihood: np.ndarray
+    blocks: np.ndarray
+    held: np.ndarray
+
+
 class Problem:
     """
     The cuts of a rig, ready for hypotheses.
@@ -152,7 +177,7 @@ class Problem:
         """Return the given model with entries of a model file added."""
         return self.rig.with_(effects=[*self.rig.effects, *effects])
 
-    def fit(self, hypothesis, theta=(), near=None):
+    def fit(self, hypothesis, theta=(), near=None, hold=False):
         """
         Fit a hypothesis.
 
@@ -164,6 +189,8 @@ class Problem:
             Start of the normalised parameters of its effects.
         near : Found, optional
             Where known numbers, weights and untouched cuts start; the baseline by default.
+        hold : bool
+            Whether latency and skew of the measurement stay at their prior.
 
         Returns
         -------
@@ -174,7 +201,7 @@ class Problem:
         touched = [cut for cut in self.cuts if hypothesis.touches(cut)]
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
         search = _Search(self, hypothesis, touched, {
-            c.subsystem: np.ones(len(c.signals)) for c in touched})
+            c.subsystem: np.ones(len(c.signals)) for c in touched}, hold)
         # The baseline's numbers are bent by what is missing; a better model starts unbent.
         bent = near is self.base
         x = np.concatenate([np.asarray(theta, float)] + [
@@ -202,25 +229,28 @@ class Problem:
         return sum(float(np.mean(found.errors[c.subsystem][np.isin(c.part, self.use)] ** 2))
                    for c in self.cuts)
 
-    def covariance(self, found):
-        """
-        Return the covariance of what a hypothesis adds: (theta, freed numbers in deviations).
-
-        From the tempered likelihood and the priors, with slopes taken at the solution.
-        """
+    def precision(self, found):
+        """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)
         touched = [c for c in self.cuts if found.hypothesis.touches(c)]
         search = _Search(self, found.hypothesis, touched, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
-        slope = search.slopes(x)
+        slope, residuals = search.slopes(x), search.residuals(x)
+        held = self.fit(found.hypothesis, found.theta, found, hold=True)
         self.slopes = kept
         # What the data do not touch is unknown, not certain.
         whole = np.linalg.inv(slope.T @ slope + UNTOUCHED * np.eye(x.size))
+        data = slope.shape[0] - search.prior.size
+        scores = np.zeros((search.blocks()[-1] + 1, x.size))
+        np.add.at(scores, search.blocks(), slope[:data] * residuals[:data, np.newaxis])
+        between = scores.T @ scores + slope[data:].T @ slope[data:]
         names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
         chosen = [j for j, n in enumerate(names) if n is None] + [
             names.index(n) for n in found.hypothesis.freed]
-        return whole[np.ix_(chosen, chosen)]
+        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in touched])
+        pick = np.ix_(chosen, chosen)
+        return Precision(whole[pick], (whole @ between @ whole)[pick], z[chosen])
 
     def fit_base(self):
         """Return the baseline: known numbers fitted to the parts that are used now."""
@@ -237,7 +267,7 @@ class Problem:
 class _Search:
     """One least-squares problem; x holds the effects' parameters, then each cut's numbers."""
 
-    def __init__(self, problem, hypothesis, cuts, temper):
+    def __init__(self, problem, hypothesis, cuts, temper, hold=False):
         self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
         self.free = [f for c in hypothesis.effects for f in c.free]
         self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
@@ -249,6 +279,8 @@ class _Search:
             for k, at_least, at_most in zip(cut.known, lowest, highest):
                 freed = k.name in hypothesis.freed
                 box = FREE_BOX if freed or not k.of_rig else BOX
+                if hold and k.unit == 's' and not k.of_rig:
+                    box = HELD_BOX
                 low.append(max(at_least, -box))
                 high.append(min(at_most, box))
                 self.prior.append(FREE_SD if freed else 1.0)
@@ -306,6 +338,14 @@ class _Search:
             columns[row:row + len(slope), column:column + len(cut.known)] = slope
             row, column = row + len(slope), column + len(cut.known)
         return columns
+
+    def blocks(self):
+        """Return the number of the block of every weighted error, rising, cut by cut."""
+        found, first = [], 0
+        for cut in self.cuts:
+            found.append(first + cut.block[self.masks[cut.subsystem]] // SCORE_BLOCKS)
+            first = int(found[-1].max()) + 1
+        return np.concatenate(found)
 
     def run(self, x):
         """Return the solution from a start."""

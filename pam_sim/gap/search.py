@@ -25,7 +25,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, LATER_STEP, Named, RIVAL, Rival
+from pam_sim.gap.choice import Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
@@ -233,10 +233,8 @@ class Search:
 
     def _best_of_name(self, rivals):
         best = {}
-        for r in rivals:
-            known = best.get(r.name)
-            if known is None or sum(r.share.values()) > sum(known.share.values()):
-                best[r.name] = r
+        for r in sorted(rivals, key=lambda r: CLOSE * r.at_edge - sum(r.share.values())):
+            best.setdefault(r.name, r)
         return list(best.values())
 
     # -- state -----------------------------------------------------------------------------
