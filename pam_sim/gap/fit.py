@@ -233,24 +233,44 @@ class Problem:
         """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)
+        chosen, covariances = self._covariances(found)
+        held = self.fit(found.hypothesis, found.theta, found, hold=True)
+        self.slopes = kept
+        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in self.cuts
+                                           if found.hypothesis.touches(c)])
+        return Precision(*covariances, z[chosen])
+
+    def certainty(self, found, place):
+        """Return by how many standard deviations the size of an effect differs from none."""
+        kept = dict(self.slopes)
+        self.take_slopes(found.settings(), found.known_z)
+        _, covariances = self._covariances(found)
+        self.slopes = kept
+        effect, rows = found.hypothesis.effects[place], found.hypothesis.rows(place)
+        size = [j for j, f in enumerate(effect.free) if f in effect.amplitudes]
+        if not size:                 # shapes alone have no value that means none
+            return np.inf
+        theta = found.theta_of(place)[size]
+        return min(float(np.sqrt(theta @ np.linalg.pinv(c[rows, rows][np.ix_(size, size)])
+                                 @ theta)) for c in covariances)
+
+    def _covariances(self, found):
+        """Return (columns of what is added, its covariances by likelihood and by blocks)."""
         touched = [c for c in self.cuts if found.hypothesis.touches(c)]
         search = _Search(self, found.hypothesis, touched, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
-        slope, residuals = search.slopes(x), search.residuals(x)
-        held = self.fit(found.hypothesis, found.theta, found, hold=True)
-        self.slopes = kept
+        slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
         # What the data do not touch is unknown, not certain.
         whole = np.linalg.inv(slope.T @ slope + UNTOUCHED * np.eye(x.size))
-        data = slope.shape[0] - search.prior.size
-        scores = np.zeros((search.blocks()[-1] + 1, x.size))
-        np.add.at(scores, search.blocks(), slope[:data] * residuals[:data, np.newaxis])
-        between = scores.T @ scores + slope[data:].T @ slope[data:]
+        scores = np.zeros((blocks[-1] + 1, x.size))
+        np.add.at(scores, blocks, slope[:blocks.size] * residuals[:blocks.size, np.newaxis])
+        priors = slope[blocks.size:]
+        between = scores.T @ scores + priors.T @ priors
         names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
         chosen = [j for j, n in enumerate(names) if n is None] + [
             names.index(n) for n in found.hypothesis.freed]
-        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in touched])
         pick = np.ix_(chosen, chosen)
-        return Precision(whole[pick], (whole @ between @ whole)[pick], z[chosen])
+        return chosen, (whole[pick], (whole @ between @ whole)[pick])
 
     def fit_base(self):
         """Return the baseline: known numbers fitted to the parts that are used now."""

@@ -38,6 +38,7 @@ MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
+CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
 RIVALS = 4                   # that are ranked again when further effects are in
 
@@ -126,7 +127,7 @@ class Search:
             named += taken
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named = self._eliminate(current, named)
-        current, named = self._resolve(current, named)
+        current, named = self._established(*self._resolve(current, named))
         explained = self._explained(current)
         small = {c.subsystem for c in self.problem.cuts
                  if gap(c, current.errors[c.subsystem]) < NEAR_FLOOR}
@@ -306,6 +307,16 @@ class Search:
             if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
                     current, without):
                 current, named = without, [o for o in named if o is not w]
+        return current, named
+
+    def _established(self, current, named):
+        """Drop effects whose size does not clearly differ from none."""
+        for w in list(named):
+            names = [c.name for c in current.hypothesis.effects]
+            if w.name in names and self.problem.certainty(
+                    current, names.index(w.name)) < CERTAIN_SIZE:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
         return current, named
 
     def _resolve(self, current, named):
