@@ -37,6 +37,7 @@ from scipy.optimize import least_squares
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
 FREE_BOX = 60.0
 HELD_BOX = 1e-3
+SHAPE_SD = 2.0               # of the logarithm of a shape; where data say nothing, it is typical
 FREE_SD = 30.0               # factor on the deviation of the prior of a freed number
 EFFECT_STEP = 0.01           # of a parameter of an effect, relative
 ROUNDS = 4
@@ -233,44 +234,53 @@ class Problem:
         """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)
-        chosen, covariances = self._covariances(found)
+        names, likelihood, blocks = self._covariances(found)
         held = self.fit(found.hypothesis, found.theta, found, hold=True)
         self.slopes = kept
+        count = len(found.theta)
+        chosen = [*range(count), *(names.index(n) for n in found.hypothesis.freed)]
         z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in self.cuts
                                            if found.hypothesis.touches(c)])
-        return Precision(*covariances, z[chosen])
+        pick = np.ix_(chosen, chosen)
+        return Precision(likelihood[pick], blocks[pick], z[chosen])
 
     def certainty(self, found, place):
-        """Return by how many standard deviations the size of an effect differs from none."""
+        """
+        Return by how many standard deviations the size of an effect differs from none.
+
+        Its shapes are held: a size that is known only together with a shape is none the less
+        there. Infinite for an effect of shapes alone, of which no value means none.
+        """
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)
-        _, covariances = self._covariances(found)
+        effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
+        held = [first + j for j, f in enumerate(effect.free) if f.shape]
+        size = [first + j for j, f in enumerate(effect.free) if not f.shape]
+        _, *covariances = self._covariances(found, held)
         self.slopes = kept
-        effect, rows = found.hypothesis.effects[place], found.hypothesis.rows(place)
-        size = [j for j, f in enumerate(effect.free) if f in effect.amplitudes]
-        if not size:                 # shapes alone have no value that means none
-            return np.inf
-        theta = found.theta_of(place)[size]
-        return min(float(np.sqrt(theta @ np.linalg.pinv(c[rows, rows][np.ix_(size, size)])
-                                 @ theta)) for c in covariances)
+        theta = found.theta[size]
+        return min((float(np.sqrt(theta @ np.linalg.pinv(c[np.ix_(size, size)]) @ theta))
+                    for c in covariances if size), default=np.inf)
 
-    def _covariances(self, found):
-        """Return (columns of what is added, its covariances by likelihood and by blocks)."""
+    def _covariances(self, found, held=()):
+        """
+        Return (names of all numbers, None for theta; covariance by likelihood; by blocks).
+
+        ``held`` are places that do not move.
+        """
         touched = [c for c in self.cuts if found.hypothesis.touches(c)]
         search = _Search(self, found.hypothesis, touched, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
         slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
+        slope[:, list(held)] = 0.0
         # What the data do not touch is unknown, not certain.
         whole = np.linalg.inv(slope.T @ slope + UNTOUCHED * np.eye(x.size))
-        scores = np.zeros((blocks[-1] + 1, x.size))
+        scores = np.zeros((blocks.max(initial=0) + 1, x.size))
         np.add.at(scores, blocks, slope[:blocks.size] * residuals[:blocks.size, np.newaxis])
         priors = slope[blocks.size:]
         between = scores.T @ scores + priors.T @ priors
         names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
-        chosen = [j for j, n in enumerate(names) if n is None] + [
-            names.index(n) for n in found.hypothesis.freed]
-        pick = np.ix_(chosen, chosen)
-        return chosen, (whole[pick], (whole @ between @ whole)[pick])
+        return names, whole, whole @ between @ whole
 
     def fit_base(self):
         """Return the baseline: known numbers fitted to the parts that are used now."""
@@ -293,7 +303,7 @@ class _Search:
         self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
         low = [f.coordinate(f.lower) for f in self.free]
         high = [f.coordinate(f.upper) for f in self.free]
-        self.prior = []
+        self.prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
         for cut in cuts:
             lowest, highest = cut.bounds()
             for k, at_least, at_most in zip(cut.known, lowest, highest):
@@ -331,15 +341,14 @@ class _Search:
         """Return weighted errors, then the priors."""
         errors = self.errors(x)
         return np.concatenate([self._weighted(c, errors[c.subsystem]) for c in self.cuts]
-                              + [x[len(self.free):] / self.prior])
+                              + [x / self.prior])
 
     def slopes(self, x):
         """Return the derivatives of ``residuals``."""
         base, count = dict(self.errors(x)), len(self.free)
         columns = np.zeros((self.residuals(x).size, x.size))
         rows = columns.shape[0] - self.prior.size
-        columns[rows + np.arange(self.prior.size), count + np.arange(self.prior.size)] = \
-            1.0 / self.prior
+        columns[rows:] = np.diag(1.0 / self.prior)
         last = self._last
         for j in range(count):
             step = EFFECT_STEP * max(abs(x[j]), 0.3)
@@ -361,7 +370,7 @@ class _Search:
 
     def blocks(self):
         """Return the number of the block of every weighted error, rising, cut by cut."""
-        found, first = [], 0
+        found, first = [np.zeros(0, int)], 0
         for cut in self.cuts:
             found.append(first + cut.block[self.masks[cut.subsystem]] // SCORE_BLOCKS)
             first = int(found[-1].max()) + 1
