@@ -142,9 +142,11 @@ _TABLE = {
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }
-_HSV = {'valve_dead_zone': (Free('open_time_s', 1e-3, 0.0, 9e-3),
-                            Free('close_time_s', 1e-3, 0.0, 9e-3))}
-_PPR = {'valve_dead_zone': (Free('half_width_pa', 2e3, 0.0, 5e4),)}
+_SWITCHING = (Free('open_time_s', 1e-3, 0.0, 9e-3), Free('close_time_s', 1e-3, 0.0, 9e-3))
+_HSV = {'valve_dead_zone': _SWITCHING,
+        'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3))}
+_OVERLAP = (Free('half_width_pa', 2e3, 0.0, 5e4),)
+_PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
 # Left is a limit of right: where both explain the data, the simpler one is named.
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}
