@@ -261,6 +261,7 @@ def outlooks(looks, floors=1.0):
     Parameters
     ----------
     looks : Sensitivities
+        Of the protocol.
     floors : float
         An effect shows when it moves some signal by so many noise floors (rms).
 
