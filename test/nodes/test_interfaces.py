@@ -63,7 +63,7 @@ def test_what_comes_with_certain_parameters_is_said_so(made):
 def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
     text = (ROOT / 'config' / 'security' / f'{name}.policy.xml').read_text(encoding='utf-8')
     nodes = POLICIES[name]()
-    assert text == policy(nodes), f'make it anew: pam up {name} --valve hsv --policy …'
+    assert text == policy(nodes), 'make it anew, see docs/security.md'
     publishers, enclaves = {}, ElementTree.fromstring(text.encode()).findall('.//enclave')
     assert [enclave.get('path') for enclave in enclaves] == [
         *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session']
