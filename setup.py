@@ -54,6 +54,7 @@ ROS_REQUIRES = [
 TEST_REQUIRES = [
     'pytest>=7.4',
     'pytest-timeout>=2.1',
+    'pytest-xdist>=3.0',
     'hypothesis>=6.98',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
