@@ -44,7 +44,8 @@ def policy(nodes):
 
     """
     root = ElementTree.Element('policy', version='0.2.0')
-    root.append(ElementTree.Comment(' Made from the code, as docs/security.md says; do not edit. '))
+    root.append(ElementTree.Comment(
+        ' Made from the code, as docs/security.md says; do not edit. '))
     enclaves = ElementTree.SubElement(root, 'enclaves')
     with Inspector() as inspector:
         for node in nodes:
