@@ -23,7 +23,7 @@ from pam_actuation.cli.common import EXIT_BAD_INPUT
 from pam_sim.errors import InputError
 
 VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
-         'info', 'models', 'valves', 'rules')
+         'info', 'models', 'nodes', 'valves', 'rules')
 
 
 def build_parser():

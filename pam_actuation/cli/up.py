@@ -42,15 +42,20 @@ def add_arguments(parser):
                         metavar='N', help='of all nodes, 1 to 99 (default: none)')
     parser.add_argument('--seconds', type=float, default=None, metavar='S',
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
+    parser.add_argument('--policy', metavar='FILE', default=None,
+                        help='start nothing; write the access policy of these nodes (SROS2)')
 
 
 def run(args):
     """Bring up, watch, take down; exit code 1 if a node ended or did not end in order."""
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
+    nodes = _nodes(args)
+    if args.policy is not None:
+        return _write_policy(args, nodes)
     failure, problems = '', []
     with termination_as_interrupt(), Supervisor(
-            _nodes(args), args.domain_id, args.realtime_priority) as supervisor:
+            nodes, args.domain_id, args.realtime_priority) as supervisor:
         try:
             supervisor.start()
             if not args.json:
@@ -67,6 +72,14 @@ def run(args):
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
     return EXIT_FINDING if failure or problems else EXIT_DONE
+
+
+def _write_policy(args, nodes):
+    from pam_actuation.nodes.policy import policy
+    from pam_actuation.report.page import write_text
+    path = str(write_text(args.policy, policy(nodes)))
+    emit(args, {'policy': path, 'nodes': len(nodes)}, f'policy of {len(nodes)} nodes: {path}')
+    return EXIT_DONE
 
 
 def _nodes(args):

@@ -49,9 +49,11 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
     Parameters
     ----------
     namespace : str
+        Of all nodes.
     rig : str
         Rig preset, or path of a model file.
     valve : {'ppr', 'hsv'}
+        Kind of valve.
     hardware : str
         ``sim``, another name in config/hardware, or a parameter file.
     controller : str

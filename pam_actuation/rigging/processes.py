@@ -100,6 +100,8 @@ class NodeProcess:
             '-r', f'__ns:={namespace}', *parameter_arguments(parameters)]
         if parameter_file:
             command += ['--params-file', parameter_file]
+        if environment.get('ROS_SECURITY_ENABLE') == 'true':
+            command += ['--enclave', self.full_name]
         for topic, other in dict(remap).items():
             command += ['-r', f'{topic}:={other}']
         with open(self.log_file, 'wb') as log:

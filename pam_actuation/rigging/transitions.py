@@ -32,10 +32,13 @@ def change(client, processes, transition, timeout_s=TRANSITION_TIMEOUT_S):
     Parameters
     ----------
     client : RigClient
+        Whose services are asked.
     processes : iterable of NodeProcess
+        Of the nodes.
     transition : str
         A key of ``client.TRANSITIONS``.
     timeout_s : float
+        Longest wait [s].
 
     Raises
     ------

@@ -37,6 +37,7 @@ def joint_urdf(joint, name):
     Parameters
     ----------
     joint : JointRig
+        With its muscles.
     name : str
         Name of the joint, as in ``name`` of its messages.
 

@@ -30,6 +30,7 @@ from pam_actuation.rigging.supervisor import Supervisor
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
+from std_msgs.msg import String
 
 pytestmark = pytest.mark.ros
 
@@ -64,6 +65,9 @@ def knee(tmp_path):
                 type_of(topic), topic,
                 lambda message, topic=topic: rig.heard[topic].append(from_ros(topic, message)),
                 qos.reliable(1000))
+        rig.descriptions = []
+        rig.node.create_subscription(
+            String, 'robot_description', rig.descriptions.append, qos.LATCHED)
         with rig.supervisor:
             yield rig
     finally:
@@ -115,6 +119,9 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
         return mean > P_ATM_PA + 380e3
     wait_for(stiff, 30.0, 'the wanted co-contraction')
     wait_for(lambda: holds(knee, 0.3), 30.0, 'the angle after the change of stiffness')
+
+    wait_for(lambda: knee.descriptions, 10.0, 'the robot description')
+    assert '<joint name="knee" type="revolute">' in knee.descriptions[0].data
 
     # A larger stack takes over: a movement sent once, then a trajectory ahead of the stride.
     processes = knee.supervisor.processes
