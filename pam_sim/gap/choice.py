@@ -126,7 +126,7 @@ class Choice:
                     cut, r.found.errors[s]) > self.seen_gap:
                 r.found = self.problem.polish(r.found)
                 r.share = self.shares(r.found)
-        ranked = self._without_limits(ranked, current, s)
+        ranked = without_limits(ranked, current, s)
         if not ranked:
             return []
         best = ranked[0].found.errors[s]
@@ -142,15 +142,6 @@ class Choice:
         return [r for r in tied
                 if not any((simple, r.name) in LIMITS for simple in as_good)
                 and SAME_AS.get(r.name) not in names]
-
-    @staticmethod
-    def _without_limits(rivals, current, s):
-        """Return the rivals, best first, less those that have turned into a simpler one."""
-        ranked = sorted(rivals, key=lambda r: -r.share[s])
-        simple = {r.name for r in ranked if r.share[s] > ALMOST * ranked[0].share[s]}
-        simple |= set(current.hypothesis.names)
-        return [r for r in ranked if not r.at_edge
-                or not any((name, r.name) in LIMITS for name in simple)]
 
     def _strain(self, found):
         """Return the squared pulls of all numbers that should have stayed where they were."""
@@ -191,3 +182,17 @@ class Choice:
                 return Named(r.name, cuts[0].subsystem, rivals, names,
                              [o for o in fitted if o.name == r.name])
         return None
+
+
+def without_limits(rivals, current, subsystem):
+    """
+    Return the rivals, best first, less those that have turned into a simpler effect.
+
+    That is, those at the edge of a shape where an effect they contain as a limit explains
+    almost as much or is in the present fit ``current``.
+    """
+    ranked = sorted(rivals, key=lambda r: -r.share[subsystem])
+    simple = {r.name for r in ranked if r.share[subsystem] > ALMOST * ranked[0].share[subsystem]}
+    simple |= set(current.hypothesis.names)
+    return [r for r in ranked if not r.at_edge
+            or not any((name, r.name) in LIMITS for name in simple)]
