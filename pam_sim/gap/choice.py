@@ -30,6 +30,7 @@ LATER_STEP = 0.7             # least share of what is left that a further effect
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
+UNPOLISHED = 0.5             # of the rest a fit may still be better than it seems
 EDGE = 0.02                  # of a shape to the end of its range, in its logarithm
 ALMOST = 0.9                 # of the best share; a simpler name with it stands for its limit
 STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
@@ -44,6 +45,7 @@ class Rival:
     found: Found
     share: dict = field(default_factory=dict)
     t: dict = field(default_factory=dict)
+    polished: bool = False
 
     @property
     def at_edge(self):
@@ -121,10 +123,13 @@ class Choice:
         """Return the rivals in a cut that the data cannot tell from the best, best first."""
         s = cut.subsystem
         ranked = sorted(self._admissible(rivals, current, cut), key=lambda r: -r.share[s])
+        top = max((r.share[s] for r in ranked), default=0.0)
+        # The worse the best explains, the further a fit may be from where it will end.
+        near = top - max(CLOSE, UNPOLISHED * (1.0 - top))
         for r in ranked:
-            if r.share[s] > ranked[0].share[s] - CLOSE and gap(
+            if not r.polished and r.share[s] > near and gap(
                     cut, r.found.errors[s]) > self.seen_gap:
-                r.found = self.problem.polish(r.found)
+                r.found, r.polished = self.problem.polish(r.found), True
                 r.share = self.shares(r.found)
         ranked = without_limits(ranked, current, s)
         if not ranked:
