@@ -119,7 +119,9 @@ _TABLE = {
                    Free('vent_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES)),
     'vent_asymmetry': (Free('ratio_minus_1', 0.2, -0.4, 4.0),),
     'leakage': (Free('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),),
-    'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True, (3e-4, 3e-3)),),
+    # A compressor that starts once more or less makes other valleys of the misfit.
+    'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True,
+                          (2e-4, 4e-4, 7e-4, 1.2e-3, 2.5e-3, 5e-3)),),
     'dead_volume': (Free('extra_volume_m3', 2e-6, 0.0, 1e-4),),
     'thermal': (Free('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),),
     'coulomb_friction': (Free('force_n', 1.0, 0.0, 50.0),),

@@ -42,6 +42,8 @@ FREE_SD = 30.0               # factor on the deviation of the prior of a freed n
 EFFECT_STEP = 0.01           # of a parameter of an effect, relative
 ROUNDS = 4
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
+POLISHES = 4
+WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
 SCORE_BLOCKS = 4             # test blocks whose scores are summed
@@ -218,12 +220,17 @@ class Problem:
         return Found(hypothesis, theta, known_z, errors, temper)
 
     def polish(self, found):
-        """Return the better of a fit and one that goes on with slopes taken where it stands."""
+        """Return a fit that went on with slopes taken where it stands, as long as that helps."""
         kept = dict(self.slopes)
-        self.take_slopes(found.settings(), found.known_z)
-        again = self.fit(found.hypothesis, found.theta, found)
+        for _ in range(POLISHES):
+            self.take_slopes(found.settings(), found.known_z)
+            again = self.fit(found.hypothesis, found.theta, found)
+            before, after = self.cost(found), self.cost(again)
+            found = again if after < before else found
+            if after > WORTH_POLISHING * before:
+                break
         self.slopes = kept
-        return again if self.cost(again) < self.cost(found) else found
+        return found
 
     def cost(self, found):
         """Return the mean squared error over the fitted parts, in floors squared, all cuts."""

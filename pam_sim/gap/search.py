@@ -37,6 +37,7 @@ PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
@@ -129,13 +130,10 @@ class Search:
         current, named = self._eliminate(current, named)
         current, named = self._established(*self._resolve(current, named))
         explained = self._explained(current)
-        small = {c.subsystem for c in self.problem.cuts
-                 if gap(c, current.errors[c.subsystem]) < NEAR_FLOOR}
-        for w in list(named):        # what explains too little is no name
-            least = RIVAL if w.subsystem in small else NAMED
-            if explained.get(w.subsystem, 0.0) < least:
-                current = self._swapped(current, w.name)
-                named = [o for o in named if o is not w]
+        poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
+        for w in [w for w in named if w.subsystem in poor]:
+            current = self._swapped(current, w.name)
+        named = [w for w in named if w.subsystem not in poor]
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
                        self.screened)
 
@@ -170,6 +168,14 @@ class Search:
         if not current.hypothesis.touches(cut):
             return first > self.least_gap
         return left > max(self.seen_gap, DONE * first)
+
+    def _is_poor(self, cut, current, explained):
+        """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
+        s = cut.subsystem
+        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
+        bent = any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
+                   for known, z in zip(cut.known, current.known_z[s]))
+        return bent or explained.get(s, 0.0) < least
 
     def _explained(self, current):
         return {s: explained for s, explained in self.choice.shares(current).items()
