@@ -24,6 +24,12 @@ them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
 from dataclasses import dataclass
 import math
 
+# Virtual clocks start here, not at the date of the run.
+START_NS = 1_000_000_000 * 1_000_000_000
+# Of a valve signal, by valve type: the names of its efforts, and the efforts that vent.
+VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
+SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
+
 
 @dataclass(frozen=True, slots=True)
 class Pressure:

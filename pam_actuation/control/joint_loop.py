@@ -31,9 +31,9 @@ from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.messages import ControllerState, Pressure
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
-SIDES = ('flexor', 'extensor')
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
 _INPUT_NAMES = (

@@ -16,14 +16,14 @@
 
 import sys
 
-from pam_actuation.control.tick import REASONS
 from pam_actuation.messages import Pressure
+from pam_actuation.nodes.controller_node import report_reason
 from pam_actuation.nodes.conversions import from_ros
-from pam_actuation.nodes.diagnostics import OK, WARN
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
 INPUTS = ('joint_trajectory', 'joint_reference', 'co_contraction', 'joint_state')
@@ -53,7 +53,7 @@ class JointNode(LearningSwitch, ManagedNode):
     def setup(self):
         """Load the controller, create the topics."""
         from pam_actuation.control.config import load_controller
-        from pam_actuation.control.joint_loop import JointControllerLoop, SIDES
+        from pam_actuation.control.joint_loop import JointControllerLoop
         from pam_sim.joint import load_joint
         valve = self.value('valve_type')
         joint = load_joint(self.value('joint'), valve=valve)
@@ -95,10 +95,7 @@ class JointNode(LearningSwitch, ManagedNode):
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)
         self.send('controller_state', state)
-        if self.loop.reason == REASONS[0]:
-            self.diagnostics.update(OK, 'following the reference')
-        else:
-            self.diagnostics.update(WARN, self.loop.reason)
+        report_reason(self.diagnostics, self.loop.reason)
 
     def safe_stop(self, why):
         """Command atmospheric pressure: both drivers vent."""

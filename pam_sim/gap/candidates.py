@@ -105,9 +105,9 @@ class Candidate:
         return {'name': self.effect, 'parameters': {**dict(self.held), **values}}
 
 
-def _level(name):
+def _level_and(shape):
     return (Free('force_n', 1.0, 0.0, 50.0, starts=(1.0,)),
-            Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), *name)
+            Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), shape)
 
 
 _RATES = (4e5, 1e6, 2.5e6)
@@ -124,12 +124,12 @@ _TABLE = {
     'thermal': (Free('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),),
     'coulomb_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'pressure_friction': (Free('force_at_400kpa_n', 1.0, 0.0, 100.0),),
-    'hysteresis': _level((Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5)),)),
-    'hysteresis_bouc_wen': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
-    'hysteresis_lugre': _level((Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True),)),
+    'hysteresis': _level_and(Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
+    'hysteresis_bouc_wen': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
+    'hysteresis_lugre': _level_and(Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
     'hysteresis_prandtl_ishlinskii': (
         Free('half_width_pa', 2e3, 0.0, 5e4), Free('half_width_per_pa', 0.02, 0.0, 0.3)),
-    'history_friction': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
+    'history_friction': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
     'braid_contact_friction': (Free('friction_coefficient', 0.3, 0.0, 2.0),),
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),

@@ -63,6 +63,11 @@ class Hypothesis:
         """Return how many numbers it adds to the fit."""
         return sum(len(c.free) for c in self.effects) + len(self.freed)
 
+    def rows(self, place):
+        """Return which of the normalised parameters are those of one effect, as a slice."""
+        first = sum(len(c.free) for c in self.effects[:place])
+        return slice(first, first + len(self.effects[place].free))
+
     def touches(self, cut):
         """Return whether it can change the errors of a cut."""
         return (any(acts_on(c.effect, cut.subsystem) for c in self.effects)
@@ -96,11 +101,12 @@ class Found:
 
     def values(self):
         """Return the parameters of each effect, in the order of the hypothesis."""
-        found, first = [], 0
-        for c in self.hypothesis.effects:
-            found.append({f.name: f.value(self.theta[first + j]) for j, f in enumerate(c.free)})
-            first += len(c.free)
-        return found
+        return [{f.name: f.value(t) for f, t in zip(c.free, self.theta_of(place))}
+                for place, c in enumerate(self.hypothesis.effects)]
+
+    def theta_of(self, place):
+        """Return the normalised parameters of one effect of the hypothesis."""
+        return self.theta[self.hypothesis.rows(place)]
 
     def settings(self):
         """Return the effects as entries of a model file."""
@@ -125,7 +131,7 @@ class Problem:
         self.rig, self.cuts, self.use = rig, cuts, use
         self.slopes = {}
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in cuts})
-        self.base = self._fit_base()
+        self.base = self.fit_base()
 
     def take_slopes(self, effects, known_z):
         """Take the slopes of all cuts with respect to their known numbers at a point."""
@@ -183,10 +189,6 @@ class Problem:
                 temper[s] = self.base.temper[s]
         return Found(hypothesis, theta, known_z, errors, temper)
 
-    def refit_base(self):
-        """Return the baseline fitted to the parts that are used now."""
-        return self._fit_base()
-
     def polish(self, found):
         """Return the better of a fit and one that goes on with slopes taken where it stands."""
         kept = dict(self.slopes)
@@ -220,7 +222,8 @@ class Problem:
             names.index(n) for n in found.hypothesis.freed]
         return whole[np.ix_(chosen, chosen)]
 
-    def _fit_base(self):
+    def fit_base(self):
+        """Return the baseline: known numbers fitted to the parts that are used now."""
         known = {c.subsystem: np.zeros(len(c.known)) for c in self.cuts}
         temper = {c.subsystem: np.ones(len(c.signals)) for c in self.cuts}
         for _ in range(BASE_PASSES):
@@ -238,9 +241,8 @@ class _Search:
         self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
         self.free = [f for c in hypothesis.effects for f in c.free]
         self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
-        low, high = [f.lower for f in self.free], [f.upper for f in self.free]
-        low = [f.coordinate(v) for f, v in zip(self.free, low)]
-        high = [f.coordinate(v) for f, v in zip(self.free, high)]
+        low = [f.coordinate(f.lower) for f in self.free]
+        high = [f.coordinate(f.upper) for f in self.free]
         self.prior = []
         for cut in cuts:
             lowest, highest = cut.bounds()
@@ -262,7 +264,7 @@ class _Search:
             first += len(cut.known)
         return x[:len(self.free)], found
 
-    def errors(self, x, only=None):
+    def errors(self, x):
         """Return the errors of every touched cut, by subsystem."""
         key = x.tobytes()
         if self._last.get('key') != key:

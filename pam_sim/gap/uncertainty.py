@@ -57,9 +57,8 @@ def effect_numbers(rig, found, place, covariance, named, rest):
 
     """
     candidate = found.hypothesis.effects[place]
-    first = sum(len(c.free) for c in found.hypothesis.effects[:place])
-    theta = found.theta[first:first + len(candidate.free)]
-    own = covariance[first:first + theta.size, first:first + theta.size]
+    theta, rows = found.theta_of(place), found.hypothesis.rows(place)
+    own = covariance[rows, rows]
     effect = get_effect(candidate.effect)
     units = {p.name: p.unit for p in effect.parameters}
     parameters = {}
@@ -124,9 +123,7 @@ def _formulation_spread(rig, candidate, named):
 
 
 def _reported_in(rival, candidate, rig):
-    place = rival.found.hypothesis.effects.index(candidate)
-    first = sum(len(c.free) for c in rival.found.hypothesis.effects[:place])
-    theta = rival.found.theta[first:first + len(candidate.free)]
+    theta = rival.found.theta_of(rival.found.hypothesis.effects.index(candidate))
     return {name: value for name, (value, _) in _report(candidate, theta, rig).items()}
 
 

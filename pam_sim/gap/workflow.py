@@ -22,7 +22,7 @@ import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fingerprint import fingerprint
-from pam_sim.gap.fit import Problem
+from pam_sim.gap.fit import BOX, Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
@@ -39,7 +39,6 @@ SEEN_GAP = 0.05              # floors squared; smaller ones are within the error
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
-PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -100,8 +99,8 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
                      lambda: time.perf_counter() > deadline, matters).run()
     progress(0.8)
     problem.use = (FIT, SELECT)
-    final, base = problem.polish(outcome.final), problem.refit_base()
-    proof = Proof(certify or runs[0], witness, certify is not None, problem, base, final, seed)
+    final, base = problem.polish(outcome.final), problem.fit_base()
+    proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
@@ -158,7 +157,7 @@ def _judge(result, outcome, problem, proof, base, materiality, whole):
     result.evidence = [
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
-    wrong = [c for c in result.parameters if abs(c.pull) > PULL]
+    wrong = [c for c in result.parameters if abs(c.pull) > BOX]
     left = max((beyond(s.rmse_refit, FLOOR_ERROR * s.noise_floor) / max(proof.noise[name], 1e-12)
                 for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (

@@ -55,7 +55,6 @@ NUMBERS = {
     'stop_stiffness': 0.0, 'stop_at': 0.0, 'resonance_hz': 0.0, 'resonance_damping': 0.3,
     'wander': 0.0, 'wander_hz': 1.3,
 }
-INDEX = {name: i for i, name in enumerate(NUMBERS)}
 (MASS, DAMPING, GAIN_MAP, K_M, T_M, C, V_DEAD, SUPPLY, DELAY, LAG_1, LAG_2, PLAY, DEAD_BAND,
  OPEN_DEAD, OPEN_RAMP, CLOSE_DEAD, CLOSE_RAMP, CAP_FILL, CAP_VENT, VENT_RATIO, LEAK_NOZZLE,
  LEAK_SLIT, RESERVOIR, BAND, REFILL, SECOND_VOLUME, HEAT_TIME, DRY, DRY_400, STRIBECK, LOOP,
