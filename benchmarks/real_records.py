@@ -136,8 +136,8 @@ def told(result):
     sizes = '; '.join(
         f'{n} {s.rmse_before:.3g}, {s.rmse_refit:.3g}, {s.rmse_after:.3g} {s.unit}, '
         f'floor {s.noise_floor:.3g}' for n, s in result.signals.items())
-    return (f'{result.verdict}: {"; ".join(parts) or "-"}; set {result.ambiguity_set}; rms before, '
-            f'calibrated, final: {sizes}; unexplained {result.unexplained_fraction:.2f}')
+    return (f'{result.verdict}: {"; ".join(parts) or "-"}; set {result.ambiguity_set}; rms '
+            f'before, calibrated, final: {sizes}; unexplained {result.unexplained_fraction:.2f}')
 
 
 def injected(rig, run, name, value):
