@@ -167,7 +167,7 @@ def plan(rig, experiments=(), with_force=True, materiality=1.0, only=None,
     steps, done = len(experiments) + len(pieces(rig.valve)) + 1, [0]
 
     def looked(plain):
-        found = _sensitivities(plain, noisy, with_force, only)
+        found = sensitivities(plain, noisy, with_force, only)
         done[0] += 1
         progress(done[0] / steps)
         return found
@@ -271,7 +271,8 @@ def _plain(name, description, segments, needs):
             'needs': list(needs), 'segments': segments}
 
 
-def _sensitivities(plain, rig, with_force, only):
+def sensitivities(plain, rig, with_force=True, only=None):
+    """Return the Sensitivities of a protocol, given as plain data, on a rig with its sensors."""
     experiment = load_experiment(dump_yaml(plain))
     controller = None
     if experiment.tracked:
