@@ -31,6 +31,7 @@ import truth_effects
 import truth_gap
 import truth_key
 import truth_live
+from truth_numbers import numbers as vector_of
 import truth_rig as rig
 import truth_run
 import truth_sensors
@@ -85,7 +86,7 @@ def test_with_nothing_hidden_both_simulators_agree(valve, tmp_path):
 
 
 def steady(numbers, volts, seconds=6.0):
-    rows, _ = rig.simulate(rig.numbers(**numbers), rig.PPR, np.zeros(1), np.array([volts]),
+    rows, _ = rig.simulate(vector_of(**numbers), rig.PPR, np.zeros(1), np.array([volts]),
                            np.zeros(1), volts * 1e5, seconds, False)
     return rows[-1]
 
@@ -103,7 +104,7 @@ def test_the_muscle_settles_where_the_equations_say():
 
 def test_half_the_step_changes_little(monkeypatch):
     times, volts, none = np.array([0.0, 0.3]), np.array([4.0, 5.0]), np.zeros(2)
-    numbers = rig.numbers(dry=2.0, loop=1.0)
+    numbers = vector_of(dry=2.0, loop=1.0)
     rows, _ = rig.simulate(numbers, rig.PPR, times, volts, none, 400e3, 0.5, False)
     monkeypatch.setitem(rig.simulate.py_func.__globals__, 'STEP_S', 0.5 * rig.STEP_S)
     fine, _ = rig.simulate.py_func(numbers, rig.PPR, times, volts, none, 400e3, 0.5, False)
@@ -117,7 +118,7 @@ def test_the_live_rig_is_the_recorded_one():
     for k in range(600):
         live.step((4.0 if k < 300 else 5.0,))
         found.append((live.pressure_pa, live.contraction_m, live.force_n))
-    rows, _ = rig.simulate(rig.numbers(**numbers), rig.PPR, np.array([0.0, 0.3]),
+    rows, _ = rig.simulate(vector_of(**numbers), rig.PPR, np.array([0.0, 0.3]),
                            np.array([4.0, 5.0]), np.zeros(2), 0.0, 0.6, False)
     found = np.array(found)
     assert found[:, 1] == pytest.approx(rows[5:3001:5, rig.O_X], abs=1e-9)
@@ -130,12 +131,12 @@ def test_the_live_rig_is_the_recorded_one():
 def test_air_is_conserved_with_both_valves_shut():
     times, wanted = np.array([0.0, 1.0]), np.array([501325.0, np.nan])
     for numbers in ({}, {'heat_time': 0.2}, {'second_volume': 2e-6}):
-        rows, duties = rig.simulate(rig.numbers(**numbers), rig.HSV, times, wanted, np.zeros(2),
+        rows, duties = rig.simulate(vector_of(**numbers), rig.HSV, times, wanted, np.zeros(2),
                                     400e3, 6.0, True)
         assert not duties[110:, 1:].any()
         late = rows[int(2.0 / truth_sensors.ROW_S):, rig.O_MASS]
         assert np.ptp(late) < 1e-6 * late[0]
-    leaking, _ = rig.simulate(rig.numbers(leak_nozzle=1e-12), rig.HSV, times, wanted, np.zeros(2),
+    leaking, _ = rig.simulate(vector_of(leak_nozzle=1e-12), rig.HSV, times, wanted, np.zeros(2),
                               400e3, 6.0, True)
     lost = np.diff(leaking[[-5001, -1], rig.O_MASS])[0]
     assert lost == pytest.approx(-1e-12 * rig.RHO * leaking[-1, rig.O_P], rel=0.02)

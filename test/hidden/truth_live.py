@@ -15,6 +15,7 @@
 """The hidden rig step by step, for a controller that acts on what it measures."""
 
 import numpy as np
+import truth_numbers
 import truth_rig as rig
 
 
@@ -50,7 +51,7 @@ class LiveRig:
     dt_s = 1e-3
 
     def __init__(self, numbers, readings=lambda *values: values):
-        self._n, self._readings = rig.numbers(**numbers), readings
+        self._n, self._readings = truth_numbers.numbers(**numbers), readings
         self._y, self._work = np.zeros(rig.SIZE), np.zeros((2, rig.SIZE))
         self._anchors, self._plays = np.zeros(6), np.zeros(3)
         self._y[rig.Y_AIR] = rig.ATM

@@ -17,44 +17,18 @@ A rig with hidden effects, written anew: nothing here comes from the packages un
 
 Formulation: the air is a mass and an inner energy (its pressure is a result), the state is
 advanced by the explicit midpoint rule with 0.1 ms, dry friction is a bristle, memory is slip
-elements with anchors or Dahl's differential equation. ``NUMBERS`` names every number; the
-neutral value of an effect's number switches it off.
+elements with anchors or Dahl's differential equation.
 """
 
 import math
 
 import numba
 import numpy as np
+from truth_numbers import NUMBERS
 
 STEP_S = 1e-4
 EVERY = 2                     # one row of output per so many steps
 
-# Name -> neutral or nominal value.
-NUMBERS = {
-    'mass': 5.0, 'damping': 25.0, 'gain_map': 1.0, 'k_m': 100e3, 't_m': 0.060,
-    'c': 2.0e-10, 'v_dead': 3.0e-6, 'supply': 801325.0,
-    # Command, regulator, on/off valves.
-    'delay': 0.0, 'lag_1': 0.0, 'lag_2': 0.0, 'play': 0.0, 'dead_band': 0.0,
-    'open_dead': 0.0, 'open_ramp': 0.0, 'close_dead': 0.0, 'close_ramp': 0.0,
-    'cap_fill': 0.0, 'cap_vent': 0.0, 'vent_ratio': 1.0,
-    # Air.
-    'leak_nozzle': 0.0, 'leak_slit': 0.0, 'reservoir': 0.0, 'band': 1e5, 'refill': 2e-4,
-    'second_volume': 0.0, 'heat_time': 0.0,
-    # Muscle.
-    'dry': 0.0, 'dry_400': 0.0, 'stribeck': 1.0, 'loop': 0.0, 'loop_400': 0.0, 'dahl_travel': 0.0,
-    'viscous': 0.0, 'viscous_power': 0.85,
-    'creep_1': 0.0, 'creep_2': 0.0, 'creep_3': 0.0, 'creep_4': 0.0,
-    'creep_t1': 1.0, 'creep_t2': 1.0, 'creep_t3': 1.0, 'creep_t4': 1.0,
-    'soften': 0.0, 'soften_t1': 60.0, 'soften_t2': 5.0,
-    'threshold': 0.0, 'taper': 0.0, 'taper_growth': 0.0, 'tube': 0.0, 'tube_hardening': 0.0,
-    # Load.
-    'guide': 0.0, 'spring': 0.0, 'spring_cubic': 0.0,
-    # What no library has.
-    'ripple': 0.0, 'ripple_period': 4e-3, 'contact': 0.0, 'pulsation': 0.0, 'pulsation_hz': 7.0,
-    'gain_drift': 0.0, 'drag_x2': 0.0, 'drag_v2': 0.0, 'dry_growing': 0.0, 'dry_pull': 0.0,
-    'stop_stiffness': 0.0, 'stop_at': 0.0, 'resonance_hz': 0.0, 'resonance_damping': 0.3,
-    'wander': 0.0, 'wander_hz': 1.3,
-}
 (MASS, DAMPING, GAIN_MAP, K_M, T_M, C, V_DEAD, SUPPLY, DELAY, LAG_1, LAG_2, PLAY, DEAD_BAND,
  OPEN_DEAD, OPEN_RAMP, CLOSE_DEAD, CLOSE_RAMP, CAP_FILL, CAP_VENT, VENT_RATIO, LEAK_NOZZLE,
  LEAK_SLIT, RESERVOIR, BAND, REFILL, SECOND_VOLUME, HEAT_TIME, DRY, DRY_400, STRIBECK, LOOP,
@@ -91,14 +65,6 @@ PPR, HSV = 0, 1
 O_P, O_X, O_F, O_V, O_SUPPLY, O_MASS = range(6)
 
 jit = numba.njit(cache=True)
-
-
-def numbers(**changed):
-    """Return the vector of all numbers with some changed from their neutral value."""
-    unknown = set(changed) - set(NUMBERS)
-    if unknown:
-        raise KeyError(f'no such number: {sorted(unknown)}')
-    return np.array([changed.get(name, value) for name, value in NUMBERS.items()], dtype=float)
 
 
 @jit

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import truth_bags as bags
 import truth_commands as commands
+import truth_numbers
 import truth_rig as rig
 import truth_sensors as sensors
 
@@ -49,7 +50,7 @@ def run_rig(numbers, valve, experiment):
     loop on the true pressure, so that its duties depend on what is hidden.
     """
     times, wanted, held = commands.commands(experiment)
-    vector = rig.numbers(**numbers)
+    vector = truth_numbers.numbers(**numbers)
     lead = np.array([-SETTLE_S])
     instants = np.concatenate([lead, times]) + SETTLE_S
     end_s = instants[-1] + 1.0 / commands.RATE_HZ
@@ -76,7 +77,7 @@ def replay(numbers, valve, truth):
     idle = np.zeros(1)
     lead = truth.sent[:1, 0] if valve == 'ppr' else idle
     rows, _ = rig.simulate(
-        rig.numbers(**numbers), rig.PPR if valve == 'ppr' else rig.HSV,
+        truth_numbers.numbers(**numbers), rig.PPR if valve == 'ppr' else rig.HSV,
         np.concatenate([idle, instants]), np.concatenate([lead, first]),
         np.concatenate([idle, second]), truth.rows[0, rig.O_P] - rig.ATM,
         SETTLE_S + (truth.rows.shape[0] - 1) * sensors.ROW_S, False)
