@@ -57,7 +57,7 @@ SOUND = {
     'experiment_recorder': 'recording', 'plant_simulator': 'active',
     'valve_driver': 'following the pressure command', 'valve_watchdog': 'hears the driver',
     'sofc_controller': 'following the reference', 'reference_generator': 'playing swing'}
-START_S = 90.0
+HEALTH_PERIOD_S = 0.1       # so that a sound rig is noticed soon
 FLOOD_PER_ROUND = 4         # messages, about every 2 ms
 DELAY_S = 0.4
 FAR_S = 1.0
@@ -105,7 +105,8 @@ class FaultRig:
 
     def start(self, name):
         """Start a node, the recorder with a new bag."""
-        parameters = {'realtime_priority': 1, **self._parameters[name]}
+        parameters = {'realtime_priority': 1, 'diagnostics_period_s': HEALTH_PERIOD_S,
+                      **self._parameters[name]}
         if name == 'experiment_recorder':
             self.bag = self.folder / f'bag_{self._bags}'
             self._bags += 1
