@@ -42,7 +42,9 @@ class HsvConfig:
     (absolute, used where no supply is measured), ``open_time_s`` and ``close_time_s``,
     ``dead_time_s`` from duty to pressure. Volumes include the dead volume and hold at 0
     and at 600 kPa gauge. Loop: ``gain`` share of the predicted error removed per
-    period, ``band_pa`` half width of the set-point band.
+    period, ``band_pa`` half width of the set-point band; ``fine_band_pa`` the same while the
+    command changes by less than ``fine_slope_pa_per_s``, and where it is 0 the valves never
+    open together for a dose smaller than the shortest pulse.
     """
 
     period_s: float = 0.010
@@ -61,17 +63,17 @@ class HsvConfig:
     open_time_s: float = 0.0017
     close_time_s: float = 0.0020
     pulse_margin_s: float = 0.0001
-    gain: float = 0.4
+    gain: float = 0.26
     band_pa: float = 1_000.0
     rest_share: float = 0.6
-    fine_band_pa: float = 400.0
+    fine_band_pa: float = 210.0
     fine_slope_pa_per_s: float = 20_000.0
     look_ahead_periods: float = 1.0
-    correct: float = 0.6
-    correct_volume: float = 0.05
-    correct_rate: float = 0.05
+    correct: float = 0.55
+    correct_volume: float = 0.08
+    correct_rate: float = 0.07
     learn_drift: float = 0.01
-    learn_gain: float = 0.01
+    learn_gain: float = 0.007
     learn_dead_time: float = 0.02
     dead_time_range_s: float = 0.015
     flow_scale_pa: float = 4_000.0
@@ -192,6 +194,12 @@ class HsvLaw:
     def predicted_pa(self):
         """Return the pressure [Pa] predicted for when the newest opening begins to act."""
         return self.out[kernel.O_PREDICTED]
+
+    @property
+    def dead_time_s(self):
+        """Return the dead time [s] as learned so far."""
+        periods = self.par[kernel.P_DELAY] + self.state[kernel.S_DELAY_SHIFT]
+        return max(periods, 0.0) * self.config.period_s
 
     @property
     def flow_pa(self):

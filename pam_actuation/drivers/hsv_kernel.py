@@ -23,11 +23,12 @@ left at the end of that prediction. What the model misses is learned slowly in t
 numbers: a gain of the fill flow, a gain of the vent flow and a drift (leak, moving
 volume).
 
-Both duties are exactly 0 while the predicted error is inside the set-point band. Where
-less is wanted than the shortest possible pulse does, and the command stands still, both
+Both duties are exactly 0 while the predicted error is inside the set-point band, which is
+narrower while the command stands still. Where less is wanted than the shortest possible
+pulse does, both
 valves open in the same period and the difference of their pulses is the dose
-(``hsv_pulses``); an error inside the fine band, or without this a part of the shortest
-pulse's effect, is left alone, so that the valves rest.
+(``hsv_pulses``). Where that would take pulses too long, at low pressure, an error below a
+part of the shortest pulse's effect is left alone.
 
 Source: ISO 6358 (flow).
 
@@ -38,7 +39,8 @@ import math
 
 from numba import njit
 from pam_actuation.drivers.hsv_pulses import (
-    duty_of_opening, joined_opening, opening_of_duty, pair_openings, shortest_opening)
+    duty_of_opening, joined_opening, LONGEST_OF_A_PAIR, opening_of_duty, pair_openings,
+    shortest_opening)
 from pam_sim.compiled import compiled, source_key
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from pam_sim.valve.flow import mass_flow_kg_per_s
@@ -343,8 +345,10 @@ def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     if pairs and abs(wanted) < shortest * full:
         other = abs(_full_rate(state, par, middle, volume_m3, supply_pa, not filling))
         if other > 0.0:
-            return pair_openings(
+            fill, vent = pair_openings(
                 wanted, full if filling else other, other if filling else full, shortest)
+            if max(fill, vent) <= LONGEST_OF_A_PAIR:
+                return fill, vent
     if abs(error) < par[P_REST] * shortest * full:
         return 0.0, 0.0
     opening = min(max(abs(wanted) / full, shortest), 1.0)

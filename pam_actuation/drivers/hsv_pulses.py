@@ -23,6 +23,8 @@ as small as one likes. All openings and times are parts of a PWM period.
 
 from pam_sim.compiled import compiled
 
+LONGEST_OF_A_PAIR = 0.5   # opening and duty beyond which two valves do not open together
+
 
 @compiled
 def duty_of_opening(opening, open_part, close_part, margin):
