@@ -42,9 +42,9 @@ class HsvConfig:
     (absolute, used where no supply is measured), ``open_time_s`` and ``close_time_s``,
     ``dead_time_s`` from duty to pressure. Volumes include the dead volume and hold at 0
     and at 600 kPa gauge. Loop: ``gain`` share of the predicted error removed per
-    period, ``band_pa`` half width of the set-point band; ``fine_band_pa`` the same while the
-    command changes by less than ``fine_slope_pa_per_s``, and where it is 0 the valves never
-    open together for a dose smaller than the shortest pulse.
+    period, ``band_pa`` error beyond which the valves start, ``fine_band_pa`` that within which
+    they rest again; where this is 0 they never open together for a dose smaller than the
+    shortest pulse.
     """
 
     period_s: float = 0.010
@@ -64,10 +64,9 @@ class HsvConfig:
     close_time_s: float = 0.0020
     pulse_margin_s: float = 0.0001
     gain: float = 0.26
-    band_pa: float = 1_000.0
+    band_pa: float = 700.0
     rest_share: float = 0.6
-    fine_band_pa: float = 210.0
-    fine_slope_pa_per_s: float = 20_000.0
+    fine_band_pa: float = 400.0
     look_ahead_periods: float = 1.0
     correct: float = 0.55
     correct_volume: float = 0.08
@@ -78,7 +77,7 @@ class HsvConfig:
     dead_time_range_s: float = 0.015
     flow_scale_pa: float = 4_000.0
     gain_limit: float = 2.0
-    drift_limit_pa_per_s: float = 20_000.0
+    drift_limit_pa_per_s: float = 100_000.0
     supply_margin_pa: float = 5_000.0
     slope_share: float = 1.0
 
@@ -127,7 +126,6 @@ class HsvConfig:
         par[kernel.P_BAND] = self.band_pa
         par[kernel.P_REST] = self.rest_share
         par[kernel.P_FINE_BAND] = self.fine_band_pa
-        par[kernel.P_FINE_SLOPE] = self.fine_slope_pa_per_s * self.period_s
         par[kernel.P_LOOK_AHEAD] = self.look_ahead_periods
         par[kernel.P_CORRECT] = self.correct
         par[kernel.P_CORRECT_VOLUME] = self.correct_volume

@@ -23,9 +23,9 @@ left at the end of that prediction. What the model misses is learned slowly in t
 numbers: a gain of the fill flow, a gain of the vent flow and a drift (leak, moving
 volume).
 
-Both duties are exactly 0 while the predicted error is inside the set-point band, which is
-narrower while the command stands still. Where less is wanted than the shortest possible
-pulse does, both
+The valves rest, both duties exactly 0, once the predicted error is inside the fine band,
+and until it leaves the set-point band, so that the noise of the sensor does not wake them.
+Where less is wanted than the shortest possible pulse does, both
 valves open in the same period and the difference of their pulses is the dose
 (``hsv_pulses``). Where that would take pulses too long, at low pressure, an error below a
 part of the shortest pulse's effect is left alone.
@@ -58,7 +58,7 @@ P_OPEN = 8              # opening time, part of a period
 P_CLOSE = 9             # closing time, part of a period
 P_PULSE_MARGIN = 10     # shortest pulse beyond the opening time, part of a period
 P_GAIN = 11             # share of the predicted error removed per period
-P_BAND = 12             # set-point band, half width [Pa]
+P_BAND = 12             # set-point band: the valves start beyond this error [Pa]
 P_REST = 13             # errors below this share of the shortest pulse's effect rest
 P_CORRECT = 14          # observer: pressure correction per period
 P_CORRECT_VOLUME = 15   # observer: correction of volume, in pressure
@@ -77,10 +77,9 @@ P_LEARN_DRIFT = 27      # observer: learning of the drift
 P_LEARN_GAIN = 28       # observer: learning of the flow gains
 P_SWING_LOWEST = 29     # lowest natural frequency of the load [rad/period]
 P_LOOK_AHEAD = 30       # periods the error is looked ahead without the valves
-P_FINE_BAND = 31        # set-point band while the command stands still, 0 = no pairs [Pa]
-P_FINE_SLOPE = 32       # change of the command [Pa per period] below which it stands still
-P_LEARN_DELAY = 33      # observer: learning of the dead time
-PAR_SIZE = 34
+P_FINE_BAND = 31        # and rest again within this one, 0 = no pairs of pulses [Pa]
+P_LEARN_DELAY = 32      # observer: learning of the dead time
+PAR_SIZE = 33
 
 _DELAY_MEAN = 0.3       # of the running mean of what a wrong dead time does, per period
 
@@ -99,7 +98,8 @@ S_VOLUME_RATE = 10      # and its rate [m^3 per period]
 S_DELAY_SHIFT = 11      # learned dead time less the one told of [periods]
 S_DELAY_EFFECT = 12     # what a period less of it would have added to the reading [Pa]
 S_DELAY_MEAN = 13       # its running mean [Pa]
-S_SENT = 14             # openings under way, newest first, fill > 0, vent < 0
+S_AT_WORK = 14          # 1 from an error beyond the band until one within the fine band
+S_SENT = 15             # openings under way, newest first, fill > 0, vent < 0
 SENT_SIZE = 32
 STATE_SIZE = S_SENT + SENT_SIZE
 
@@ -326,9 +326,11 @@ def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     ``p_pa`` is the pressure it starts at, ``error`` what it has to change [Pa].
     """
     pairs = par[P_FINE_BAND] > 0.0
-    still = abs(state[S_SLOPE]) <= par[P_FINE_SLOPE]
-    if abs(error) <= (par[P_FINE_BAND] if pairs and still else par[P_BAND]):
+    at_work = pairs and state[S_AT_WORK] > 0.0
+    if abs(error) <= (par[P_FINE_BAND] if at_work else par[P_BAND]):
+        state[S_AT_WORK] = 0.0
         return 0.0, 0.0
+    state[S_AT_WORK] = 1.0
     # The slope is part of the error one period on: only the rest is scaled by the gain.
     if slope_pa * error < 0.0:
         slope_pa = 0.0
