@@ -89,7 +89,7 @@ _RANGES = {
     'hsv.slope_share': (0.0, 1.0, 'share of the slope of the command fed forward'),
     'hsv.band_pa': (0.0, 5e4, 'errors beyond start the valves'),
     'hsv.rest_share': (0.0, 1.0, 'errors below this share of the shortest pulse rest'),
-    'hsv.fine_band_pa': (0.0, 5e4, 'errors within let the valves rest again; 0 = no pairs of pulses'),
+    'hsv.fine_band_pa': (0.0, 5e4, 'errors within end their work; 0 = no pairs of pulses'),
     'hsv.look_ahead_periods': (1.0, 20.0, 'periods the error is looked ahead'),
     'hsv.correct': (0.0, 1.0, 'observer: correction of the pressure'),
     'hsv.correct_volume': (-1.0, 1.0, 'observer: correction of the volume'),

@@ -82,6 +82,8 @@ P_LEARN_DELAY = 32      # observer: learning of the dead time
 PAR_SIZE = 33
 
 _DELAY_MEAN = 0.3       # of the running mean of what a wrong dead time does, per period
+_LEARN_PAIR = 0.06      # of a pair's error taken over, per period
+_PAIR_LIMIT = 0.5
 
 # State.
 S_MODEL = 0             # model pressure now [Pa]
@@ -99,9 +101,11 @@ S_DELAY_SHIFT = 11      # learned dead time less the one told of [periods]
 S_DELAY_EFFECT = 12     # what a period less of it would have added to the reading [Pa]
 S_DELAY_MEAN = 13       # its running mean [Pa]
 S_AT_WORK = 14          # 1 from an error beyond the band until one within the fine band
-S_SENT = 15             # openings under way, newest first, fill > 0, vent < 0
+S_PAIR_GAIN = 15        # learned: what a pair fills too much, share of what goes through it
+S_SENT = 16             # openings under way, newest first, fill > 0, vent < 0
 SENT_SIZE = 32
-STATE_SIZE = S_SENT + SENT_SIZE
+S_THROUGH = S_SENT + SENT_SIZE      # of the same periods, air through both valves [Pa]
+STATE_SIZE = S_THROUGH + SENT_SIZE
 
 # Output.
 O_FILL = 0              # fill duty 0..1
@@ -224,6 +228,7 @@ def observe(state, par, p_meas_pa, supply_pa):
     after, vol, vrate, flow_late = _advance(
         state, par, p_pa, vol, vrate, late, 1.0 - part, supply_pa)
     flow = flow_early + flow_late
+    through = (part * state[S_THROUGH + whole + 1] + (1.0 - part) * state[S_THROUGH + whole])
     state[S_DELAY_EFFECT] += flow - state[S_FLOW]
     state[S_FLOW] = flow
     state[S_MODEL] = after
@@ -240,23 +245,29 @@ def observe(state, par, p_meas_pa, supply_pa):
         per_pa = vol / after
         state[S_VOLUME] = max(vol + par[P_CORRECT_VOLUME] * error * per_pa, par[P_VOLUME])
         state[S_VOLUME_RATE] = vrate - par[P_CORRECT_RATE] * error * per_pa
-    # A large flow points to a wrong flow gain, a small one, which may be the difference of
-    # two, to a drift: that of filling and venting together cannot tell a gain from a drift.
+    # A large flow points to a wrong flow gain, a pair of pulses to a wrong difference of two,
+    # anything else to a drift.
+    power = through * through + par[P_FLOW_SCALE] ** 2
+    pair = state[S_PAIR_GAIN] + _LEARN_PAIR * error * through / power
+    state[S_PAIR_GAIN] = min(max(pair, -_PAIR_LIMIT), _PAIR_LIMIT)
     share = 0.0
     if abs(flow) > par[P_FLOW_SCALE]:
         share = 1.0 - (par[P_FLOW_SCALE] / flow) ** 2
         index = S_FILL_GAIN if flow > 0.0 else S_VENT_GAIN
         gain = state[index] * (1.0 + par[P_LEARN_GAIN] * share * error / flow)
         state[index] = min(max(gain, 1.0 / par[P_GAIN_LIMIT]), par[P_GAIN_LIMIT])
-    drift = state[S_DRIFT] + par[P_LEARN_DRIFT] * (1.0 - share) * error
+    rest = (1.0 - share) * (1.0 - through * through / power)
+    drift = state[S_DRIFT] + par[P_LEARN_DRIFT] * rest * error
     state[S_DRIFT] = min(max(drift, -par[P_DRIFT_LIMIT]), par[P_DRIFT_LIMIT])
 
 
 @compiled
-def _push(state, opening):
-    for i in range(S_SENT + SENT_SIZE - 1, S_SENT, -1):
-        state[i] = state[i - 1]
+def _push(state, opening, through_pa):
+    for i in range(SENT_SIZE - 1, 0, -1):
+        state[S_SENT + i] = state[S_SENT + i - 1]
+        state[S_THROUGH + i] = state[S_THROUGH + i - 1]
     state[S_SENT] = opening
+    state[S_THROUGH] = through_pa
 
 
 @compiled
@@ -347,8 +358,10 @@ def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     if pairs and abs(wanted) < shortest * full:
         other = abs(_full_rate(state, par, middle, volume_m3, supply_pa, not filling))
         if other > 0.0:
+            through = shortest * min(full, other)
             fill, vent = pair_openings(
-                wanted, full if filling else other, other if filling else full, shortest)
+                wanted - state[S_PAIR_GAIN] * through,
+                full if filling else other, other if filling else full, shortest)
             if max(fill, vent) <= LONGEST_OF_A_PAIR:
                 return fill, vent
     if abs(error) < par[P_REST] * shortest * full:
@@ -359,14 +372,16 @@ def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
 
 @compiled
 def _joined(state, par, p_pa, volume_m3, supply_pa, fill_duty, vent_duty):
-    """Return the signed opening that acts like two duties at a pressure."""
+    """Return the signed opening that acts like two duties, and the air through both [Pa]."""
     fill = opening_of_duty(fill_duty, par[P_OPEN], par[P_CLOSE])
     vent = opening_of_duty(vent_duty, par[P_OPEN], par[P_CLOSE])
     if fill <= 0.0 or vent <= 0.0:
-        return fill - vent
+        return fill - vent, 0.0
+    fill_rate = _full_rate(state, par, p_pa, volume_m3, supply_pa, True)
+    vent_rate = -_full_rate(state, par, p_pa, volume_m3, supply_pa, False)
+    through = min(fill * fill_rate, vent * vent_rate)
     return joined_opening(
-        fill, vent, _full_rate(state, par, p_pa, volume_m3, supply_pa, True),
-        -_full_rate(state, par, p_pa, volume_m3, supply_pa, False))
+        fill, vent, fill_rate, vent_rate, state[S_PAIR_GAIN] * through), through
 
 
 @compiled
@@ -390,6 +405,7 @@ def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     out[O_SATURATED] = 0.0
     out[O_PREDICTED] = math.nan
     sent = 0.0
+    through = 0.0
     if state[S_STARTED] > 0.5:
         predicted, vol, vrate = predict(state, par, supply_pa)
         out[O_PREDICTED] = predicted
@@ -399,8 +415,9 @@ def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
         out[O_VENT] = _duty(par, vent)
         if out[O_FILL] >= 1.0 or out[O_VENT] >= 1.0:
             out[O_SATURATED] = 1.0 if out[O_FILL] >= 1.0 else -1.0
-        sent = _joined(state, par, predicted, vol, supply_pa, out[O_FILL], out[O_VENT])
-    _push(state, sent)
+        sent, through = _joined(
+            state, par, predicted, vol, supply_pa, out[O_FILL], out[O_VENT])
+    _push(state, sent, through)
 
 
 @compiled
@@ -408,8 +425,9 @@ def _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
     if not math.isfinite(supply_pa):
         supply_pa = par[P_SUPPLY]
     observe(state, par, p_meas_pa, supply_pa)
-    _push(state, _joined(state, par, state[S_MODEL], state[S_VOLUME], supply_pa,
-                         fill_duty, vent_duty))
+    sent, through = _joined(state, par, state[S_MODEL], state[S_VOLUME], supply_pa,
+                            fill_duty, vent_duty)
+    _push(state, sent, through)
     state[S_COMMAND] = math.nan
     state[S_SLOPE] = 0.0
 
@@ -436,9 +454,7 @@ def _entries(key):
 
     @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
     def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
-        """
-        One PWM period with imposed duties (venting, missed tick): only the model goes on.
-        """
+        """One PWM period with imposed duties (vent, missed tick): only the model goes on."""
         if key >= 0:
             _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa)
 

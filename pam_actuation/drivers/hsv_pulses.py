@@ -73,11 +73,11 @@ def pair_openings(wanted_pa, fill_rate_pa, vent_rate_pa, shortest):
 
 
 @compiled
-def joined_opening(fill, vent, fill_rate_pa, vent_rate_pa):
-    """Return the one signed opening, fill > 0, that acts like both openings together."""
-    if vent <= 0.0:
-        return fill
-    if fill <= 0.0:
-        return -vent
-    net_pa = fill * fill_rate_pa - vent * vent_rate_pa
+def joined_opening(fill, vent, fill_rate_pa, vent_rate_pa, more_pa=0.0):
+    """
+    Return the one signed opening, fill > 0, that acts like both openings together.
+
+    ``more_pa`` is what they are known to fill more than their rates say.
+    """
+    net_pa = fill * fill_rate_pa - vent * vent_rate_pa + more_pa
     return net_pa / (fill_rate_pa if net_pa > 0.0 else vent_rate_pa)

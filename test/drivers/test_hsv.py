@@ -70,7 +70,7 @@ def test_tracks_a_sine(rig, hz, rms_kpa):
     """150-550 kPa: lag of dead time + at most 2 periods, small error beside the lag."""
     p, c, duties = run(rig, lambda t: 350.0 - 200.0 * math.cos(2 * math.pi * hz * t), 6.0)
     lag_ms, rms, _ = lag_and_rest(p, c)
-    assert 30 <= lag_ms <= 50
+    assert 30 <= lag_ms <= 55
     assert rms < rms_kpa
     assert duties[duties.min(axis=1) > 0.0].max(initial=0.0) <= pulses.LONGEST_OF_A_PAIR
 
@@ -84,13 +84,13 @@ def test_one_hertz_within_what_the_valve_can(rig):
 
 @pytest.mark.parametrize('seed', [1, 2, 3])
 def test_step_and_rest(rig, seed):
-    """200 to 400 kPa: fast, overshoot below two shortest pulses, then both valves shut."""
+    """200 to 400 kPa: fast, little overshoot, then both valves shut."""
     p, _, duties = run(rig, lambda t: 200.0 if t < 1.5 else 400.0, 4.0, seed=seed)
     after = p[1500:]
-    assert np.argmax(after > 392.0) < 190            # ms; the fill valve alone needs 130
-    assert after.max() - 400.0 < 2 * 3.4
-    assert np.abs(p[3000:] - 400.0).max() < 2.5
-    assert np.ptp(p[3500:]) < 4.0
+    assert np.argmax(after > 392.0) < 230            # ms; the fill valve alone needs 130
+    assert after.max() - 400.0 < 5.0
+    assert np.abs(p[3000:] - 400.0).max() < 1.0
+    assert np.ptp(p[3500:]) < 1.0
     assert np.count_nonzero(duties[350:]) <= 4
 
 
@@ -125,10 +125,10 @@ def test_stands_wrong_numbers(rig, change):
     """With a rig 20 % and more off its data sheet the loop settles and rests."""
     config = driver_config(rig).hsv
     p, _, duties = run(rig.with_(parameters=change),
-                       lambda t: 200.0 if t < 1.5 else 400.0, 4.5, config)
+                       lambda t: 200.0 if t < 1.5 else 400.0, 6.5, config)
     assert p[1500:].max() - 400.0 < 20.0
-    assert np.abs(p[4000:] - 400.0).max() < 4.0
-    assert np.count_nonzero(duties[400:]) <= 10
+    assert np.abs(p[4000:] - 400.0).max() < 2.0
+    assert np.count_nonzero(duties[600:]) <= 10
 
 
 @pytest.mark.parametrize('delay_s', [0.024, 0.036])
@@ -172,8 +172,8 @@ def test_two_pulses_make_a_small_dose(wanted_pa):
     assert 16e3 * fill - 12e3 * vent == pytest.approx(wanted_pa, abs=1e-6)
     one = pulses.joined_opening(fill, vent, 16e3, 12e3)
     assert (16e3 if one > 0.0 else 12e3) * one == pytest.approx(wanted_pa, abs=1e-6)
-    assert pulses.joined_opening(0.3, 0.0, 16e3, 12e3) == 0.3
-    assert pulses.joined_opening(0.0, 0.3, 16e3, 12e3) == -0.3
+    assert pulses.joined_opening(0.3, 0.0, 16e3, 12e3) == pytest.approx(0.3)
+    assert pulses.joined_opening(0.0, 0.3, 16e3, 12e3) == pytest.approx(-0.3)
 
 
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
