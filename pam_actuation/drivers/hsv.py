@@ -64,7 +64,7 @@ class HsvConfig:
     close_time_s: float = 0.0020
     pulse_margin_s: float = 0.0001
     gain: float = 0.26
-    band_pa: float = 700.0
+    band_pa: float = 1_000.0
     rest_share: float = 0.6
     fine_band_pa: float = 400.0
     look_ahead_periods: float = 1.0
