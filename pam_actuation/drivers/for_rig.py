@@ -26,9 +26,8 @@ from pam_actuation.drivers.config import DriverConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 _UNKNOWN_SWING_HZ = 5.9
-# The way of a reading to the signal; and taken too long it calms the loop, too short it swings.
-_DEAD_TIME_MARGIN_S = 0.006
-_GAIN, _GAIN_AT_ONCE = 0.6, 0.7
+_DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
+_GAIN, _GAIN_AT_ONCE = 0.26, 0.7
 _GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
 
 

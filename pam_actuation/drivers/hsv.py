@@ -42,7 +42,9 @@ class HsvConfig:
     (absolute, used where no supply is measured), ``open_time_s`` and ``close_time_s``,
     ``dead_time_s`` from duty to pressure. Volumes include the dead volume and hold at 0
     and at 600 kPa gauge. Loop: ``gain`` share of the predicted error removed per
-    period, ``band_pa`` half width of the set-point band.
+    period, ``band_pa`` error beyond which the valves start, ``fine_band_pa`` that within which
+    they rest again; where this is 0 they never open together for a dose smaller than the
+    shortest pulse.
     """
 
     period_s: float = 0.010
@@ -61,18 +63,21 @@ class HsvConfig:
     open_time_s: float = 0.0017
     close_time_s: float = 0.0020
     pulse_margin_s: float = 0.0001
-    gain: float = 0.6
+    gain: float = 0.26
     band_pa: float = 1_000.0
     rest_share: float = 0.6
-    look_ahead_periods: float = 3.0
-    correct: float = 0.2
-    correct_volume: float = 0.0
-    correct_rate: float = 0.05
+    fine_band_pa: float = 400.0
+    look_ahead_periods: float = 1.0
+    correct: float = 0.55
+    correct_volume: float = 0.08
+    correct_rate: float = 0.07
     learn_drift: float = 0.01
-    learn_gain: float = 0.03
+    learn_gain: float = 0.007
+    learn_dead_time: float = 0.02
+    dead_time_range_s: float = 0.015
     flow_scale_pa: float = 4_000.0
     gain_limit: float = 2.0
-    drift_limit_pa_per_s: float = 500_000.0
+    drift_limit_pa_per_s: float = 100_000.0
     supply_margin_pa: float = 5_000.0
     slope_share: float = 1.0
 
@@ -90,12 +95,11 @@ class HsvConfig:
         if not 0.0 <= self.dead_time_s < longest_s:
             raise InputError(f'dead time of {self.dead_time_s} s, allowed are 0 to below '
                              f'{longest_s:.2f} s', 'dead_time_s')
-        delay = round(self.dead_time_s / self.period_s, 9)
-        whole = math.floor(delay)
         par = np.zeros(kernel.PAR_SIZE)
         par[kernel.P_PERIOD] = self.period_s
-        par[kernel.P_DELAY_WHOLE] = whole
-        par[kernel.P_DELAY_PART] = delay - whole
+        par[kernel.P_DELAY] = round(self.dead_time_s / self.period_s, 9)
+        par[kernel.P_DELAY_RANGE] = self.dead_time_range_s / self.period_s
+        par[kernel.P_LEARN_DELAY] = self.learn_dead_time
         par[kernel.P_CONDUCTANCE] = (
             self.conductance_m3_per_s_pa * RHO_REFERENCE
             * math.sqrt(T_REFERENCE_K / TEMPERATURE_K))
@@ -121,6 +125,7 @@ class HsvConfig:
         par[kernel.P_GAIN] = self.gain
         par[kernel.P_BAND] = self.band_pa
         par[kernel.P_REST] = self.rest_share
+        par[kernel.P_FINE_BAND] = self.fine_band_pa
         par[kernel.P_LOOK_AHEAD] = self.look_ahead_periods
         par[kernel.P_CORRECT] = self.correct
         par[kernel.P_CORRECT_VOLUME] = self.correct_volume
@@ -187,6 +192,12 @@ class HsvLaw:
     def predicted_pa(self):
         """Return the pressure [Pa] predicted for when the newest opening begins to act."""
         return self.out[kernel.O_PREDICTED]
+
+    @property
+    def dead_time_s(self):
+        """Return the dead time [s] as learned so far."""
+        periods = self.par[kernel.P_DELAY] + self.state[kernel.S_DELAY_SHIFT]
+        return max(periods, 0.0) * self.config.period_s
 
     @property
     def flow_pa(self):

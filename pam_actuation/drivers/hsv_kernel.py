@@ -23,12 +23,14 @@ left at the end of that prediction. What the model misses is learned slowly in t
 numbers: a gain of the fill flow, a gain of the vent flow and a drift (leak, moving
 volume).
 
-Both duties are exactly 0 while the predicted error is inside the set-point band, and
-an error smaller than a part of what the shortest possible pulse would do is left alone,
-so that the valves rest. Never are both duties above 0.
+The valves rest, both duties exactly 0, once the predicted error is inside the fine band,
+and until it leaves the set-point band, so that the noise of the sensor does not wake them.
+Where less is wanted than the shortest possible pulse does, both
+valves open in the same period and the difference of their pulses is the dose
+(``hsv_pulses``). Where that would take pulses too long, at low pressure, an error below a
+part of the shortest pulse's effect is left alone.
 
-Sources: ISO 6358 (flow); the opening and closing times act as in a pulse of length
-on: open from on-delay to off-delay, nothing if shorter than the on-delay.
+Source: ISO 6358 (flow).
 
 ``P_*`` index the parameter array, ``S_*`` the state array, ``O_*`` the output array.
 """
@@ -36,14 +38,17 @@ on: open from on-delay to off-delay, nothing if shorter than the on-delay.
 import math
 
 from numba import njit
+from pam_actuation.drivers.hsv_pulses import (
+    duty_of_opening, joined_opening, LONGEST_OF_A_PAIR, opening_of_duty, pair_openings,
+    shortest_opening)
 from pam_sim.compiled import compiled, source_key
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
 # Parameters.
 P_PERIOD = 0            # PWM period [s]
-P_DELAY_WHOLE = 1       # dead time, whole periods
-P_DELAY_PART = 2        # dead time, rest as a part of a period
+P_DELAY = 1             # dead time told of [periods]
+P_DELAY_RANGE = 2       # the learned dead time stays within +- this of it [periods]
 P_CONDUCTANCE = 3       # C rho0 sqrt(T0/T) [kg/(s Pa)]
 P_CRITICAL_RATIO = 4    # b
 P_SUPPLY = 5            # nominal supply [Pa absolute]
@@ -53,7 +58,7 @@ P_OPEN = 8              # opening time, part of a period
 P_CLOSE = 9             # closing time, part of a period
 P_PULSE_MARGIN = 10     # shortest pulse beyond the opening time, part of a period
 P_GAIN = 11             # share of the predicted error removed per period
-P_BAND = 12             # set-point band, half width [Pa]
+P_BAND = 12             # set-point band: the valves start beyond this error [Pa]
 P_REST = 13             # errors below this share of the shortest pulse's effect rest
 P_CORRECT = 14          # observer: pressure correction per period
 P_CORRECT_VOLUME = 15   # observer: correction of volume, in pressure
@@ -72,7 +77,13 @@ P_LEARN_DRIFT = 27      # observer: learning of the drift
 P_LEARN_GAIN = 28       # observer: learning of the flow gains
 P_SWING_LOWEST = 29     # lowest natural frequency of the load [rad/period]
 P_LOOK_AHEAD = 30       # periods the error is looked ahead without the valves
-PAR_SIZE = 31
+P_FINE_BAND = 31        # and rest again within this one, 0 = no pairs of pulses [Pa]
+P_LEARN_DELAY = 32      # observer: learning of the dead time
+PAR_SIZE = 33
+
+_DELAY_MEAN = 0.3       # of the running mean of what a wrong dead time does, per period
+_LEARN_PAIR = 0.06      # of a pair's error taken over, per period
+_PAIR_LIMIT = 0.5
 
 # State.
 S_MODEL = 0             # model pressure now [Pa]
@@ -86,9 +97,15 @@ S_SLOPE = 7             # former change of the command [Pa per period]
 S_FLOW = 8              # pressure change by the valves in the last period [Pa]
 S_VOLUME = 9            # model volume [m^3]
 S_VOLUME_RATE = 10      # and its rate [m^3 per period]
-S_SENT = 11             # openings under way, newest first, fill > 0, vent < 0
+S_DELAY_SHIFT = 11      # learned dead time less the one told of [periods]
+S_DELAY_EFFECT = 12     # what a period less of it would have added to the reading [Pa]
+S_DELAY_MEAN = 13       # its running mean [Pa]
+S_AT_WORK = 14          # 1 from an error beyond the band until one within the fine band
+S_PAIR_GAIN = 15        # learned: what a pair fills too much, share of what goes through it
+S_SENT = 16             # openings under way, newest first, fill > 0, vent < 0
 SENT_SIZE = 32
-STATE_SIZE = S_SENT + SENT_SIZE
+S_THROUGH = S_SENT + SENT_SIZE      # of the same periods, air through both valves [Pa]
+STATE_SIZE = S_THROUGH + SENT_SIZE
 
 # Output.
 O_FILL = 0              # fill duty 0..1
@@ -158,27 +175,30 @@ def _advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
 
 
 @compiled
-def duty_of_opening(opening, open_part, close_part, margin):
-    """Return the duty whose pulse is effectively open for ``opening`` (0..1) of a period."""
-    # A valve that has no time to shut before the next pulse stays open: between the
-    # longest pulse that still shuts and fully open there is nothing.
-    longest = 1.0 - close_part
-    if opening > 0.5 * (1.0 + longest - open_part + close_part):
-        return 1.0
-    duty = opening + open_part - close_part
-    return min(max(duty, open_part + margin), longest)
+def _delay(state, par):
+    """Return the dead time as whole periods and the part of one that is left."""
+    delay = min(max(par[P_DELAY] + state[S_DELAY_SHIFT], 0.0), SENT_SIZE - 2.0)
+    whole = min(int(delay), SENT_SIZE - 3)
+    return whole, delay - whole
 
 
 @compiled
-def opening_of_duty(duty, open_part, close_part):
-    """Return the effective opening (0..1 of a period) of a duty."""
-    if duty <= 0.0:
-        return 0.0
-    if duty > 1.0 - close_part:
-        return 1.0
-    if duty <= open_part:
-        return 0.0
-    return min(duty - open_part + close_part, 1.0)
+def _learn_delay(state, par, error):
+    """
+    Move the dead time where a change of the flow shows earlier or later than expected.
+
+    With the dead time a period too long a reading is off by the latest changes of the flow,
+    as far as the observer has not made up for them: a gradient step, normalised. Only the
+    quick part of them tells: the slow one goes with the motion of the load, whose volume the
+    model knows less well.
+    """
+    state[S_DELAY_MEAN] += _DELAY_MEAN * (state[S_DELAY_EFFECT] - state[S_DELAY_MEAN])
+    effect = state[S_DELAY_EFFECT] - state[S_DELAY_MEAN]
+    scale = par[P_FLOW_SCALE]
+    shift = state[S_DELAY_SHIFT] - (
+        par[P_LEARN_DELAY] * error * effect / (effect * effect + scale * scale))
+    state[S_DELAY_SHIFT] = min(max(shift, -par[P_DELAY_RANGE]), par[P_DELAY_RANGE])
+    state[S_DELAY_EFFECT] *= 1.0 - par[P_CORRECT]
 
 
 @compiled
@@ -199,8 +219,7 @@ def observe(state, par, p_meas_pa, supply_pa):
         state[S_VOLUME_RATE] = 0.0
         state[S_STARTED] = 1.0
         return
-    whole = int(par[P_DELAY_WHOLE])
-    part = par[P_DELAY_PART]
+    whole, part = _delay(state, par)
     before = state[S_MODEL]
     early = state[S_SENT + whole + 1]
     late = state[S_SENT + whole]
@@ -209,6 +228,8 @@ def observe(state, par, p_meas_pa, supply_pa):
     after, vol, vrate, flow_late = _advance(
         state, par, p_pa, vol, vrate, late, 1.0 - part, supply_pa)
     flow = flow_early + flow_late
+    through = (part * state[S_THROUGH + whole + 1] + (1.0 - part) * state[S_THROUGH + whole])
+    state[S_DELAY_EFFECT] += flow - state[S_FLOW]
     state[S_FLOW] = flow
     state[S_MODEL] = after
     state[S_VOLUME] = vol
@@ -218,27 +239,35 @@ def observe(state, par, p_meas_pa, supply_pa):
     rate = (after - before) / par[P_PERIOD]
     error = p_meas_pa - (after - rate * state[S_AGE])
     state[S_MODEL] = after + par[P_CORRECT] * error
+    _learn_delay(state, par, error)
     if vol > par[P_VOLUME]:
         # A reading above the model: the volume grows less than it thinks.
         per_pa = vol / after
         state[S_VOLUME] = max(vol + par[P_CORRECT_VOLUME] * error * per_pa, par[P_VOLUME])
         state[S_VOLUME_RATE] = vrate - par[P_CORRECT_RATE] * error * per_pa
-    # A large flow points to a wrong flow gain, a small one to a drift.
-    scale = par[P_FLOW_SCALE]
-    share = flow * flow / (flow * flow + scale * scale)
-    if share > 0.0:
+    # A large flow points to a wrong flow gain, a pair of pulses to a wrong difference of two,
+    # anything else to a drift.
+    power = through * through + par[P_FLOW_SCALE] ** 2
+    pair = state[S_PAIR_GAIN] + _LEARN_PAIR * error * through / power
+    state[S_PAIR_GAIN] = min(max(pair, -_PAIR_LIMIT), _PAIR_LIMIT)
+    share = 0.0
+    if abs(flow) > par[P_FLOW_SCALE]:
+        share = 1.0 - (par[P_FLOW_SCALE] / flow) ** 2
         index = S_FILL_GAIN if flow > 0.0 else S_VENT_GAIN
         gain = state[index] * (1.0 + par[P_LEARN_GAIN] * share * error / flow)
         state[index] = min(max(gain, 1.0 / par[P_GAIN_LIMIT]), par[P_GAIN_LIMIT])
-    drift = state[S_DRIFT] + par[P_LEARN_DRIFT] * (1.0 - share) * error
+    rest = (1.0 - share) * (1.0 - through * through / power)
+    drift = state[S_DRIFT] + par[P_LEARN_DRIFT] * rest * error
     state[S_DRIFT] = min(max(drift, -par[P_DRIFT_LIMIT]), par[P_DRIFT_LIMIT])
 
 
 @compiled
-def _push(state, opening):
-    for i in range(S_SENT + SENT_SIZE - 1, S_SENT, -1):
-        state[i] = state[i - 1]
+def _push(state, opening, through_pa):
+    for i in range(SENT_SIZE - 1, 0, -1):
+        state[S_SENT + i] = state[S_SENT + i - 1]
+        state[S_THROUGH + i] = state[S_THROUGH + i - 1]
     state[S_SENT] = opening
+    state[S_THROUGH] = through_pa
 
 
 @compiled
@@ -249,10 +278,10 @@ def predict(state, par, supply_pa):
     Returns pressure [Pa], volume [m^3] and its rate [m^3 per period] when the next
     opening begins to act.
     """
-    whole = int(par[P_DELAY_WHOLE])
+    whole, part = _delay(state, par)
     p_pa, vol, vrate, _ = _advance(
         state, par, state[S_MODEL], state[S_VOLUME], state[S_VOLUME_RATE],
-        state[S_SENT + whole], par[P_DELAY_PART], supply_pa)
+        state[S_SENT + whole], part, supply_pa)
     for i in range(whole - 1, -1, -1):
         p_pa, vol, vrate, _ = _advance(
             state, par, p_pa, vol, vrate, state[S_SENT + i], 1.0, supply_pa)
@@ -301,14 +330,18 @@ def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
 
 
 @compiled
-def _wanted_opening(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
+def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     """
-    Return the signed opening for the next period.
+    Return the openings (fill, vent) for the next period.
 
     ``p_pa`` is the pressure it starts at, ``error`` what it has to change [Pa].
     """
-    if abs(error) <= par[P_BAND]:
-        return 0.0
+    pairs = par[P_FINE_BAND] > 0.0
+    at_work = pairs and state[S_AT_WORK] > 0.0
+    if abs(error) <= (par[P_FINE_BAND] if at_work else par[P_BAND]):
+        state[S_AT_WORK] = 0.0
+        return 0.0, 0.0
+    state[S_AT_WORK] = 1.0
     # The slope is part of the error one period on: only the rest is scaled by the gain.
     if slope_pa * error < 0.0:
         slope_pa = 0.0
@@ -320,14 +353,43 @@ def _wanted_opening(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
     middle = min(max(middle, P_ATM_PA), supply_pa)
     full = abs(_full_rate(state, par, middle, volume_m3, supply_pa, filling))
     if full <= 0.0:
-        return 0.0
-    shortest = 0.0
-    if par[P_OPEN] > 0.0 or par[P_CLOSE] > 0.0:
-        shortest = min(par[P_CLOSE] + par[P_PULSE_MARGIN], 1.0)
+        return 0.0, 0.0
+    shortest = shortest_opening(par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
+    if pairs and abs(wanted) < shortest * full:
+        other = abs(_full_rate(state, par, middle, volume_m3, supply_pa, not filling))
+        if other > 0.0:
+            through = shortest * min(full, other)
+            fill, vent = pair_openings(
+                wanted - state[S_PAIR_GAIN] * through,
+                full if filling else other, other if filling else full, shortest)
+            if max(fill, vent) <= LONGEST_OF_A_PAIR:
+                return fill, vent
     if abs(error) < par[P_REST] * shortest * full:
-        return 0.0
+        return 0.0, 0.0
     opening = min(max(abs(wanted) / full, shortest), 1.0)
-    return opening if filling else -opening
+    return (opening, 0.0) if filling else (0.0, opening)
+
+
+@compiled
+def _joined(state, par, p_pa, volume_m3, supply_pa, fill_duty, vent_duty):
+    """Return the signed opening that acts like two duties, and the air through both [Pa]."""
+    fill = opening_of_duty(fill_duty, par[P_OPEN], par[P_CLOSE])
+    vent = opening_of_duty(vent_duty, par[P_OPEN], par[P_CLOSE])
+    if fill <= 0.0 or vent <= 0.0:
+        return fill - vent, 0.0
+    fill_rate = _full_rate(state, par, p_pa, volume_m3, supply_pa, True)
+    vent_rate = -_full_rate(state, par, p_pa, volume_m3, supply_pa, False)
+    through = min(fill * fill_rate, vent * vent_rate)
+    return joined_opening(
+        fill, vent, fill_rate, vent_rate, state[S_PAIR_GAIN] * through), through
+
+
+@compiled
+def _duty(par, opening):
+    """Return the duty of an opening, exactly 0 for none."""
+    if opening <= 0.0:
+        return 0.0
+    return duty_of_opening(opening, par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
 
 
 @compiled
@@ -338,24 +400,24 @@ def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     slope = _command_slope(state, par, p_cmd_pa)
     target = max(min(p_cmd_pa, supply_pa - par[P_SUPPLY_MARGIN]), P_ATM_PA)
     out[O_TARGET] = target
-    opening = 0.0
+    out[O_FILL] = 0.0
+    out[O_VENT] = 0.0
+    out[O_SATURATED] = 0.0
     out[O_PREDICTED] = math.nan
+    sent = 0.0
+    through = 0.0
     if state[S_STARTED] > 0.5:
         predicted, vol, vrate = predict(state, par, supply_pa)
         out[O_PREDICTED] = predicted
         error = _free_error(state, par, predicted, vol, vrate, target, supply_pa)
-        opening = _wanted_opening(state, par, predicted, vol, error, slope, supply_pa)
-    out[O_FILL] = 0.0
-    out[O_VENT] = 0.0
-    out[O_SATURATED] = 0.0
-    if opening != 0.0:
-        duty = duty_of_opening(abs(opening), par[P_OPEN], par[P_CLOSE], par[P_PULSE_MARGIN])
-        out[O_FILL if opening > 0.0 else O_VENT] = duty
-        if duty >= 1.0:
-            out[O_SATURATED] = math.copysign(1.0, opening)
-        opening = math.copysign(
-            opening_of_duty(duty, par[P_OPEN], par[P_CLOSE]), opening)
-    _push(state, opening)
+        fill, vent = _wanted_openings(state, par, predicted, vol, error, slope, supply_pa)
+        out[O_FILL] = _duty(par, fill)
+        out[O_VENT] = _duty(par, vent)
+        if out[O_FILL] >= 1.0 or out[O_VENT] >= 1.0:
+            out[O_SATURATED] = 1.0 if out[O_FILL] >= 1.0 else -1.0
+        sent, through = _joined(
+            state, par, predicted, vol, supply_pa, out[O_FILL], out[O_VENT])
+    _push(state, sent, through)
 
 
 @compiled
@@ -363,9 +425,9 @@ def _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
     if not math.isfinite(supply_pa):
         supply_pa = par[P_SUPPLY]
     observe(state, par, p_meas_pa, supply_pa)
-    fill = opening_of_duty(fill_duty, par[P_OPEN], par[P_CLOSE])
-    vent = opening_of_duty(vent_duty, par[P_OPEN], par[P_CLOSE])
-    _push(state, fill - vent)
+    sent, through = _joined(state, par, state[S_MODEL], state[S_VOLUME], supply_pa,
+                            fill_duty, vent_duty)
+    _push(state, sent, through)
     state[S_COMMAND] = math.nan
     state[S_SLOPE] = 0.0
 
@@ -392,11 +454,7 @@ def _entries(key):
 
     @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
     def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
-        """
-        One PWM period with imposed duties (venting, missed tick): only the model goes on.
-
-        The open valve of larger effect counts where both are open.
-        """
+        """One PWM period with imposed duties (vent, missed tick): only the model goes on."""
         if key >= 0:
             _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa)
 

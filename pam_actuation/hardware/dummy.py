@@ -14,7 +14,7 @@
 
 """Devices that are not there: to run the whole graph on a computer without any wiring."""
 
-from pam_actuation.hardware.valve_output import check_one_open, ValveOutput
+from pam_actuation.hardware.valve_output import check_pair, ValveOutput
 from pam_sim.units import P_ATM_PA
 
 
@@ -26,7 +26,7 @@ class DummyValve(ValveOutput):
     def write(self, efforts):
         """Keep the signal."""
         if len(efforts) == 2:
-            check_one_open(*efforts)
+            check_pair(*efforts)
         self.efforts = tuple(efforts)
 
     def vent(self):

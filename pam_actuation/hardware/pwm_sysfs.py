@@ -21,7 +21,7 @@ from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
-from pam_actuation.hardware.valve_output import check_one_open, ValveOutput
+from pam_actuation.hardware.valve_output import check_pair, ValveOutput
 
 EXPORT_WAIT_S = 1.0     # until the kernel shows a channel and udev hands it over
 NS_PER_S = 1e9
@@ -117,7 +117,7 @@ class PwmPair(ValveOutput):
     def write(self, efforts):
         """Send both duties, the one that shuts first."""
         fill, vent = efforts
-        check_one_open(fill, vent)
+        check_pair(fill, vent)
         order = ((self._fill, fill), (self._vent, vent))
         for channel, opening in order if vent > 0.0 else reversed(order):
             channel.set(opening)

@@ -22,6 +22,7 @@ through ``GuardedOutput`` only.
 import time
 import weakref
 
+from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
 from pam_actuation.hardware.sysfs import DeviceError
 
 TRIES = 3              # to vent, on the way out
@@ -69,12 +70,17 @@ class ValveOutput:
         """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
 
 
-def check_one_open(fill_duty, vent_duty):
-    """Raise DeviceError if filling and venting valve are to be open in the same period."""
-    if fill_duty > 0.0 and vent_duty > 0.0:
+def check_pair(fill_duty, vent_duty):
+    """
+    Raise DeviceError if both valves are to be open, one of them for long.
+
+    Short pulses of both in one period are a small dose of air; more would only blow from
+    the supply to the atmosphere.
+    """
+    if min(fill_duty, vent_duty) > 0.0 and max(fill_duty, vent_duty) > LONGEST_OF_A_PAIR:
         raise DeviceError(
             f'filling ({fill_duty:.3f}) and venting valve ({vent_duty:.3f}) are never open '
-            'together', 'valve signal')
+            f'together beyond a duty of {LONGEST_OF_A_PAIR}', 'valve signal')
 
 
 class GuardedOutput:

@@ -57,7 +57,7 @@ def want(tick, position, rate, lead_ticks, learn, inp):
 
 
 @compiled
-def drive(driver, hsv, command_pa, measured_pa):
+def drive(driver, hsv, command_pa, measured_pa, supply_pa=np.nan):
     """
     Run a driver law once and return its two valve signals.
 
@@ -69,12 +69,14 @@ def drive(driver, hsv, command_pa, measured_pa):
         Which law it is.
     command_pa, measured_pa : float
         Wanted and measured muscle pressure, absolute Pa.
+    supply_pa : float
+        Measured supply, absolute Pa; NaN where none is: the nominal one. Only for a pair.
 
     """
     state, par, out = driver
     if hsv:
         state[S_AGE] = 0.0
-        hsv_step(state, par, command_pa, measured_pa, np.nan, out)
+        hsv_step(state, par, command_pa, measured_pa, supply_pa, out)
         return out[0], out[1]
     ppr_step(state, par, command_pa, measured_pa, np.nan, out)
     return out[0], 0.0

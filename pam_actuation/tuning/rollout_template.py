@@ -65,7 +65,8 @@ def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, la
     signal_0 = plant_inp[layout.INP_SIGNAL_0]
     signal_1 = plant_inp[layout.INP_SIGNAL_1]
     if tick % driver_every == 0:
-        signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa)
+        supply_pa = disturbance[max(tick - 1, 0), 1]
+        signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa, supply_pa)
     plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
     plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
     for j in range(steps):

@@ -18,7 +18,7 @@ import math
 
 import numba
 import numpy as np
-from pam_actuation.drivers import hsv_kernel as kernel
+from pam_actuation.drivers import hsv_kernel as kernel, hsv_pulses as pulses
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvConfig, HsvLaw, initial_state
 import pam_sim
@@ -70,9 +70,9 @@ def test_tracks_a_sine(rig, hz, rms_kpa):
     """150-550 kPa: lag of dead time + at most 2 periods, small error beside the lag."""
     p, c, duties = run(rig, lambda t: 350.0 - 200.0 * math.cos(2 * math.pi * hz * t), 6.0)
     lag_ms, rms, _ = lag_and_rest(p, c)
-    assert 30 <= lag_ms <= 50
+    assert 30 <= lag_ms <= 55
     assert rms < rms_kpa
-    assert not np.any((duties[:, 0] > 0.0) & (duties[:, 1] > 0.0))
+    assert duties[duties.min(axis=1) > 0.0].max(initial=0.0) <= pulses.LONGEST_OF_A_PAIR
 
 
 def test_one_hertz_within_what_the_valve_can(rig):
@@ -84,13 +84,13 @@ def test_one_hertz_within_what_the_valve_can(rig):
 
 @pytest.mark.parametrize('seed', [1, 2, 3])
 def test_step_and_rest(rig, seed):
-    """200 to 400 kPa: fast, overshoot below two shortest pulses, then both valves shut."""
+    """200 to 400 kPa: fast, little overshoot, then both valves shut."""
     p, _, duties = run(rig, lambda t: 200.0 if t < 1.5 else 400.0, 4.0, seed=seed)
     after = p[1500:]
-    assert np.argmax(after > 392.0) < 190            # ms; the fill valve alone needs 130
-    assert after.max() - 400.0 < 2 * 3.4
-    assert np.abs(p[3000:] - 400.0).max() < 2.5
-    assert np.ptp(p[3500:]) < 4.0
+    assert np.argmax(after > 392.0) < 230            # ms; the fill valve alone needs 130
+    assert after.max() - 400.0 < 5.0
+    assert np.abs(p[3000:] - 400.0).max() < 1.0
+    assert np.ptp(p[3500:]) < 1.0
     assert np.count_nonzero(duties[350:]) <= 4
 
 
@@ -125,10 +125,10 @@ def test_stands_wrong_numbers(rig, change):
     """With a rig 20 % and more off its data sheet the loop settles and rests."""
     config = driver_config(rig).hsv
     p, _, duties = run(rig.with_(parameters=change),
-                       lambda t: 200.0 if t < 1.5 else 400.0, 4.5, config)
+                       lambda t: 200.0 if t < 1.5 else 400.0, 6.5, config)
     assert p[1500:].max() - 400.0 < 20.0
-    assert np.abs(p[4000:] - 400.0).max() < 4.0
-    assert np.count_nonzero(duties[400:]) <= 10
+    assert np.abs(p[4000:] - 400.0).max() < 2.0
+    assert np.count_nonzero(duties[600:]) <= 10
 
 
 @pytest.mark.parametrize('delay_s', [0.024, 0.036])
@@ -153,7 +153,7 @@ def test_nominal_rig_has_no_dead_time_to_wait_for():
 
 def test_duty_and_opening_are_inverse():
     """Opening times: shortest pulse, no pulse, always open."""
-    opening_of, duty_of = kernel.opening_of_duty, kernel.duty_of_opening
+    opening_of, duty_of = pulses.opening_of_duty, pulses.duty_of_opening
     assert opening_of(0.17, 0.17, 0.2) == 0.0
     assert opening_of(0.18, 0.17, 0.2) == pytest.approx(0.21)
     assert opening_of(0.81, 0.17, 0.2) == 1.0
@@ -162,6 +162,51 @@ def test_duty_and_opening_are_inverse():
         assert opening_of(duty, 0.17, 0.2) == pytest.approx(opening)
     assert duty_of(0.05, 0.17, 0.2, 0.01) == pytest.approx(0.18)
     assert opening_of(0.0, 0.0, 0.0) == 0.0 and opening_of(0.3, 0.0, 0.0) == 0.3
+
+
+@pytest.mark.parametrize('wanted_pa', [-3000.0, -1.0, 0.0, 700.0, 3000.0])
+def test_two_pulses_make_a_small_dose(wanted_pa):
+    """Neither is shorter than a valve can; their difference is the dose wanted."""
+    fill, vent = pulses.pair_openings(wanted_pa, 16e3, 12e3, 0.21)
+    assert min(fill, vent) == 0.21
+    assert 16e3 * fill - 12e3 * vent == pytest.approx(wanted_pa, abs=1e-6)
+    one = pulses.joined_opening(fill, vent, 16e3, 12e3)
+    assert (16e3 if one > 0.0 else 12e3) * one == pytest.approx(wanted_pa, abs=1e-6)
+    assert pulses.joined_opening(0.3, 0.0, 16e3, 12e3) == pytest.approx(0.3)
+    assert pulses.joined_opening(0.0, 0.3, 16e3, 12e3) == pytest.approx(-0.3)
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_small_steps_of_the_command(rig, fidelity):
+    """Steps of 1.2 kPa, a third of the shortest pulse, are followed; single pulses cannot."""
+    def command(now):
+        return 400.0 + 1.2 * (int(now) % 2)
+
+    rig = rig.with_(fidelity=fidelity)
+    away = {}
+    for band_pa in (400.0, 0.0):
+        config = driver_config(rig, {'hsv.fine_band_pa': band_pa}).hsv
+        p, c, duties = run(rig, command, 7.0, config)
+        away[band_pa] = np.abs((p - c).reshape(-1, 1000)[3:, 500:]).mean()
+        assert np.any(duties.min(axis=1) > 0.0) == (band_pa > 0.0)
+        assert np.mean(duties[300:].max(axis=1) == 0.0) > 0.5
+    assert away[400.0] < 0.35
+    assert away[400.0] < 0.6 * away[0.0]
+
+
+@pytest.mark.parametrize('delay_s', [0.020, 0.045])
+def test_learns_the_dead_time(rig, delay_s):
+    """Told of 30 ms it moves most of the way to the true one."""
+    effects = [{'name': item.name, 'parameters': {'delay_s': delay_s}
+                if item.name == 'valve_dead_time' else item.parameters} for item in rig.effects]
+    law = HsvLaw(driver_config(rig, {'hsv.learn_dead_time': 0.1, 'hsv.dead_time_s': 0.03}).hsv)
+    plant, noise = rig.with_(effects=effects).plant(1), np.random.default_rng(1)
+    for k in range(1500):
+        wanted = 350e3 + 100e3 * (k // 100 % 2)
+        duty = law.step(P_ATM_PA + wanted, plant.pressure_pa + NOISE_PA * noise.standard_normal())
+        for _ in range(10):
+            plant.step(duty)
+    assert law.dead_time_s == pytest.approx(delay_s, abs=0.005)
 
 
 def test_dead_time_longer_than_memory():

@@ -131,11 +131,11 @@ def test_what_shuts_is_written_before_what_opens(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize('backend', ['dummy', 'pwm_sysfs'])
-def test_both_valves_are_never_opened_together(tmp_path, backend):
+def test_both_valves_are_never_opened_together_for_long(tmp_path, backend):
     chip = make_pwm(tmp_path)
     output = open_one(tmp_path, 'hsv', backend)
-    assert output.send((0.3, 0.0)) == ''
-    assert 'never open together' in output.send((0.3, 0.1))
+    assert output.send((0.3, 0.0)) == '' and output.send((0.3, 0.25)) == ''
+    assert 'never open together beyond a duty of 0.5' in output.send((0.6, 0.1))
     assert output.failures == 1
     if backend == 'pwm_sysfs':
         assert duties(chip) == (0, PERIOD_NS)
