@@ -24,6 +24,8 @@ measured input), ``candidates`` (what may be missing), ``fit`` (one hypothesis),
 numbers are known), ``prove`` (free runs on data kept aside), ``locate`` (where the gap
 sits), ``workflow`` (all of it in order, and the verdict), ``words`` (the verdict in
 sentences), ``result`` (what gap.json holds).
+A witness without a model of what is missing: ``fingerprint``. Before anything is measured:
+``plan`` (what a protocol could show) and ``look_alikes``.
 """
 
 from pam_sim.gap.result import GapResult

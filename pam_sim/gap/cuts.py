@@ -91,6 +91,8 @@ class Cut:
         Made so far.
     part, block, signal : numpy.ndarray of int, shape (N,)
         Part, test block and signal (index into ``signals``) of every compared sample.
+    time_s, run : numpy.ndarray, shape (N,)
+        Its time in its recording, and which of them that is.
 
     """
 
@@ -104,9 +106,9 @@ class Cut:
         self.simulations, self._lock = 0, threading.Lock()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
-        self._index, parts, blocks, signals, measured = [], [], [], [], []
+        self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
         first = 0
-        for recording in recordings:
+        for index, recording in enumerate(recordings):
             chosen = {}
             for name in self.outputs(recording):
                 s = self.signals.index(name)
@@ -116,11 +118,14 @@ class Cut:
                 parts.append(part_of(at, recording.grid_s[-1], own_proof))
                 blocks.append(first + (at // TEST_BLOCK_S).astype(int))
                 signals.append(np.full(at.size, s))
+                times.append(at)
+                runs.append(np.full(at.size, index))
                 measured.append(recording.measured[name][::every])
             self._index.append(chosen)
             first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
         self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
         self.signal, self._measured = np.concatenate(signals), np.concatenate(measured)
+        self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
         self.floor = self._floors(rig, seed)
         self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
 

@@ -20,6 +20,7 @@ import time
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fingerprint import fingerprint
 from pam_sim.gap.fit import BOX, Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.health import check_health
@@ -106,6 +107,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     _judge(result, outcome, problem, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
+    result.fingerprint = fingerprint(problem, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome)
     result.simulations = problem.simulations + proof.simulations
