@@ -48,7 +48,8 @@ ALLOWED_S = 0.3
 LOST_S = 1.0                 # of a recording, when its recorder is killed
 RESTART_S = 60.0             # a busy machine starts a node in many seconds
 START_S = 120.0
-SETTLE_S = 0.5
+SETTLE_S, MOMENTS_S = 0.2, 1.5
+LOOK_S, SHORTEST_S = 0.05, 0.5
 DRIVER, CONTROLLER, PLANT = 'valve_driver', 'sofc_controller', 'plant_simulator'
 RECORDER, REFERENCE, WATCHDOG = 'experiment_recorder', 'reference_generator', 'valve_watchdog'
 
@@ -58,6 +59,7 @@ class Case:
     """
     One row: what strikes, who says what about it, and what then is on the wire.
 
+    ``lasts_s`` is how long the fault lasts at most; it is ended once its outcome is known.
     ``strike`` is ``kill`` or ``stop`` of the node ``target``, else how the sensor ``target`` is
     spoiled. ``safe`` is ``signal`` (vents), ``command`` (atmosphere is commanded) or '' (goes on).
     """
@@ -161,15 +163,15 @@ def play(rig, case, moment_s):
     witness.forget()
     onset_ns = strike(rig, case)
     told_ns = safe_ns = None
-    for _ in range(round(case.lasts_s / 0.05)):
-        witness.listen(0.05)
+    for k in range(round(case.lasts_s / LOOK_S)):
+        witness.listen(LOOK_S)
         if case.teller and told_ns is None:
             said = witness.first_said(case.teller, case.words, onset_ns)
             told_ns = said.stamp_ns if said else None
         if case.safe and safe_ns is None:
             safe_ns = (witness.safe_since if case.safe == 'signal' else
                        witness.atmosphere_since)(onset_ns)
-        if told_ns and safe_ns and case.strike == 'kill':
+        if told_ns and safe_ns and (k + 1) * LOOK_S >= SHORTEST_S:
             break
     undo(rig, case)
     restarted = rig.wait_until_sound(RESTART_S)
@@ -254,7 +256,7 @@ class Series:
                 if self._rig is None:
                     self._start()
                 rng = random.Random(f'{self._arguments.seed} {valve} {key} {number}')
-                outcome = play(self._rig, cases[key], SETTLE_S + rng.uniform(0.0, 2.0))
+                outcome = play(self._rig, cases[key], SETTLE_S + rng.uniform(0.0, MOMENTS_S))
                 outcome.update(valve=valve, case=key, number=number)
                 self._open.append(outcome)
                 if not outcome['restarted']:

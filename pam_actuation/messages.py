@@ -107,7 +107,7 @@ class AngleReference:
 @dataclass(frozen=True, slots=True)
 class AngleTrajectory:
     """
-    Wanted angle of a joint known ahead: topic joint_trajectory.
+    Wanted angle of a joint known ahead, as sent on joint_trajectory.
 
     Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length.
     """
@@ -116,6 +116,20 @@ class AngleTrajectory:
     time_from_start_ns: tuple
     angle_rad: tuple = ()
     rate_rad_per_s: tuple = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NamedTrajectory:
+    """
+    A joint_trajectory as received: of any joints, by name.
+
+    ``points`` are ``(time_from_start_ns, positions, velocities)``, one entry per name each;
+    velocities may be empty.
+    """
+
+    stamp_ns: int
+    names: tuple
+    points: tuple
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,9 @@ LATER_STEP = 0.7             # least share of what is left that a further effect
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
+UNPOLISHED = 0.5             # of the rest a fit may still be better than it seems
+EDGE = 0.02                  # of a shape to the end of its range, in its logarithm
+ALMOST = 0.9                 # of the best share; a simpler name with it stands for its limit
 STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
 SAME_AS = {'viscous_damping': 'damping_n_s_per_m', 'dead_volume': 'V_dead'}
 
@@ -42,6 +45,21 @@ class Rival:
     found: Found
     share: dict = field(default_factory=dict)
     t: dict = field(default_factory=dict)
+    polished: bool = False
+
+    @property
+    def at_edge(self):
+        """
+        Return whether a shape of the effect went to the end of its range.
+
+        There an effect turns into another one, its limit, and its name means nothing.
+        """
+        for place, c in enumerate(self.found.hypothesis.effects):
+            if c.name == self.name:
+                return any(f.shape and min(abs(x - f.coordinate(end)) for end in (
+                    f.lower, f.upper)) < EDGE
+                    for f, x in zip(c.free, self.found.theta_of(place)))
+        return False
 
 
 @dataclass
@@ -105,14 +123,17 @@ class Choice:
         """Return the rivals in a cut that the data cannot tell from the best, best first."""
         s = cut.subsystem
         ranked = sorted(self._admissible(rivals, current, cut), key=lambda r: -r.share[s])
+        top = max((r.share[s] for r in ranked), default=0.0)
+        # The worse the best explains, the further a fit may be from where it will end.
+        near = top - max(CLOSE, UNPOLISHED * (1.0 - top))
+        for r in ranked:
+            if not r.polished and r.share[s] > near and gap(
+                    cut, r.found.errors[s]) > self.seen_gap:
+                r.found, r.polished = self.problem.polish(r.found), True
+                r.share = self.shares(r.found)
+        ranked = without_limits(ranked, current, s)
         if not ranked:
             return []
-        for r in ranked:
-            if r.share[s] > ranked[0].share[s] - CLOSE and gap(
-                    cut, r.found.errors[s]) > self.seen_gap:
-                r.found = self.problem.polish(r.found)
-                r.share = self.shares(r.found)
-        ranked.sort(key=lambda r: -r.share[s])
         best = ranked[0].found.errors[s]
         for r in ranked:
             r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
@@ -166,3 +187,17 @@ class Choice:
                 return Named(r.name, cuts[0].subsystem, rivals, names,
                              [o for o in fitted if o.name == r.name])
         return None
+
+
+def without_limits(rivals, current, subsystem):
+    """
+    Return the rivals, best first, less those that have turned into a simpler effect.
+
+    That is, those at the edge of a shape where an effect they contain as a limit explains
+    almost as much or is in the present fit ``current``.
+    """
+    ranked = sorted(rivals, key=lambda r: -r.share[subsystem])
+    simple = {r.name for r in ranked if r.share[subsystem] > ALMOST * ranked[0].share[subsystem]}
+    simple |= set(current.hypothesis.names)
+    return [r for r in ranked if not r.at_edge
+            or not any((name, r.name) in LIMITS for name in simple)]

@@ -25,7 +25,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, LATER_STEP, Named, RIVAL, Rival
+from pam_sim.gap.choice import Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
@@ -37,7 +37,9 @@ PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
+CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
 RIVALS = 4                   # that are ranked again when further effects are in
 
@@ -126,15 +128,12 @@ class Search:
             named += taken
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named = self._eliminate(current, named)
-        current, named = self._resolve(current, named)
+        current, named = self._established(*self._resolve(current, named))
         explained = self._explained(current)
-        small = {c.subsystem for c in self.problem.cuts
-                 if gap(c, current.errors[c.subsystem]) < NEAR_FLOOR}
-        for w in list(named):        # what explains too little is no name
-            least = RIVAL if w.subsystem in small else NAMED
-            if explained.get(w.subsystem, 0.0) < least:
-                current = self._swapped(current, w.name)
-                named = [o for o in named if o is not w]
+        poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
+        for w in [w for w in named if w.subsystem in poor]:
+            current = self._swapped(current, w.name)
+        named = [w for w in named if w.subsystem not in poor]
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
                        self.screened)
 
@@ -169,6 +168,14 @@ class Search:
         if not current.hypothesis.touches(cut):
             return first > self.least_gap
         return left > max(self.seen_gap, DONE * first)
+
+    def _is_poor(self, cut, current, explained):
+        """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
+        s = cut.subsystem
+        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
+        bent = any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
+                   for known, z in zip(cut.known, current.known_z[s]))
+        return bent or explained.get(s, 0.0) < least
 
     def _explained(self, current):
         return {s: explained for s, explained in self.choice.shares(current).items()
@@ -233,10 +240,8 @@ class Search:
 
     def _best_of_name(self, rivals):
         best = {}
-        for r in rivals:
-            known = best.get(r.name)
-            if known is None or sum(r.share.values()) > sum(known.share.values()):
-                best[r.name] = r
+        for r in sorted(rivals, key=lambda r: CLOSE * r.at_edge - sum(r.share.values())):
+            best.setdefault(r.name, r)
         return list(best.values())
 
     # -- state -----------------------------------------------------------------------------
@@ -308,6 +313,16 @@ class Search:
             if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
                     current, without):
                 current, named = without, [o for o in named if o is not w]
+        return current, named
+
+    def _established(self, current, named):
+        """Drop effects whose size does not clearly differ from none."""
+        for w in list(named):
+            names = [c.name for c in current.hypothesis.effects]
+            if w.name in names and self.problem.certainty(
+                    current, names.index(w.name)) < CERTAIN_SIZE:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
         return current, named
 
     def _resolve(self, current, named):

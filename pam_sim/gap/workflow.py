@@ -18,7 +18,6 @@ from dataclasses import replace
 import math
 import time
 
-import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fingerprint import fingerprint
@@ -31,7 +30,7 @@ from pam_sim.gap.prove import free_run_of, model_of, moved, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
-from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95, NUMERICS
+from pam_sim.gap.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
 from pam_sim.gap.words import explain
 from scipy.stats import norm
 
@@ -120,8 +119,8 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
 def _fill(result, problem, outcome, final, proof):
     """Put signals, numbers, effects and the model into a result."""
     result.signals = proof.signals()
-    covariance = problem.covariance(final)
-    result.calibration = _calibrated(problem, final, covariance)
+    precision = problem.precision(final)
+    result.calibration = _calibrated(problem, final, precision)
     freed = set(final.hypothesis.freed)
     result.parameters = [c for c in result.calibration if c.name in freed]
     model = model_of(problem, final)
@@ -131,7 +130,7 @@ def _fill(result, problem, outcome, final, proof):
         if place is None:
             continue
         parameters, equivalent = effect_numbers(
-            model, final, place, covariance, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
+            model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
         effect = get_effect(w.name)
         formulation = final.hypothesis.effects[place].effect
         result.effects.append({
@@ -180,7 +179,7 @@ def beyond(value, floor):
     return math.sqrt(max(value ** 2 - floor ** 2, 0.0))
 
 
-def _calibrated(problem, found, covariance):
+def _calibrated(problem, found, precision):
     """Return every known number of the rig as Calibrated."""
     count, freed = len(found.theta), list(found.hypothesis.freed)
     numbers, _ = numbers_of(problem, found)
@@ -189,12 +188,11 @@ def _calibrated(problem, found, covariance):
         for known, z in zip(cut.known, found.known_z[cut.subsystem]):
             if not known.of_rig:
                 continue
-            deviation = 1.0
-            if known.name in freed:
-                place = count + freed.index(known.name)
-                deviation = float(np.sqrt(covariance[place, place]))
             value = numbers[known.name]
-            half = math.hypot(NORMAL_95 * deviation * known.sd, NUMERICS * value)
+            half = NORMAL_95 * known.sd
+            if known.name in freed:
+                half = math.hypot(NUMERICS * value, known.sd * half_width(
+                    precision, count + freed.index(known.name), float(z)))
             listed.append(Calibrated(known.name, known.unit, known.value, value,
                                      (value - half, value + half), float(z)))
     return listed
