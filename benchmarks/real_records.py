@@ -57,8 +57,9 @@ MUSCLE_NAMES = ('coulomb_friction', 'pressure_friction', 'hysteresis', 'viscous_
 VALVE_NAMES = ('valve_dead_time', 'tube_lag', 'flow_limit', 'vent_asymmetry', 'valve_dead_zone',
                'valve_hysteresis', 'pressure_lag')
 MIDDLE_BAR = np.linspace(1.0, 5.4, 23)
-INJECTED = {'coulomb_friction': ('force_n', 15.0), 'end_taper': ('k_minus_1', 0.2),
-            'threshold_pressure': ('pressure_pa', 15e3)}
+INJECTED = (('coulomb_friction', 'force_n', 15.0), ('coulomb_friction', 'force_n', 6.0),
+            ('end_taper', 'k_minus_1', 0.2), ('end_taper', 'k_minus_1', 0.07),
+            ('threshold_pressure', 'pressure_pa', 15e3))
 KNOWN_NOW = 0.02             # tolerance of what the first look has calibrated
 
 
@@ -140,10 +141,9 @@ def told(result):
             f'before, calibrated, final: {sizes}; unexplained {result.unexplained_fraction:.2f}')
 
 
-def injected(rig, run, name, value):
+def injected(rig, run, name, parameter, size):
     """Return the run with what an effect adds to the contraction of a model added to it."""
     recording = Recording(run, 'ppr')
-    parameter, size = value
     more = rig.with_(effects=[*rig.effects, {'name': name, 'parameters': {parameter: size}}])
     change = (run_from_pressure(more, recording)['contraction']
               - run_from_pressure(rig, recording)['contraction'])
@@ -179,10 +179,10 @@ def main():
     result = find_gap(stepped, rig, None, VALVE_NAMES, args.seconds)
     print('steps, names of the valve:', told(result), flush=True)
     better = replace(better, tolerance=dict.fromkeys(better.tolerance, KNOWN_NOW))
-    for name, value in INJECTED.items():
-        looks = [injected(better, run, name, value) for run in (first, second)]
+    for name, parameter, size in INJECTED:
+        looks = [injected(better, run, name, parameter, size) for run in (first, second)]
         result = find_gap(looks[0], better, looks[1], MUSCLE_NAMES, args.seconds)
-        print(f'loop, {name} {value[0]} {value[1]:g} injected, from the found model:',
+        print(f'loop, {name} {parameter} {size:g} injected, from the found model:',
               told(result), flush=True)
 
 
