@@ -401,10 +401,9 @@ def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
     steps = int(round(end_s / STEP_S))
     rows = np.empty((steps // EVERY + 1, 6))
     duties = np.empty((int(end_s / 0.010) + 2, 3))
-    sent = 0
+    sent, ready = 0, 0
     y, middle = np.zeros(SIZE), np.zeros(SIZE)
-    d = np.zeros(SIZE)
-    anchors = np.zeros(6)
+    d, anchors = np.zeros(SIZE), np.zeros(6)
     p = ATM + start_gauge
     y[Y_X] = _rest(start_gauge, n)
     y[Y_Q1:Y_Q4 + 1] = y[Y_X]
@@ -416,13 +415,10 @@ def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
     y[Y_STORE] = n[SUPPLY] * n[RESERVOIR] / RT
     y[Y_A1] = y[Y_A2] = start_gauge if valve == PPR else 0.0
     plays = np.full(3, start_gauge)
-    running = 0.0
-    pointer = -1
+    running, pointer = 0.0, -1
     wanted = p
-    raw_a = start_gauge / 1e5 if valve == PPR else 0.0
-    raw_b = 0.0
+    raw_a, raw_b = (start_gauge / 1e5 if valve == PPR else 0.0), 0.0
     # A delayed command: what was sent waits in the list of inputs or of duties.
-    ready = 0
     for k in range(steps + 1):
         t = k * STEP_S
         if closed:
