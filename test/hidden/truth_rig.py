@@ -52,8 +52,7 @@ CRITICAL = 0.38
 HEAT_MASS = 8e-5
 
 # Bristles of dry friction: travel to break-away, damping while nearly at rest.
-BRISTLE_M, BRISTLE_SPEED = 15e-6, 0.5e-3
-STRIBECK_SPEED = 5e-3
+BRISTLE_M, BRISTLE_SPEED, STRIBECK_SPEED = 15e-6, 0.5e-3, 5e-3
 SLIP_M = np.array([0.07e-3, 0.18e-3, 0.45e-3, 0.9e-3, 1.7e-3, 3.4e-3])
 SLIP_SHARE = np.array([0.14, 0.16, 0.22, 0.20, 0.16, 0.12])
 
@@ -407,7 +406,7 @@ def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
     p = ATM + start_gauge
     y[Y_X] = _rest(start_gauge, n)
     y[Y_Q1:Y_Q4 + 1] = y[Y_X]
-    anchors[:] = y[Y_X]
+    anchors = np.full(6, y[Y_X])
     room = volume(y[Y_X]) + n[V_DEAD]
     y[Y_AIR] = p if valve == PPR else p * room / RT
     y[Y_ENERGY] = p * room / (GAMMA - 1.0)
