@@ -33,8 +33,16 @@ help:
 demo: $(STAMP)
 	@$(BIN)/pam demo $(ARGS)
 
+# What starts no nodes goes through all cores; the live nodes then have the machine to themselves.
 test: $(STAMP)
+ifeq ($(strip $(ARGS)),)
+	@failed=0; \
+	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || failed=1; \
+	$(BIN)/python -m pytest -m ros || failed=1; \
+	exit $$failed
+else
 	@$(BIN)/python -m pytest $(ARGS)
+endif
 
 env: $(STAMP)
 

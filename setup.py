@@ -54,6 +54,7 @@ ROS_REQUIRES = [
 TEST_REQUIRES = [
     'pytest>=7.4',
     'pytest-timeout>=2.1',
+    'pytest-xdist>=3.0',
     'hypothesis>=6.98',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
@@ -120,6 +121,7 @@ setup(
     entry_points={
         'console_scripts': [
             'valve_driver = pam_actuation.nodes.valve_driver:main',
+            'valve_watchdog = pam_actuation.nodes.valve_watchdog:main',
             'plant_simulator = pam_actuation.nodes.plant_simulator:main',
             'sofc_controller = pam_actuation.nodes.sofc_controller:main',
             'pid_controller = pam_actuation.nodes.pid_controller:main',

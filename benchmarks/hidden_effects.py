@@ -17,13 +17,15 @@ How often `pam gap` names the hidden effect: rigs made by an independent simulat
 
     python benchmarks/hidden_effects.py                      # 330 cases
     python benchmarks/hidden_effects.py --number 33 --seed 7 --jobs 2 --kinds single,null
+    python benchmarks/hidden_effects.py --work exam --minutes 40     # a piece; again to go on
 
 Four phases: all cases are recorded and the key is sealed; `pam gap` answers every case from
 its bags; the experiments it suggests for the ambiguous cases are run on the hidden rigs and
-answered; then the key is opened and everything is scored. With --work DIR the recordings and
-the answers are kept, and an interrupted run goes on where it stopped.
+answered; then the key is opened and everything is scored. With --work DIR each recording and each
+answer is kept as soon as it is there, and an interrupted run goes on where it stopped; with
+--minutes it stops by itself between two cases.
 
-Exit code 1 when a bar is missed.
+Exit code 1 when a bar is missed, 3 when the minutes were over before all was answered.
 """
 
 import argparse
@@ -52,6 +54,11 @@ import truth_key  # noqa: E402
 
 FAMILIES = {name: hidden.family for name, hidden in EFFECTS.items()}
 SMALL = 0.3                  # materiality asked for where the gap is below 1 sigma
+UNFINISHED = 3               # exit code
+
+
+class OutOfMinutes(Exception):
+    """The time for this piece of the examination is over."""
 
 
 def main():
@@ -64,46 +71,53 @@ def main():
                         help='answer the first N cases by the other methods, too')
     parser.add_argument('--work', type=Path, help='keep recordings and answers here')
     parser.add_argument('--again', action='store_true',
-                        help='with --work: keep the recordings, answer anew')
+                        help='with --work: keep the recordings, answer anew (only with the '
+                        'first piece)')
     parser.add_argument('--seconds', type=float, default=None, help='time budget of `pam gap` for '
                         'one case (default: its own); on a busy machine give more')
+    parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
+                        help='with --work: begin no case after N minutes; start again to go on')
     parser.add_argument('--out', type=Path, help='write the report here as well')
     args = parser.parse_args()
+    args.until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.number, args.seed)
     if args.kinds:
         cases = [c for c in cases if c.kind in args.kinds.split(',')]
     if args.work:
         args.work.mkdir(parents=True, exist_ok=True)
-        return examine(cases, args.work, args)
+        try:
+            return examine(cases, args.work, args)
+        except OutOfMinutes as reached:
+            print(f'{reached}; start again to go on')
+            return UNFINISHED
     with tempfile.TemporaryDirectory(prefix='hidden_effects_') as folder:
         return examine(cases, Path(folder), args)
 
 
 def examine(cases, work, args):
     """Run the four phases; return the exit code."""
-    begun = time.time()
     if not (work / 'sealed.json').exists():
-        keys = each(args.jobs, 'recording', record, [(c, work) for c in cases])
-        truth_key.seal({c.name: key for c, key in zip(cases, keys)}, work)
+        keys = each(args, 'recording', record, [(c, work) for c in cases])
         (work / 'orders.json').write_text(json.dumps({
             c.name: SMALL if 0.0 < max(key['gap_sigma'].values()) < 1.0 else 1.0
             for c, key in zip(cases, keys)}), encoding='utf-8')
+        truth_key.seal({c.name: key for c, key in zip(cases, keys)}, work)
+        shutil.rmtree(work / 'recorded')
     orders = read(work / 'orders.json')
     if not {c.name for c in cases} <= set(orders):
         sys.exit(f'{work} holds another examination: give its --seed, at most its --number')
     if args.again:
         for path in (*work.glob('*/answer.json'), *work.glob('*/after.json')):
             path.unlink()
-    each(args.jobs, 'answering', answer, [
+    each(args, 'answering', answer, [
         (work / c.name, 'answer', ['fit'], orders[c.name], args.seconds) for c in cases])
-    each(args.jobs, 'next experiments', follow, [
+    each(args, 'next experiments', follow, [
         (c, work, orders[c.name], args.seconds) for c in cases if c.kind == 'ambiguous'])
     rivals = {}
     if args.rivals:
         from hidden_rivals import METHODS
         for name in METHODS:
-            found = each(args.jobs, name, other, [(work / c.name, name)
-                                                  for c in cases[:args.rivals]])
+            found = each(args, name, other, [(work / c.name, name) for c in cases[:args.rivals]])
             rivals[name] = [(c.name, one) for c, one in zip(cases, found)]
     answers = {c.name: read(work / c.name / 'answer.json') for c in cases}
     keys = truth_key.open_keys(work, answers, [c.name for c in cases])
@@ -114,24 +128,41 @@ def examine(cases, work, args):
               for name, given in rivals.items()}
     text = '\n'.join([
         f'{len(cases)} cases, seed {args.seed}, {args.jobs} processes on {platform.machine()}, '
-        f'{(time.time() - begun) / 60.0:.0f} min.', '', report(found, FAMILIES, others), ''])
+        f'{sum(a["wall_s"] for a in answers.values()) / 60.0:.0f} min of answers.', '',
+        report(found, FAMILIES, others), ''])
     print(text)
     if args.out:
         args.out.write_text(text, encoding='utf-8')
     return int(any(row.met is False for row in table(found, FAMILIES)))
 
 
-def each(jobs, what, function, arguments):
-    """Return function(*a) of all arguments, in order, on some processes, with a progress bar."""
-    results = Parallel(n_jobs=jobs, return_as='generator')(
-        delayed(function)(*a) for a in arguments)
-    return list(tqdm(results, total=len(arguments), desc=what, disable=None))
+def each(args, what, function, arguments):
+    """
+    Return function(*a) of all arguments, in order, on some processes, with a progress bar.
+
+    Raises OutOfMinutes where some were not begun in time.
+    """
+    results = Parallel(n_jobs=args.jobs, return_as='generator')(
+        delayed(in_time)(args.until, function, a) for a in arguments)
+    found = list(tqdm(results, total=len(arguments), desc=what, disable=None))
+    done = sum(begun for begun, _ in found)
+    if done < len(found):
+        raise OutOfMinutes(f'{what}: {done} of {len(found)} done')
+    return [result for _, result in found]
+
+
+def in_time(until, function, arguments):
+    """Return (True, what the function returns), (False, None) after the end of the time."""
+    return (True, function(*arguments)) if time.time() < until else (False, None)
 
 
 def record(case, work):
-    """Record one case anew; return its key."""
-    shutil.rmtree(work / case.name, ignore_errors=True)
-    return truth_cases.build(case, work / case.name)
+    """Record one case unless that was done; return its key, kept until all are sealed."""
+    kept = work / 'recorded' / f'{case.name}.json'
+    if not kept.exists():
+        shutil.rmtree(work / case.name, ignore_errors=True)
+        write(kept, truth_cases.build(case, work / case.name))
+    return read(kept)
 
 
 def answer(folder, name, runs, materiality, seconds):
@@ -141,9 +172,8 @@ def answer(folder, name, runs, materiality, seconds):
         return
     begun, used = time.perf_counter(), time.process_time()
     result = pam_gap(folder, [folder / run for run in runs], folder / name, materiality, seconds)
-    target.write_text(json.dumps({
-        'result': result, 'wall_s': time.perf_counter() - begun,
-        'processor_s': time.process_time() - used}), encoding='utf-8')
+    write(target, {'result': result, 'wall_s': time.perf_counter() - begun,
+                   'processor_s': time.process_time() - used})
 
 
 def other(folder, name):
@@ -155,7 +185,7 @@ def other(folder, name):
             result = METHODS[name](folder)
         except Exception as error:                # as for `pam gap`: an answer, a wrong one
             result = {'verdict': 'crashed', 'reason': repr(error)}
-        target.write_text(json.dumps(result), encoding='utf-8')
+        write(target, result)
     return read(target)
 
 
@@ -172,10 +202,17 @@ def follow(case, work, materiality, seconds):
     try:
         truth_cases.run_suggested(case, folder / 'next', experiment)
     except (NotRunnable, TypeError, KeyError) as error:
-        (folder / 'after.json').write_text(json.dumps({
-            'result': {'verdict': 'crashed', 'reason': repr(error)}}), encoding='utf-8')
+        write(folder / 'after.json', {'result': {'verdict': 'crashed', 'reason': repr(error)}})
         return
     answer(folder, 'after', ['fit', 'next'], materiality, seconds)
+
+
+def write(path, data):
+    """Write data as a JSON file, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix('.part')
+    part.write_text(json.dumps(data), encoding='utf-8')
+    part.replace(path)
 
 
 def read(path):

@@ -29,7 +29,7 @@ from pam_actuation.bags.load import load_run
 from pam_sim.errors import InputError
 from pam_sim.gap.candidates import candidates
 from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.noise import noise_floor
+from pam_sim.gap.noise import sensor_floor
 from pam_sim.model_file import load_rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from scipy.optimize import least_squares
@@ -53,7 +53,8 @@ def forward_selection(folder):
     rig = load_rig(folder / 'model.yaml')
     run = load_run(folder / 'fit')
     recording = Recording(run, rig.valve)
-    floor = {s: noise_floor(run, s) for s in recording.signals}
+    floor = {s: sensor_floor(recording.time_s[s], recording.measured[s], s)
+             for s in recording.signals}
     every = {s: max(int(round(1.0 / (np.median(np.diff(recording.time_s[s])) * RATE_HZ))), 1)
              for s in recording.signals}
     known = [p for p in rig.parameter_list if rig.tolerance[p.name] > 0.0]

@@ -107,7 +107,7 @@ def run_once(arguments):
         Topic to (number of messages, digest of their bytes).
 
     """
-    from pam_actuation.nodes.simulated_time import START_NS
+    from pam_actuation.messages import START_NS
     lock = DomainLock()
     client = None
     with tempfile.TemporaryDirectory() as folder:

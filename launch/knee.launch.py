@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A joint: simulated limb with two muscles, a valve driver for each, one controller, a reference.
+A joint: simulated limb with two muscles, driver and watchdog for each, a controller, a reference.
 
     ros2 launch pam_actuation knee.launch.py valve:=ppr experiment:=joint_sine
 
@@ -93,6 +93,7 @@ def generate_launch_description():
     drivers = [
         _node('valve_driver', valve, {'rig': _text(LaunchConfiguration('joint'), '/', side)},
               side=side) for side in SIDES]
+    watchdogs = [_node('valve_watchdog', valve, side=side) for side in SIDES]
     plant = _node('joint_simulator', valve, joint, seed)
     controller = _node('joint_controller', valve, joint, control)
     reference = _node(
@@ -107,7 +108,7 @@ def generate_launch_description():
             (controller, 'the controller ended'),
             *((driver, 'a valve driver ended') for driver in drivers))]
     return LaunchDescription(
-        [*_arguments(), plant, *drivers, controller, reference, *ends])
+        [*_arguments(), plant, *drivers, *watchdogs, controller, reference, *ends])
 
 
 def _shut_down(reason):

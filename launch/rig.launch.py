@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The whole rig: plant or real sensors, valve driver, controller, reference and recorder.
+The whole rig: plant or real sensors, driver and watchdog, controller, reference, recorder.
 
     ros2 launch pam_actuation rig.launch.py valve:=hsv experiment:=sine_quarter_hz
     ros2 launch pam_actuation rig.launch.py hardware:=my_rig.yaml
@@ -130,12 +130,14 @@ def generate_launch_description():
         condition=IfCondition(NotEqualsSubstitution(hardware, 'sim')))
     driver = _node(
         'valve_driver', valve, {'rig': _text('rig')}, LaunchConfiguration(HARDWARE_FILE))
+    watchdog = _node(
+        'valve_watchdog', valve, condition=IfCondition(EqualsSubstitution(hardware, 'sim')))
     reference = _node(
         'reference_generator',
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
          'exit_when_finished': True})
     nodes = [
-        recorder, plant, sensors, driver,
+        recorder, plant, sensors, driver, watchdog,
         _node('sofc_controller', valve, control, learning, condition=chosen('sofc')),
         _node('pid_controller', valve, control, condition=chosen('pid')),
         reference,

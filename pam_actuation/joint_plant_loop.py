@@ -23,9 +23,9 @@ import math
 import numpy as np
 from pam_actuation.messages import JointAngle
 from pam_actuation.plant_loop import HeldSignal, muscle_readings, PlantClock
+from pam_sim.joint.parameters import SIDES
 from pam_sim.sensors import SensorChain
 
-SIDES = ('flexor', 'extensor')
 ANGLE_NOISE_RAD = 5e-4                      # design value of an encoder on the joint
 ANGLE_STEP_RAD = 2.0 * math.pi / 2 ** 14    # of 14 bit a turn
 
@@ -53,17 +53,10 @@ class JointPlantLoop(PlantClock):
         self.sensors = {side: SensorChain(rig.sensors, seed + k)
                         for k, (side, rig) in enumerate(zip(SIDES, rigs))}
         self._noise = np.random.default_rng((seed, len(SIDES)))
-        self._torque_n_m = 0.0
-
-    def set_external_torque(self, torque_n_m):
-        """Take the torque on the limb [N m], flexion positive; not finite is ignored."""
-        if math.isfinite(torque_n_m):
-            self._torque_n_m = float(torque_n_m)
 
     def step_once(self):
         """Advance the joint by one step with the signals held."""
-        self.plant.step(self.signals['flexor'].efforts, self.signals['extensor'].efforts,
-                        self._torque_n_m)
+        self.plant.step(self.signals['flexor'].efforts, self.signals['extensor'].efforts)
 
     def sample(self, now_ns):
         """

@@ -24,6 +24,12 @@ them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
 from dataclasses import dataclass
 import math
 
+# Virtual clocks start here, not at the date of the run.
+START_NS = 1_000_000_000 * 1_000_000_000
+# Of a valve signal, by valve type: the names of its efforts, and the efforts that vent.
+VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
+SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
+
 
 @dataclass(frozen=True, slots=True)
 class Pressure:
@@ -101,7 +107,7 @@ class AngleReference:
 @dataclass(frozen=True, slots=True)
 class AngleTrajectory:
     """
-    Wanted angle of a joint known ahead: topic joint_trajectory.
+    Wanted angle of a joint known ahead, as sent on joint_trajectory.
 
     Point i holds at ``stamp_ns + time_from_start_ns[i]``; the tuples have equal length.
     """
@@ -110,6 +116,20 @@ class AngleTrajectory:
     time_from_start_ns: tuple
     angle_rad: tuple = ()
     rate_rad_per_s: tuple = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NamedTrajectory:
+    """
+    A joint_trajectory as received: of any joints, by name.
+
+    ``points`` are ``(time_from_start_ns, positions, velocities)``, one entry per name each;
+    velocities may be empty.
+    """
+
+    stamp_ns: int
+    names: tuple
+    points: tuple
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,11 +22,10 @@ when asked. The simulator node and the offline simulation both use it.
 
 import math
 
-from pam_actuation.messages import Contraction, Force, Pressure, ValveSignal
+from pam_actuation.messages import Contraction, Force, Pressure, VALVE_NAMES, ValveSignal
 from pam_sim.sensors import SensorChain
 
 _NS = 1_000_000_000
-_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
 
 
 class HeldSignal:
@@ -40,7 +39,7 @@ class HeldSignal:
     """
 
     def __init__(self, valve):
-        self._names = _NAMES[valve]
+        self._names = VALVE_NAMES[valve]
         self.efforts = (0.0,) * len(self._names)
         self.taken = 0
         self.ignored = 0

@@ -29,8 +29,8 @@ ROOT = Path(__file__).resolve().parent.parent
 NODES = (
     'valve_driver', 'plant_simulator', 'sofc_controller', 'pid_controller',
     'reference_generator', 'experiment_recorder')
-# They need devices, or a joint instead of a muscle; their own tests start them.
-FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller')
+# They need devices, a joint instead of a muscle, or a driver; their own tests start them.
+FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller', 'valve_watchdog')
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',

@@ -22,7 +22,7 @@ import sys
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ('pam_actuation', 'pam_sim', 'test', 'launch')
+FOLDERS = ('pam_actuation', 'pam_sim', 'test', 'launch', 'examples')
 CHECKED = [folder for folder in FOLDERS if any((ROOT / folder).rglob('*.py'))] + ['setup.py']
 SOURCES = sorted(
     path for folder in FOLDERS for path in (ROOT / folder).rglob('*.py')) + [ROOT / 'setup.py']

@@ -25,14 +25,11 @@ import numpy as np
 
 from pam_actuation.bags import codecs, series
 from pam_actuation.bags.source import read_bag
+from pam_actuation.messages import VALVE_NAMES
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
 
-SIGNALS = {
-    'ppr': ('ppr_voltage',),
-    'hsv': ('fill_duty', 'vent_duty'),
-}
-_SIGNAL_NAMES = tuple(name for names in SIGNALS.values() for name in names)
+_SIGNAL_NAMES = tuple(name for names in VALVE_NAMES.values() for name in names)
 # Any clock that counts from 1970 is far above this; a simulation's may start at 0.
 _WALL_CLOCK_NS = 10**17
 _UNIT_OF_ENDING = (
@@ -63,7 +60,7 @@ class RecordedRun(Run):
     def valve(self):
         """Return 'ppr' or 'hsv' by the valve signal, else by the metadata, else ''."""
         names = self.topics['valve_signal'].values if 'valve_signal' in self.topics else {}
-        for valve, signals in SIGNALS.items():
+        for valve, signals in VALVE_NAMES.items():
             if set(signals) & set(names):
                 return valve
         return self.metadata.get('valve', '')

@@ -14,6 +14,8 @@
 
 """``pam gap``: what a model misses in recordings, added to it and proved."""
 
+import json
+
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
@@ -32,6 +34,14 @@ def add_arguments(parser):
     parser.add_argument('--explain', default=None, metavar='EFFECT',
                         help='say what an effect is, from which size on it shows and what looks '
                         'like it; in the bag, or without one in a simulated identification')
+    parser.add_argument('--plan', action='store_true',
+                        help='before measuring: say which effects this model and the experiments '
+                        'named in place of bags could tell apart, from which size on, and make '
+                        'the best protocol of 60 s')
+    parser.add_argument('--valve', default=None, metavar='ppr|hsv',
+                        help='plan for a model preset with this valve')
+    parser.add_argument('--no-force', action='store_true',
+                        help='plan for a rig without a load cell')
     parser.add_argument('--certify', default=None, metavar='RUN',
                         help='bag for the proof (default: every fifth block of the first bag)')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
@@ -52,6 +62,8 @@ def run(args):
     from pam_sim.errors import InputError
     if args.explain is not None:
         return _explain(args)
+    if args.plan:
+        return _plan(args)
     if not args.run or args.out is None:
         raise InputError('needs at least one recorded bag and --out DIR')
     names = args.effects.split(',') if args.effects else None
@@ -65,6 +77,34 @@ def run(args):
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
     emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+
+
+def _plan(args):
+    """Judge protocols before anything is measured; write plan.json and experiment.yaml."""
+    from pathlib import Path
+
+    from pam_actuation.experiments import load_experiment
+    from pam_actuation.experiments.protocols import plan
+    from pam_actuation.report.page import write_text
+    from pam_sim import load_rig
+    from pam_sim.effects.registry import get_effect
+    from pam_sim.located_yaml import dump_yaml
+    rig = load_rig(args.model, valve=args.valve)
+    names = args.effects.split(',') if args.effects else None
+    for name in names or ():
+        get_effect(name, '--effects')
+    experiments = [load_experiment(one) for one in args.run]
+    with progress(args, 1.0, '', 'plan') as bar:
+        found = plan(rig, experiments, not args.no_force, args.materiality, names,
+                     progress=lambda done: bar.update(done - bar.n))
+    text = found.text()
+    if args.out is not None:
+        folder = Path(args.out)
+        write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
+        write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
+        text += f'\nrun it with: pam run {folder / "experiment.yaml"}'
+    emit(args, found.to_dict(), text)
+    return EXIT_DONE
 
 
 def _explain(args):

@@ -22,8 +22,8 @@ import sys
 from pam_actuation.cli.common import EXIT_BAD_INPUT
 from pam_sim.errors import InputError
 
-VERBS = ('demo', 'run', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report', 'info',
-         'models', 'valves', 'rules')
+VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
+         'info', 'models', 'nodes', 'valves', 'rules')
 
 
 def build_parser():

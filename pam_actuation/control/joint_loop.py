@@ -23,7 +23,8 @@ until the next one; one that is not finite is ignored, one beyond the limits sto
 
 import math
 
-from pam_actuation.control import tick as codes
+from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.joint_trajectory import angle_trajectory
 from pam_actuation.control.loop import (
     fresh, measurement_reason, REFERENCE_REASONS, STALL_NS)
 from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
@@ -31,9 +32,9 @@ from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.messages import ControllerState, Pressure
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
-SIDES = ('flexor', 'extensor')
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
 _INPUT_NAMES = (
@@ -51,7 +52,10 @@ class JointControllerLoop:
     controller : JointController
         As ``load_controller`` gives it for a joint.
     angle_range_rad : tuple of float
-        Measurements outside are implausible: the encoder is wrong, not the joint.
+        Measurements outside are implausible: the encoder is wrong, not the joint. Wishes
+        outside are refused.
+    joint : str
+        Name by which it is found in a trajectory of several joints.
 
     Raises
     ------
@@ -60,17 +64,20 @@ class JointControllerLoop:
 
     """
 
-    def __init__(self, controller, angle_range_rad=(-math.pi, math.pi)):
+    def __init__(self, controller, angle_range_rad=(-math.pi, math.pi), joint='muscle'):
         if tracked_by(controller) != JOINT:
             raise InputError('this controller tracks a single muscle; a joint needs one with '
                              '`mode: joint`', controller.rig_name)
         self.controller = controller
         self.references = ReferenceBuffer(JOINT)
         self.rejected_references = 0
+        self.refusal = ''           # why the newest trajectory was not taken
         self.reason = codes.REASONS[codes.NO_ANGLE]
         self.ticks = 0
         self.names = _INPUT_NAMES + tuple(controller.state_names)
         self._range = angle_range_rad
+        self._joint = joint
+        self._trajectory = None     # that arrived since the last tick
         self._angle = None
         self._pressures = [None, None]
         self._forces = [None, None]
@@ -102,6 +109,26 @@ class JointControllerLoop:
         """Take an ``AngleTrajectory``; an unusable one is ignored and counted."""
         self.rejected_references += not self.references.set_trajectory(message)
 
+    def on_named_trajectory(self, message):
+        """Take a ``NamedTrajectory``; the next tick counts it or, where unusable, refuses it."""
+        self._trajectory = message
+
+    def _take_trajectory(self, now_ns):
+        """Let the trajectory that arrived count from now on."""
+        message, self._trajectory = self._trajectory, None
+        references = self.references
+        present = math.nan if self._angle is None else self._angle.angle_rad
+        if references.state(now_ns) in (reference_buffer.FRESH, reference_buffer.HELD):
+            present = references.at(now_ns, now_ns)[0]
+        try:
+            references.set_trajectory(angle_trajectory(
+                message.stamp_ns, message.names, message.points, self._joint, self._range, now_ns,
+                present))
+            self.refusal = ''
+        except InputError as error:
+            self.refusal = str(error)
+            self.rejected_references += 1
+
     def on_co_contraction(self, message):
         """Take a wanted mean ``Pressure`` of both muscles, absolute."""
         if math.isfinite(message.pressure_pa):
@@ -120,6 +147,8 @@ class JointControllerLoop:
 
         """
         controller, references = self.controller, self.references
+        if self._trajectory is not None:
+            self._take_trajectory(now_ns)
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
         angle = math.nan if self._angle is None else self._angle.angle_rad

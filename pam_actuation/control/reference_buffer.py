@@ -22,7 +22,8 @@ is interpolated (cubic through positions and rates). Rules:
   has not passed; then its times are absolute and each message replaces the former.
   Beyond its end the last point goes on with its rate. Where it moves faster, by
   ``JUMP_PER_S``, than both its points say, it jumps: the first point goes on until the
-  second one's time, so that the controller sees a jump and not a steep ramp.
+  second one's time, so that the controller sees a jump and not a steep ramp. One that is
+  newer than any ``reference`` is a whole movement, sent once: it counts to its end.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, after
   that the position stands still; the preview fades out until ``LOST_S``.
 * After ``LOST_S`` without either the reference is lost: the last position is held with
@@ -107,10 +108,13 @@ class ReferenceBuffer:
         """Return whether the trajectory is the one that counts now."""
         if self.trajectory is None or now_ns > self._times_ns[-1]:
             return False
-        newest_ns = self.trajectory.stamp_ns
-        if now_ns - newest_ns <= TRAJECTORY_LIFE_S * 1e9:
-            return True
-        return self.reference is None      # a whole movement sent once, nothing else known
+        age_s = (now_ns - self.trajectory.stamp_ns) * 1e-9
+        return age_s <= TRAJECTORY_LIFE_S or self._is_whole_movement()
+
+    def _is_whole_movement(self):
+        """Tell whether the trajectory was sent after the last reference."""
+        return self.trajectory is not None and (
+            self.reference is None or self.reference.stamp_ns < self.trajectory.stamp_ns)
 
     def state(self, now_ns):
         """Return ``NONE``, ``FRESH``, ``HELD`` or ``LOST`` for a time."""
@@ -140,7 +144,7 @@ class ReferenceBuffer:
         """
         if self.uses_trajectory(now_ns):
             return self._interpolate(time_ns)
-        if self.reference is None:
+        if self._is_whole_movement():
             return self._values[-1], 0.0
         reference = self.reference
         rate = getattr(reference, self._rate_field) if self._rate_field else 0.0

@@ -24,6 +24,7 @@ import difflib
 import math
 
 from pam_actuation.drivers.hsv import HsvConfig
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.drivers.ppr import PprConfig
 from pam_actuation.drivers.safety import SafetyLimits
 from pam_sim.errors import InputError
@@ -103,17 +104,6 @@ _RANGES = {
     'hsv.drift_limit_pa_per_s': (0.0, 1e7, 'range of the learned drift'),
     'hsv.supply_margin_pa': (0.0, 5e5, 'the target stays this far below the supply'),
 }
-
-
-@dataclass(frozen=True)
-class DriverParameter:
-    """One parameter: name, default, allowed range (None: not a number), meaning."""
-
-    name: str
-    default: object
-    lower: float | None
-    upper: float | None
-    description: str
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,8 @@ FAULT_TABLE = (
           'start the driver again'),
     Fault('driver_killed', 'Driver killed, stopped or its computer lost',
           'not detectable by the driver: the valve holds its last signal', HOLD, False,
-          'needs hardware or a second process that publishes the safe valve_signal'),
+          'valve_watchdog, a process of its own, sends the safe valve_signal after 0.05 s of '
+          'silence; behind a hardware back end only hardware can'),
     Fault('reference_lost', 'Reference lost',
           'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,
           'the driver follows the controller'),

@@ -25,11 +25,9 @@ from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import SafetySupervisor
-from pam_actuation.messages import Pressure, Status, ValveSignal
+from pam_actuation.messages import Pressure, Status, VALVE_NAMES, ValveSignal
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
-PPR_NAMES = ('ppr_voltage',)
-HSV_NAMES = ('fill_duty', 'vent_duty')
 _NS = 1_000_000_000
 _MOST_MISSED = 20        # periods the model catches up after a late tick
 _PPR_MOVE_PA = 20_000.0  # a regulator this far from its command should move
@@ -60,6 +58,7 @@ class DriverLoop:
             config = DriverConfig.from_parameters(config or {})
         self.config = config
         self.is_hsv = valve_type == 'hsv'
+        self._names = VALVE_NAMES[valve_type]
         self.safety = SafetySupervisor(config.safety, needs_pressure=self.is_hsv)
         self.period_s = config.hsv.period_s if self.is_hsv else config.ppr.period_s
         self.rate_hz = 1.0 / self.period_s
@@ -91,8 +90,7 @@ class DriverLoop:
         makes the command invalid.
         """
         efforts = dict(zip(message.names, message.efforts))
-        names = HSV_NAMES if self.is_hsv else PPR_NAMES
-        wanted = [efforts.get(name, math.nan) for name in names]
+        wanted = [efforts.get(name, math.nan) for name in self._names]
         if self.is_hsv:
             self.safety.on_duty(message.stamp_ns, wanted[0] - wanted[1])
         else:
@@ -195,7 +193,7 @@ class DriverLoop:
         return (0.0, 1.0) if self.is_hsv else (max(self.config.ppr.lowest_v, 0.0),)
 
     def _signal(self, now_ns, efforts):
-        return ValveSignal(now_ns, HSV_NAMES if self.is_hsv else PPR_NAMES, efforts)
+        return ValveSignal(now_ns, self._names, efforts)
 
     # -- status ---------------------------------------------------------------------
 

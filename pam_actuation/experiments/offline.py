@@ -32,10 +32,9 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.messages import Status
+from pam_actuation.messages import START_NS, Status
 from pam_actuation.plant_loop import PlantLoop
 
-START_NS = 1_000_000_000 * 1_000_000_000   # virtual clocks start here, not at the date of the run
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
 LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live

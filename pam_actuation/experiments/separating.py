@@ -42,6 +42,8 @@ from pam_sim.units import P_ATM_PA
 HIGHEST_GAUGE_PA = 550e3     # below the pressure limit of the driver
 LOWEST_GAUGE_PA = 200e3      # a hanging mass of 5 kg has left its stop
 NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothing is recorded
+SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
+                'force': 'force_noise_n'}
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 
 
@@ -103,7 +105,7 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
         plain = {'name': f'tell_apart_{name}', 'domain': 'pressure', 'segments': segments,
                  'description': f'{why[0].upper()}{why[1:]}'}
         try:
-            run = _simulated(plain, truth)
+            run = simulated(plain, truth)
             apart = {False: separation(run, rig, rivals[1:], 'force' in recorded)}
             if 'force' not in recorded:
                 apart[True] = separation(run, rig, rivals[1:], True)
@@ -143,16 +145,23 @@ def separation(run, rig, rivals, with_force):
 
 def identification_run(rig):
     """Return a simulated run of the experiment ``pressure_identification`` with sensor noise."""
-    return _simulated(load_experiment('pressure_identification').to_dict(), rig.with_(
-        sensors=_sensors({})))
+    return simulated(load_experiment('pressure_identification').to_dict(), sensors_for(rig)[1])
+
+
+def sensors_for(rig):
+    """Return (noise by signal, the rig with it): its own, else that of the realistic rig."""
+    own = {s: rig.sensors.get(name, 0.0) for s, name in SENSOR_NOISE.items()}
+    noise = {s: own[s] or NOISE[s] for s in NOISE}
+    return noise, rig.with_(sensors=_sensors(noise))
 
 
 def _sensors(noise):
-    return {f'{s}_noise_{u}': noise.get(s, NOISE[s]) for s, u in (
-        ('pressure', 'pa'), ('contraction', 'm'), ('force', 'n'))}
+    return {name: noise.get(s, NOISE[s]) for s, name in SENSOR_NOISE.items()}
 
 
-def _simulated(plain, rig):
+def simulated(plain, rig, controller=None):
+    """Return the simulated run of an experiment, given as plain data."""
     with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
-        simulate_experiment(load_experiment(dump_yaml(plain)), rig, None, Path(folder) / 'bag')
+        simulate_experiment(load_experiment(dump_yaml(plain)), rig, controller,
+                            Path(folder) / 'bag')
         return load_run(Path(folder) / 'bag')

@@ -22,7 +22,7 @@ offset that is not there is 0.
 
 from pathlib import Path
 
-from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
 

@@ -14,7 +14,7 @@
 
 """Sensors on analog inputs of Linux (IIO): volts to pressure, contraction and force."""
 
-from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
 

@@ -14,7 +14,7 @@
 
 """A proportional regulator on an analog output of Linux (IIO): volts to raw values."""
 
-from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError

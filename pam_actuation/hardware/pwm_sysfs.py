@@ -17,7 +17,7 @@
 from pathlib import Path
 import time
 
-from pam_actuation.drivers.config import DriverParameter
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError

@@ -88,7 +88,7 @@ class GuardedOutput:
     A valve output that vents when a write fails, and when nobody holds it any more.
 
     An output that was not closed vents when it is collected or when the interpreter
-    ends, whatever came before. ``writes`` and ``failures`` count.
+    ends, whatever came before. ``failures`` counts.
 
     Parameters
     ----------
@@ -103,7 +103,6 @@ class GuardedOutput:
         self._device = device
         self._safe_efforts = tuple(safe_efforts)
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
-        self.writes = 0
         self.failures = 0
 
     def send(self, efforts):
@@ -141,7 +140,6 @@ class GuardedOutput:
         return problem
 
     def _try(self, action):
-        self.writes += 1
         try:
             action()
         except DeviceError as error:

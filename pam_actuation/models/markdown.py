@@ -39,22 +39,24 @@ def page(entries):
 
 
 def _entry(entry):
-    lines = [f'### {entry["name"]}', '', _escaped(entry['sentence']), '']
+    lines = [f'### {entry["name"]}', '', escaped(entry['sentence']), '']
     for what, value in facts(entry):
         lines.append(f'- {what}: `{value}`' if what == 'equation'
-                     else f'- {what}: {_escaped(value)}')
+                     else f'- {what}: {escaped(value)}')
     if entry['kind'] != 'rig':          # its parameters stand with muscle, valve and load
         for head, rows in tables(entry):
-            lines += ['', _row(head), '|---' * len(head) + '|',
-                      *(_row((f'`{row[0]}`', *map(_escaped, row[1:]))) for row in rows)]
+            lines += ['', row(head), '|---' * len(head) + '|',
+                      *(row((f'`{row[0]}`', *map(escaped, row[1:]))) for row in rows)]
     return '\n'.join(lines).rstrip() + '\n'
 
 
-def _row(cells):
+def row(cells):
+    """Return a row of a table."""
     return '| ' + ' | '.join(cells) + ' |'
 
 
-def _escaped(value):
+def escaped(value):
+    """Return a text in which nothing is markup."""
     for character in ('\\', '|', '*', '_', '<', '`'):
         value = value.replace(character, '\\' + character)
     return value

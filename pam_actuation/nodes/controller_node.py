@@ -15,7 +15,6 @@
 """What the controller nodes share: measurements and reference in, pressure command out."""
 
 from pam_actuation.control.tick import REASONS
-from pam_actuation.experiments.reference import TRAJECTORY_EVERY_NS
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import from_ros
@@ -26,11 +25,18 @@ from pam_actuation.nodes.parameters import NodeParameter
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
-OK_REASON = REASONS[0]
 MOST_WRONG_STEPS = 20
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
 INPUTS = ('reference_trajectory', 'reference', *MEASURED)
+
+
+def report_reason(diagnostics, reason):
+    """Report what a controller loop says of its tick: one of ``REASONS``, the first is well."""
+    if reason == REASONS[0]:
+        diagnostics.update(OK, 'following the reference')
+    else:
+        diagnostics.update(WARN, reason)
 
 
 class ControllerNode(ManagedNode):
@@ -67,6 +73,7 @@ class ControllerNode(ManagedNode):
 
     def inputs_of_a_tick(self):
         """Return the measurements and, of a reference that takes part, what it asks for."""
+        from pam_actuation.experiments.reference import TRAJECTORY_EVERY_NS
         by_topic = {topic: subscription for topic, subscription, _ in self.inputs}
         awaited = [lockstep.EachTick(by_topic[topic]) for topic in SENT_LAST_FIRST]
         if lockstep.REFERENCE in self.participants:
@@ -106,10 +113,7 @@ class ControllerNode(ManagedNode):
         command, state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', state)
-        if self.loop.reason == OK_REASON:
-            self.diagnostics.update(OK, 'following the reference')
-        else:
-            self.diagnostics.update(WARN, self.loop.reason)
+        report_reason(self.diagnostics, self.loop.reason)
 
     def safe_stop(self, why):
         """Command atmospheric pressure: the driver vents."""

@@ -30,11 +30,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import WrenchStamped
 from pam_actuation.messages import AngleReference
-from pam_actuation.messages import AngleTrajectory
 from pam_actuation.messages import Contraction
 from pam_actuation.messages import ControllerState
 from pam_actuation.messages import Force
 from pam_actuation.messages import JointAngle
+from pam_actuation.messages import NamedTrajectory
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import Reference
 from pam_actuation.messages import ReferenceTrajectory
@@ -144,7 +144,9 @@ def _read_joint_reference(message):
 
 def _read_joint_trajectory(message):
     points = message.points
-    return AngleTrajectory(stamp_ns(message), _times_ns(points), *_motion(points))
+    return NamedTrajectory(stamp_ns(message), tuple(message.joint_names), tuple(
+        (time_ns, tuple(point.positions), tuple(point.velocities))
+        for time_ns, point in zip(_times_ns(points), points)))
 
 
 def _read_valve_signal(message):

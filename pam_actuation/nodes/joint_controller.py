@@ -16,17 +16,21 @@
 
 import sys
 
-from pam_actuation.control.tick import REASONS
 from pam_actuation.messages import Pressure
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.controller_node import report_reason
 from pam_actuation.nodes.conversions import from_ros
-from pam_actuation.nodes.diagnostics import OK, WARN
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
+from std_msgs.msg import String
 
-INPUTS = ('joint_trajectory', 'joint_reference', 'co_contraction', 'joint_state')
+INPUTS = {
+    'joint_trajectory': 'on_named_trajectory', 'joint_reference': 'on_joint_reference',
+    'co_contraction': 'on_co_contraction', 'joint_state': 'on_joint_state'}
 
 
 class JointNode(LearningSwitch, ManagedNode):
@@ -34,7 +38,8 @@ class JointNode(LearningSwitch, ManagedNode):
     Track the angle of a joint with both its muscles; on every way out ask both to be vented.
 
     Its own namespace is that of the joint; the drivers of the muscles run in ``flexor`` and
-    ``extensor`` below it.
+    ``extensor`` below it. The joint's URDF is on ``robot_description``, as other programs
+    expect it; the parameter ``muscle`` is the joint's name there and in trajectories.
     """
 
     NAME = 'joint_controller'
@@ -49,24 +54,29 @@ class JointNode(LearningSwitch, ManagedNode):
     )
 
     loop = None
+    _refusal = ''
 
     def setup(self):
         """Load the controller, create the topics."""
         from pam_actuation.control.config import load_controller
-        from pam_actuation.control.joint_loop import JointControllerLoop, SIDES
+        from pam_actuation.control.joint_loop import JointControllerLoop
         from pam_sim.joint import load_joint
+        from pam_sim.joint.urdf import joint_urdf
         valve = self.value('valve_type')
         joint = load_joint(self.value('joint'), valve=valve)
         name = self.value('controller') or f'sofc_joint_{valve}'
         load_controller(name, joint).step(0.0, 0.0, 0.0, 0.0, 0.0)  # compiled before time counts
-        self.loop = JointControllerLoop(load_controller(name, joint), joint.range_rad)
+        self.loop = JointControllerLoop(
+            load_controller(name, joint), joint.range_rad, self.value('muscle'))
+        self._description = self.create_publisher(String, 'robot_description', qos.LATCHED)
+        self._description.publish(String(data=joint_urdf(joint, self.value('muscle'))))
         self.learning = self.value('learning')
         self._commands = [f'{side}/pressure_command' for side in SIDES]
         for topic in (*self._commands, 'controller_state'):
             self.add_publisher(topic)
         self._inputs = [
-            (topic, self.add_subscription(topic), getattr(self.loop, f'on_{topic}'))
-            for topic in INPUTS]
+            (topic, self.add_subscription(topic), getattr(self.loop, handler))
+            for topic, handler in INPUTS.items()]
         self._sides = [
             (topic, k, self.add_subscription(f'{side}/{topic}'), handler)
             for topic, handler in (('pressure', self.loop.on_pressure),
@@ -75,8 +85,9 @@ class JointNode(LearningSwitch, ManagedNode):
         self._freeze_service = self.create_freeze_service()
 
     def teardown(self):
-        """Take the service back."""
+        """Take service and description back."""
         self.destroy_service(self._freeze_service)
+        self.destroy_publisher(self._description)
         self.loop = None
 
     def start(self):
@@ -95,10 +106,11 @@ class JointNode(LearningSwitch, ManagedNode):
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)
         self.send('controller_state', state)
-        if self.loop.reason == REASONS[0]:
-            self.diagnostics.update(OK, 'following the reference')
-        else:
-            self.diagnostics.update(WARN, self.loop.reason)
+        if self.loop.refusal != self._refusal:
+            self._refusal = self.loop.refusal
+            if self._refusal:
+                self.get_logger().warning(f'a trajectory was refused: {self._refusal}')
+        report_reason(self.diagnostics, self.loop.reason)
 
     def safe_stop(self, why):
         """Command atmospheric pressure: both drivers vent."""
@@ -107,9 +119,13 @@ class JointNode(LearningSwitch, ManagedNode):
                 self.send(topic, Pressure(self.now_ns(), P_ATM_PA))
 
     def diagnostic_values(self):
-        """Add whether the rules change."""
-        learning = (('learning', self.learning),) if self.loop else ()
-        return (*super().diagnostic_values(), *learning)
+        """Add whether the rules change, and wishes that were refused."""
+        values = super().diagnostic_values()
+        if self.loop is None:
+            return values
+        return (*values, ('learning', self.learning),
+                ('references.refused', self.loop.rejected_references),
+                ('references.refusal', self.loop.refusal))
 
 
 def main(args=None):

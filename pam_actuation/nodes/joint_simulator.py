@@ -16,11 +16,11 @@
 
 import sys
 
-from pam_actuation.joint_plant_loop import SIDES
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
+from pam_sim.joint.parameters import SIDES
 
 
 class JointSimulator(PhysicsNode):

@@ -275,6 +275,17 @@ class ManagedNode(LifecycleNode):
             publisher.wait_for_all_acked(max(deadline - time.monotonic(), 0.0))
         self.stop()
 
+    def destroy_node(self):
+        """
+        Destroy everything of this node in the middleware.
+
+        rclpy 7.1 leaves the state machine, whose publisher and services keep the participant
+        alive until the process ends. There Fast DDS takes its tables down under the threads
+        that still receive, which now and then ended a process by a segmentation fault.
+        """
+        super().destroy_node()
+        del self._state_machine
+
     # Transitions: each is wrapped, since rclpy swallows exceptions without a word.
 
     def on_configure(self, state):

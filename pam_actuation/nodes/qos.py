@@ -43,6 +43,10 @@ def reliable(depth):
 PUBLISHER = reliable(PUBLISHER_DEPTH)
 CONSUMER = reliable(CONSUMER_DEPTH)
 RECORDER = reliable(RECORDER_DEPTH)
+# What is said once, such as a robot description: who comes later hears it too.
+LATCHED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def overridable():

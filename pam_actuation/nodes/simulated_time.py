@@ -22,7 +22,9 @@ addition until what they need of the tick has arrived (``lockstep``).
 
 import time
 
+from pam_actuation.messages import START_NS
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import set_stamp
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.endpoints import PolledSubscription
@@ -33,7 +35,6 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 CLOCK_TOPIC = '/clock'
-START_NS = 1_000_000_000 * 1_000_000_000    # simulated time starts here, as in pam simulate
 LONGEST_WAIT_S = 0.1                        # how soon a waiting node notices that it is to end
 FALLEN_BEHIND_S = 0.1                       # later than this, the rate counts from now on anew
 
@@ -183,8 +184,7 @@ class PlantTime:
 
     def publish(self):
         """Tell everybody the time."""
-        stamp = self._message.clock
-        stamp.sec, stamp.nanosec = divmod(self._now_ns, 1_000_000_000)
+        set_stamp(self._message.clock, self._now_ns)
         self._publisher.publish(self._message)
 
     def _follows(self, name):

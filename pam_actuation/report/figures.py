@@ -78,6 +78,14 @@ def line(x, y, name, role, held=False, dash=None, width=1.6, max_points=2400):
             'x': [round(float(v), 4) for v in x], 'y': rounded(y)}
 
 
+def points(x, y, name, role, max_points=700):
+    """Return one trace of points, every so-manieth kept; arguments as of :func:`line`."""
+    every = max(int(math.ceil(len(x) / max_points)), 1)
+    return {'type': 'scatter', 'mode': 'markers', 'name': name,
+            'marker': {'color': f'@{role}', 'size': 3, 'opacity': 0.6},
+            'x': rounded(x[::every]), 'y': rounded(y[::every])}
+
+
 def stack(rows, x_title, row_px=ROW_PX):
     """
     Return a figure of plots one below the other whose x axes zoom together.

@@ -26,11 +26,28 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+NAME = 'rig_session'         # of the node, and of its enclave
 TRANSITIONS = {
     'configure': Transition.TRANSITION_CONFIGURE,
     'activate': Transition.TRANSITION_ACTIVATE,
     'deactivate': Transition.TRANSITION_DEACTIVATE,
 }
+
+
+def local_context(domain_id, arguments=()):
+    """Return an open rclpy context in a ROS domain, looking at this machine only."""
+    context = rclpy.Context()
+    before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    try:
+        rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
+                   signal_handler_options=SignalHandlerOptions.NO)
+    finally:
+        if before is None:
+            del os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE']
+        else:
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
+    return context
 
 
 class RigClient:
@@ -52,20 +69,9 @@ class RigClient:
     """
 
     def __init__(self, domain_id):
-        self._context = rclpy.Context()
-        before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        try:
-            rclpy.init(
-                context=self._context, domain_id=domain_id, args=[],
-                signal_handler_options=SignalHandlerOptions.NO)
-        finally:
-            if before is None:
-                del os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE']
-            else:
-                os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
+        self._context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
         self.node = Node(
-            'rig_session', context=self._context, use_global_arguments=False,
+            NAME, context=self._context, use_global_arguments=False,
             enable_rosout=False, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

@@ -83,16 +83,27 @@ class NodeProcess:
         From ``node_environment``.
     log_dir : path
         Folder for what the node prints.
+    remap : dict
+        Topic of the node to the name it has instead.
+    parameter_file : str
+        ROS parameter file with further parameters; '' for none.
 
     """
 
-    def __init__(self, name, namespace, parameters, environment, log_dir):
+    def __init__(self, name, namespace, parameters, environment, log_dir, remap=(),
+                 parameter_file=''):
         self.name = name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
         command = [
             sys.executable, '-m', f'pam_actuation.nodes.{name}', '--ros-args',
             '-r', f'__ns:={namespace}', *parameter_arguments(parameters)]
+        if parameter_file:
+            command += ['--params-file', parameter_file]
+        if environment.get('ROS_SECURITY_ENABLE') == 'true':
+            command += ['--enclave', self.full_name]
+        for topic, other in dict(remap).items():
+            command += ['-r', f'{topic}:={other}']
         with open(self.log_file, 'wb') as log:
             self._process = subprocess.Popen(
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,

@@ -26,28 +26,23 @@ from dataclasses import dataclass, field
 import os
 from pathlib import Path
 import re
-import signal
-import threading
 import time
 
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_actuation.rigging.transitions import (
+    change, SessionFailed, termination_as_interrupt, TRANSITION_TIMEOUT_S)
 from pam_sim.errors import InputError
 import yaml
 
 START_TIMEOUT_S = 60.0        # a busy machine compiles for long
-TRANSITION_TIMEOUT_S = 15.0
 CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
 FINISHED = 'finished'
 LEVEL_ERROR = 2
 NAMESPACE = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
-
-
-class SessionFailed(Exception):
-    """The rig could not be brought up or did not stay up; the text says why."""
 
 
 @dataclass
@@ -159,17 +154,7 @@ class RigSession:
 
     def change(self, names, transition, timeout_s=TRANSITION_TIMEOUT_S):
         """Ask nodes for a transition at the same time; SessionFailed if one does not make it."""
-        processes = {self.processes[name].full_name: self.processes[name] for name in names}
-        refused = self.client.change_states(
-            processes, transition, timeout_s, lambda full_name: processes[full_name].running)
-        # A node that ended explains more than one that only did not answer.
-        for full_name in sorted(refused, key=lambda name: processes[name].running):
-            process = processes[full_name]
-            if not process.running:
-                raise SessionFailed(process.how_it_ended())
-            last = process.last_line()
-            raise SessionFailed(
-                f'{process.name} did not {transition}' + (f': {last}' if last else ''))
+        change(self.client, [self.processes[name] for name in names], transition, timeout_s)
 
     def run(self, progress=None):
         """
@@ -340,7 +325,7 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         namespace=namespace, overwrite=overwrite, realtime=realtime)
     result = Result(bag or '')
     try:
-        with _termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:
+        with termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:
             run_guarded(session, result, progress)
     finally:
         plan.remove()
@@ -363,20 +348,3 @@ def run_guarded(session, result, progress):
     problems = session.finish()
     session.fill(result)
     result.findings += problems
-
-
-class _termination_as_interrupt:
-    """Turn SIGTERM into KeyboardInterrupt while the rig runs, so that it ends in order."""
-
-    def __enter__(self):
-        self._before = None
-        if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, _interrupt)
-
-    def __exit__(self, *_):
-        if self._before is not None:
-            signal.signal(signal.SIGTERM, self._before)
-
-
-def _interrupt(number, frame):
-    raise KeyboardInterrupt

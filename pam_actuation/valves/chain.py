@@ -21,7 +21,7 @@ The driver is the one of the live node; sensors are read at the rate of the plan
 import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.messages import Pressure
+from pam_actuation.messages import Pressure, START_NS
 from pam_sim.errors import InputError
 from pam_sim.response import Response
 from pam_sim.rollout import kernel, layout
@@ -31,7 +31,6 @@ from pam_sim.units import P_ATM_PA
 STEP_S = 0.001
 SENSOR_EVERY = 4                    # steps between two readings: 250 Hz
 _STEP_NS = 1_000_000
-_START_NS = 1_000_000_000 * 1_000_000_000
 
 
 class Record(Response):
@@ -146,7 +145,7 @@ class Chain:
 
     def _drive(self, command_pa, signal):
         """Read the sensors and call the driver where it is time; return the valve signal."""
-        now = _START_NS + self._steps * _STEP_NS
+        now = START_NS + self._steps * _STEP_NS
         if self._steps % SENSOR_EVERY == 0:
             out = self._now
             pressure_pa, _, _, jitter_ns = self._sensors.read(

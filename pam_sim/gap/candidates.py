@@ -105,9 +105,9 @@ class Candidate:
         return {'name': self.effect, 'parameters': {**dict(self.held), **values}}
 
 
-def _level(name):
+def _level_and(shape):
     return (Free('force_n', 1.0, 0.0, 50.0, starts=(1.0,)),
-            Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), *name)
+            Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), shape)
 
 
 _RATES = (4e5, 1e6, 2.5e6)
@@ -119,17 +119,19 @@ _TABLE = {
                    Free('vent_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES)),
     'vent_asymmetry': (Free('ratio_minus_1', 0.2, -0.4, 4.0),),
     'leakage': (Free('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),),
-    'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True, (3e-4, 3e-3)),),
+    # A compressor that starts once more or less makes other valleys of the misfit.
+    'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True,
+                          (2e-4, 4e-4, 7e-4, 1.2e-3, 2.5e-3, 5e-3)),),
     'dead_volume': (Free('extra_volume_m3', 2e-6, 0.0, 1e-4),),
     'thermal': (Free('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),),
     'coulomb_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'pressure_friction': (Free('force_at_400kpa_n', 1.0, 0.0, 100.0),),
-    'hysteresis': _level((Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5)),)),
-    'hysteresis_bouc_wen': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
-    'hysteresis_lugre': _level((Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True),)),
+    'hysteresis': _level_and(Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
+    'hysteresis_bouc_wen': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
+    'hysteresis_lugre': _level_and(Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
     'hysteresis_prandtl_ishlinskii': (
         Free('half_width_pa', 2e3, 0.0, 5e4), Free('half_width_per_pa', 0.02, 0.0, 0.3)),
-    'history_friction': _level((Free('width_m', 8e-4, 2e-4, 8e-3, True),)),
+    'history_friction': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
     'braid_contact_friction': (Free('friction_coefficient', 0.3, 0.0, 2.0),),
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
@@ -142,9 +144,11 @@ _TABLE = {
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }
-_HSV = {'valve_dead_zone': (Free('open_time_s', 1e-3, 0.0, 9e-3),
-                            Free('close_time_s', 1e-3, 0.0, 9e-3))}
-_PPR = {'valve_dead_zone': (Free('half_width_pa', 2e3, 0.0, 5e4),)}
+_SWITCHING = (Free('open_time_s', 1e-3, 0.0, 9e-3), Free('close_time_s', 1e-3, 0.0, 9e-3))
+_HSV = {'valve_dead_zone': _SWITCHING,
+        'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3))}
+_OVERLAP = (Free('half_width_pa', 2e3, 0.0, 5e4),)
+_PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
 # Left is a limit of right: where both explain the data, the simpler one is named.
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}

@@ -28,7 +28,7 @@ import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.free_run import (
     FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven)
-from pam_sim.gap.noise import noise_of, noise_sd, rms_rate, SMALLEST, STAMP_SD_S
+from pam_sim.gap.noise import noise_of, noise_sd, sensor_floor, SMALLEST, STAMP_SD_S
 from pam_sim.gap.parts import part_of
 from pam_sim.gap.result import FIELD, SIGNALS
 from pam_sim.units import P_ATM_PA
@@ -91,6 +91,8 @@ class Cut:
         Made so far.
     part, block, signal : numpy.ndarray of int, shape (N,)
         Part, test block and signal (index into ``signals``) of every compared sample.
+    time_s, run : numpy.ndarray, shape (N,)
+        Its time in its recording, and which of them that is.
 
     """
 
@@ -104,25 +106,26 @@ class Cut:
         self.simulations, self._lock = 0, threading.Lock()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
-        self._index, parts, blocks, signals, measured = [], [], [], [], []
+        self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
         first = 0
-        for recording in recordings:
+        for index, recording in enumerate(recordings):
             chosen = {}
             for name in self.outputs(recording):
                 s = self.signals.index(name)
                 time_s = recording.time_s[name]
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
-                chosen[name] = np.arange(0, time_s.size, every)
-                at = time_s[chosen[name]]
-                chosen[name] = at
+                chosen[name] = at = time_s[::every]
                 parts.append(part_of(at, recording.grid_s[-1], own_proof))
                 blocks.append(first + (at // TEST_BLOCK_S).astype(int))
                 signals.append(np.full(at.size, s))
+                times.append(at)
+                runs.append(np.full(at.size, index))
                 measured.append(recording.measured[name][::every])
             self._index.append(chosen)
             first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
         self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
         self.signal, self._measured = np.concatenate(signals), np.concatenate(measured)
+        self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
         self.floor = self._floors(rig, seed)
         self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
 
@@ -178,22 +181,14 @@ class Cut:
         squares += ((self._coarse(rig) - base) / COARSE_GAIN) ** 2
         floor = {}
         for s, name in enumerate(self.signals):
-            own = np.mean([self._sensor_floor(r, name) ** 2 for r in self.recordings
-                           if name in self.outputs(r)])
+            own = np.mean([sensor_floor(r.time_s[name], r.measured[name], name) ** 2
+                           for r in self.recordings if name in self.outputs(r)])
             floor[name] = float(np.sqrt(own + np.mean(squares[self.signal == s])))
         return floor
 
     def _coarse(self, rig):
         """Return the values with every second sample of the measured input left out."""
         return self.values(rig, np.zeros(len(self.known)))
-
-    @staticmethod
-    def _sensor_floor(recording, name):
-        time_s, values = recording.time_s[name], recording.measured[name]
-        noise = noise_of(time_s, values)
-        return float(np.sqrt(
-            noise.sd ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise.white_sd)) ** 2
-            + SMALLEST[name] ** 2))
 
 
 class ValveCut(Cut):

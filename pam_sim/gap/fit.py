@@ -36,12 +36,17 @@ from scipy.optimize import least_squares
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
 FREE_BOX = 60.0
+HELD_BOX = 1e-3
+SHAPE_SD = 2.0               # of the logarithm of a shape; where data say nothing, it is typical
 FREE_SD = 30.0               # factor on the deviation of the prior of a freed number
 EFFECT_STEP = 0.01           # of a parameter of an effect, relative
 ROUNDS = 4
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
+POLISHES = 4
+WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
+SCORE_BLOCKS = 4             # test blocks whose scores are summed
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
@@ -62,6 +67,11 @@ class Hypothesis:
     def size(self):
         """Return how many numbers it adds to the fit."""
         return sum(len(c.free) for c in self.effects) + len(self.freed)
+
+    def rows(self, place):
+        """Return which of the normalised parameters are those of one effect, as a slice."""
+        first = sum(len(c.free) for c in self.effects[:place])
+        return slice(first, first + len(self.effects[place].free))
 
     def touches(self, cut):
         """Return whether it can change the errors of a cut."""
@@ -96,15 +106,39 @@ class Found:
 
     def values(self):
         """Return the parameters of each effect, in the order of the hypothesis."""
-        found, first = [], 0
-        for c in self.hypothesis.effects:
-            found.append({f.name: f.value(self.theta[first + j]) for j, f in enumerate(c.free)})
-            first += len(c.free)
-        return found
+        return [{f.name: f.value(t) for f, t in zip(c.free, self.theta_of(place))}
+                for place, c in enumerate(self.hypothesis.effects)]
+
+    def theta_of(self, place):
+        """Return the normalised parameters of one effect of the hypothesis."""
+        return self.theta[self.hypothesis.rows(place)]
 
     def settings(self):
         """Return the effects as entries of a model file."""
         return [c.setting(v) for c, v in zip(self.hypothesis.effects, self.values())]
+
+
+@dataclass(frozen=True)
+class Precision:
+    """
+    How well what a hypothesis adds is known: theta, then freed numbers in deviations.
+
+    Attributes
+    ----------
+    likelihood : numpy.ndarray, shape (K, K)
+        Covariance by the tempered likelihood and the priors.
+    blocks : numpy.ndarray, shape (K, K)
+        Covariance by how much the scores of time blocks differ: errors that last through a
+        block count once (White 1980, for clusters).
+    held : numpy.ndarray, shape (K,)
+        Solution with latency and skew of the measurement at their prior. What they took
+        up of a delay may have been the effect's own.
+
+    """
+
+    likelihood: np.ndarray
+    blocks: np.ndarray
+    held: np.ndarray
 
 
 class Problem:
@@ -125,7 +159,7 @@ class Problem:
         self.rig, self.cuts, self.use = rig, cuts, use
         self.slopes = {}
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in cuts})
-        self.base = self._fit_base()
+        self.base = self.fit_base()
 
     def take_slopes(self, effects, known_z):
         """Take the slopes of all cuts with respect to their known numbers at a point."""
@@ -146,7 +180,7 @@ class Problem:
         """Return the given model with entries of a model file added."""
         return self.rig.with_(effects=[*self.rig.effects, *effects])
 
-    def fit(self, hypothesis, theta=(), near=None):
+    def fit(self, hypothesis, theta=(), near=None, hold=False):
         """
         Fit a hypothesis.
 
@@ -158,6 +192,8 @@ class Problem:
             Start of the normalised parameters of its effects.
         near : Found, optional
             Where known numbers, weights and untouched cuts start; the baseline by default.
+        hold : bool
+            Whether latency and skew of the measurement stay at their prior.
 
         Returns
         -------
@@ -168,7 +204,7 @@ class Problem:
         touched = [cut for cut in self.cuts if hypothesis.touches(cut)]
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
         search = _Search(self, hypothesis, touched, {
-            c.subsystem: np.ones(len(c.signals)) for c in touched})
+            c.subsystem: np.ones(len(c.signals)) for c in touched}, hold)
         # The baseline's numbers are bent by what is missing; a better model starts unbent.
         bent = near is self.base
         x = np.concatenate([np.asarray(theta, float)] + [
@@ -183,44 +219,78 @@ class Problem:
                 temper[s] = self.base.temper[s]
         return Found(hypothesis, theta, known_z, errors, temper)
 
-    def refit_base(self):
-        """Return the baseline fitted to the parts that are used now."""
-        return self._fit_base()
-
     def polish(self, found):
-        """Return the better of a fit and one that goes on with slopes taken where it stands."""
+        """Return a fit that went on with slopes taken where it stands, as long as that helps."""
         kept = dict(self.slopes)
-        self.take_slopes(found.settings(), found.known_z)
-        again = self.fit(found.hypothesis, found.theta, found)
+        for _ in range(POLISHES):
+            self.take_slopes(found.settings(), found.known_z)
+            again = self.fit(found.hypothesis, found.theta, found)
+            before, after = self.cost(found), self.cost(again)
+            found = again if after < before else found
+            if after > WORTH_POLISHING * before:
+                break
         self.slopes = kept
-        return again if self.cost(again) < self.cost(found) else found
+        return found
 
     def cost(self, found):
         """Return the mean squared error over the fitted parts, in floors squared, all cuts."""
         return sum(float(np.mean(found.errors[c.subsystem][np.isin(c.part, self.use)] ** 2))
                    for c in self.cuts)
 
-    def covariance(self, found):
-        """
-        Return the covariance of what a hypothesis adds: (theta, freed numbers in deviations).
+    def precision(self, found):
+        """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
+        kept = dict(self.slopes)
+        self.take_slopes(found.settings(), found.known_z)
+        names, likelihood, blocks = self._covariances(found)
+        held = self.fit(found.hypothesis, found.theta, found, hold=True)
+        self.slopes = kept
+        count = len(found.theta)
+        chosen = [*range(count), *(names.index(n) for n in found.hypothesis.freed)]
+        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in self.cuts
+                                           if found.hypothesis.touches(c)])
+        pick = np.ix_(chosen, chosen)
+        return Precision(likelihood[pick], blocks[pick], z[chosen])
 
-        From the tempered likelihood and the priors, with slopes taken at the solution.
+    def certainty(self, found, place):
+        """
+        Return by how many standard deviations the size of an effect differs from none.
+
+        Its shapes are held: a size that is known only together with a shape is none the less
+        there. Infinite for an effect of shapes alone, of which no value means none.
         """
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)
+        effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
+        held = [first + j for j, f in enumerate(effect.free) if f.shape]
+        size = [first + j for j, f in enumerate(effect.free) if not f.shape]
+        _, *covariances = self._covariances(found, held)
+        self.slopes = kept
+        theta = found.theta[size]
+        return min((float(np.sqrt(theta @ np.linalg.pinv(c[np.ix_(size, size)]) @ theta))
+                    for c in covariances if size), default=np.inf)
+
+    def _covariances(self, found, held=()):
+        """
+        Return (names of all numbers, None for theta; covariance by likelihood; by blocks).
+
+        ``held`` are places that do not move.
+        """
         touched = [c for c in self.cuts if found.hypothesis.touches(c)]
         search = _Search(self, found.hypothesis, touched, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
-        slope = search.slopes(x)
-        self.slopes = kept
+        slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
+        slope[:, list(held)] = 0.0
         # What the data do not touch is unknown, not certain.
         whole = np.linalg.inv(slope.T @ slope + UNTOUCHED * np.eye(x.size))
+        scores = np.zeros((blocks.max(initial=0) + 1, x.size))
+        np.add.at(scores, blocks, slope[:blocks.size] * residuals[:blocks.size, np.newaxis])
+        priors = slope[blocks.size:]
+        between = scores.T @ scores + priors.T @ priors
         names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
-        chosen = [j for j, n in enumerate(names) if n is None] + [
-            names.index(n) for n in found.hypothesis.freed]
-        return whole[np.ix_(chosen, chosen)]
+        return names, whole, whole @ between @ whole
 
-    def _fit_base(self):
+    def fit_base(self):
+        """Return the baseline: known numbers fitted to the parts that are used now."""
         known = {c.subsystem: np.zeros(len(c.known)) for c in self.cuts}
         temper = {c.subsystem: np.ones(len(c.signals)) for c in self.cuts}
         for _ in range(BASE_PASSES):
@@ -234,19 +304,20 @@ class Problem:
 class _Search:
     """One least-squares problem; x holds the effects' parameters, then each cut's numbers."""
 
-    def __init__(self, problem, hypothesis, cuts, temper):
+    def __init__(self, problem, hypothesis, cuts, temper, hold=False):
         self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
         self.free = [f for c in hypothesis.effects for f in c.free]
         self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
-        low, high = [f.lower for f in self.free], [f.upper for f in self.free]
-        low = [f.coordinate(v) for f, v in zip(self.free, low)]
-        high = [f.coordinate(v) for f, v in zip(self.free, high)]
-        self.prior = []
+        low = [f.coordinate(f.lower) for f in self.free]
+        high = [f.coordinate(f.upper) for f in self.free]
+        self.prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
         for cut in cuts:
             lowest, highest = cut.bounds()
             for k, at_least, at_most in zip(cut.known, lowest, highest):
                 freed = k.name in hypothesis.freed
                 box = FREE_BOX if freed or not k.of_rig else BOX
+                if hold and k.unit == 's' and not k.of_rig:
+                    box = HELD_BOX
                 low.append(max(at_least, -box))
                 high.append(min(at_most, box))
                 self.prior.append(FREE_SD if freed else 1.0)
@@ -262,7 +333,7 @@ class _Search:
             first += len(cut.known)
         return x[:len(self.free)], found
 
-    def errors(self, x, only=None):
+    def errors(self, x):
         """Return the errors of every touched cut, by subsystem."""
         key = x.tobytes()
         if self._last.get('key') != key:
@@ -277,15 +348,14 @@ class _Search:
         """Return weighted errors, then the priors."""
         errors = self.errors(x)
         return np.concatenate([self._weighted(c, errors[c.subsystem]) for c in self.cuts]
-                              + [x[len(self.free):] / self.prior])
+                              + [x / self.prior])
 
     def slopes(self, x):
         """Return the derivatives of ``residuals``."""
         base, count = dict(self.errors(x)), len(self.free)
         columns = np.zeros((self.residuals(x).size, x.size))
         rows = columns.shape[0] - self.prior.size
-        columns[rows + np.arange(self.prior.size), count + np.arange(self.prior.size)] = \
-            1.0 / self.prior
+        columns[rows:] = np.diag(1.0 / self.prior)
         last = self._last
         for j in range(count):
             step = EFFECT_STEP * max(abs(x[j]), 0.3)
@@ -304,6 +374,14 @@ class _Search:
             columns[row:row + len(slope), column:column + len(cut.known)] = slope
             row, column = row + len(slope), column + len(cut.known)
         return columns
+
+    def blocks(self):
+        """Return the number of the block of every weighted error, rising, cut by cut."""
+        found, first = [np.zeros(0, int)], 0
+        for cut in self.cuts:
+            found.append(first + cut.block[self.masks[cut.subsystem]] // SCORE_BLOCKS)
+            first = int(found[-1].max()) + 1
+        return np.concatenate(found)
 
     def run(self, x):
         """Return the solution from a start."""

@@ -23,7 +23,6 @@ and outliers.
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.gap.result import FIELD
 from scipy.signal import lfilter
 
 THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)      # 1, 3, 3, 1 squared and summed
@@ -128,17 +127,13 @@ def quantisation_step(values):
     return float(steps[steps > 1e-9 * np.ptp(values)].min(initial=np.inf)) if steps.size else 0.0
 
 
-def noise_floor(run, signal, inputs_sd=0.0):
+def sensor_floor(time_s, values, signal, inputs_sd=0.0):
     """
-    Return the standard deviation that noise and stamps give a residual, SI.
+    Return the standard deviation that noise and stamps give the residual of a signal, SI.
 
     Quadrature sum of sensor noise, of the stamp error times the rms rate of the
     signal, and of ``inputs_sd``, the noise that the inputs bring along.
     """
-    series = run.topics[signal]
-    order = np.argsort(series.stamp_ns, kind='stable')
-    time_s = np.asarray(series.stamp_ns)[order] * 1e-9
-    values = np.asarray(series.values[FIELD[signal]], dtype=float)[order]
     noise = noise_of(time_s, values)
     return float(np.sqrt(
         noise.sd ** 2 + (STAMP_SD_S * rms_rate(time_s, values, noise.white_sd)) ** 2

@@ -21,7 +21,7 @@ recorded valve signal alone.
 
 import numpy as np
 from pam_sim.gap.free_run import free_run
-from pam_sim.gap.noise import noise_floor, noise_of, STAMP_SD_S
+from pam_sim.gap.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT
 
@@ -49,11 +49,11 @@ def late_by(measurement):
     return {'contraction': skew, 'force': skew + measurement.get('force_skew', 0.0)}
 
 
-def free_run_of(problem, found, recording, start_error_pa=0.0):
+def free_run_of(problem, found, recording, start_error_pa=0.0, stamp_shift_s=None):
     """Return the whole-chain free run of a fit at the stamps of a recording, by signal."""
     _, measurement = numbers_of(problem, found)
     return free_run(model_of(problem, found), recording, measurement['latency'],
-                    start_error_pa=start_error_pa, late_s=late_by(measurement))
+                    stamp_shift_s, start_error_pa, late_by(measurement))
 
 
 def moved(recording, first, second, chosen=None):
@@ -73,10 +73,8 @@ class Proof:
 
     Parameters
     ----------
-    run : pam_sim.run.Run
-        The recording the proof is made on.
     recording : Recording
-        The same, prepared.
+        The recording the proof is made on.
     whole : bool
         All of it is the certify part; otherwise its certify blocks.
     problem : Problem
@@ -88,7 +86,7 @@ class Proof:
 
     """
 
-    def __init__(self, run, recording, whole, problem, base, final, seed=0):
+    def __init__(self, recording, whole, problem, base, final, seed=0):
         self.recording, self.problem = recording, problem
         self.part = {s: recording.time_s[s] > SETTLE_S if whole else
                      part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY
@@ -98,13 +96,13 @@ class Proof:
         self.simulations = 3
         self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd
                       for s in recording.signals}
-        self.floor = self._floors(run, final, seed)
+        self.floor = self._floors(final, whole, seed)
 
-    def run(self, found, whole):
+    def run(self, found, whole, stamp_shift_s=None):
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.problem, found)
         start = 0.0 if whole else measurement.get('start_error', 0.0)
-        return free_run_of(self.problem, found, self.recording, start)
+        return free_run_of(self.problem, found, self.recording, start, stamp_shift_s)
 
     def signals(self):
         """Return the SignalGap of every signal."""
@@ -134,15 +132,14 @@ class Proof:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def _floors(self, run, final, seed):
+    def _floors(self, final, whole, seed):
         random, r = np.random.default_rng(seed), self.recording
-        rig, squares = model_of(self.problem, final), dict.fromkeys(r.signals, 0.0)
-        _, measurement = numbers_of(self.problem, final)
+        squares = dict.fromkeys(r.signals, 0.0)
         for _ in range(INPUT_DRAWS):
             shift = STAMP_SD_S * random.standard_normal(r.messages)
-            moved = free_run(rig, r, measurement['latency'], shift,
-                             late_s=late_by(measurement))
+            moved = self.run(final, whole, shift)
             self.simulations += 1
             for s in r.signals:
                 squares[s] += float(np.mean((moved[s] - self.after[s]) ** 2)) / INPUT_DRAWS
-        return {s: noise_floor(run, s, np.sqrt(squares[s])) for s in r.signals}
+        return {s: sensor_floor(r.time_s[s], r.measured[s], s, np.sqrt(squares[s]))
+                for s in r.signals}

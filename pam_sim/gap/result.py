@@ -20,7 +20,6 @@ import math
 import numpy as np
 
 SCHEMA = 1
-VERDICTS = ('effects', 'parameter', 'no_gap', 'unknown', 'ambiguous', 'refused')
 SIGNALS = ('pressure', 'contraction', 'force')
 FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
 UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
@@ -114,7 +113,7 @@ class GapResult:
     Attributes
     ----------
     verdict : str
-        One of ``VERDICTS``.
+        ``effects``, ``parameter``, ``no_gap``, ``unknown``, ``ambiguous`` or ``refused``.
     reason : str
         One or two sentences for a person.
     signals : dict of str -> SignalGap

@@ -24,7 +24,8 @@ missed when it is left out.
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from pam_sim.gap.candidates import candidates, LIMITS
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
@@ -35,42 +36,12 @@ MAX_EFFECTS = 3
 PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
-FIRST_STEP = 0.25            # least share of the gap a first effect explains
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
-RIVAL = 0.5                  # of the best share; a name that explains less is no rival
-BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
-LATER_STEP = 0.7             # least share of what is left that a further effect explains
+CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
 RIVALS = 4                   # that are ranked again when further effects are in
-CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
-STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
-SAME_AS = {'viscous_damping': 'damping_n_s_per_m', 'dead_volume': 'V_dead'}
-
-
-@dataclass
-class Rival:
-    """One hypothesis with its share of the gap and, against the best, its t, by subsystem."""
-
-    name: str
-    found: Found
-    share: dict = field(default_factory=dict)
-    t: dict = field(default_factory=dict)
-
-
-@dataclass
-class Named:
-    """
-    An effect or a number that was taken in.
-
-    ``names`` explain as much, itself first; ``formulations`` are all fits under its name.
-    """
-
-    name: str
-    subsystem: str
-    rivals: list
-    names: tuple
-    formulations: list = field(default_factory=list)
 
 
 @dataclass
@@ -125,8 +96,9 @@ class Search:
         self.problem, self.out_of_time, self.matters = problem, out_of_time, matters
         self.seen_gap, self.least_gap = seen_gap, least_gap
         outputs = sum((cut.signals for cut in problem.cuts), ())
-        self.only, self.pool = only, candidates(problem.rig, outputs, only)
+        self.pool = candidates(problem.rig, outputs, only)
         self.base = problem.base
+        self.choice = Choice(problem, self.base, seen_gap)
         self.fitted = []
         self.screened = screen(problem, self.base, self.pool)
         self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
@@ -141,9 +113,10 @@ class Search:
                 break
             rivals = self._rivals(current, open_cuts)
             self._set_levels(rivals, open_cuts)
-            taken = self._joint_winner(rivals, current, open_cuts)
+            taken = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
             if taken is None:
-                taken = [w for w in (self._winner(rivals, current, c) for c in open_cuts) if w]
+                taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
+                taken = [w for w in taken if w]
                 closed |= {c.subsystem for c in open_cuts} - {w.subsystem for w in taken}
             else:
                 taken = [taken]
@@ -155,15 +128,12 @@ class Search:
             named += taken
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named = self._eliminate(current, named)
-        current, named = self._resolve(current, named)
+        current, named = self._established(*self._resolve(current, named))
         explained = self._explained(current)
-        small = {c.subsystem for c in self.problem.cuts
-                 if gap(c, current.errors[c.subsystem]) < NEAR_FLOOR}
-        for w in list(named):        # what explains too little is no name
-            least = RIVAL if w.subsystem in small else NAMED
-            if explained.get(w.subsystem, 0.0) < least:
-                current = self._swapped(current, w.name)
-                named = [o for o in named if o is not w]
+        poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
+        for w in [w for w in named if w.subsystem in poor]:
+            current = self._swapped(current, w.name)
+        named = [w for w in named if w.subsystem not in poor]
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
                        self.screened)
 
@@ -187,7 +157,10 @@ class Search:
             s = cut.subsystem
             cut.level = min([cut.level] + [cut.chi2(r.found.errors[s], SELECT) for r in rivals])
         for r in rivals:
-            r.share = self._rival(r.found, r.name).share
+            r.share = self.choice.shares(r.found)
+
+    def _cut(self, subsystem):
+        return next(c for c in self.problem.cuts if c.subsystem == subsystem)
 
     def _is_open(self, cut, current):
         first = self.first_gap[cut.subsystem]
@@ -196,10 +169,17 @@ class Search:
             return first > self.least_gap
         return left > max(self.seen_gap, DONE * first)
 
+    def _is_poor(self, cut, current, explained):
+        """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
+        s = cut.subsystem
+        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
+        bent = any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
+                   for known, z in zip(cut.known, current.known_z[s]))
+        return bent or explained.get(s, 0.0) < least
+
     def _explained(self, current):
-        return {c.subsystem: share(c, self.base.errors[c.subsystem],
-                                   current.errors[c.subsystem])
-                for c in self.problem.cuts if self.first_gap[c.subsystem] > self.least_gap}
+        return {s: explained for s, explained in self.choice.shares(current).items()
+                if self.first_gap[s] > self.least_gap}
 
     # -- rivals ----------------------------------------------------------------------------
     def _rivals(self, current, cuts):
@@ -256,103 +236,13 @@ class Search:
             hypothesis, (*current.theta, *screened.start), current), screened.candidate.name)
 
     def _rival(self, found, name):
-        return Rival(name, found, {
-            c.subsystem: share(c, self.base.errors[c.subsystem], found.errors[c.subsystem])
-            for c in self.problem.cuts})
+        return Rival(name, found, self.choice.shares(found))
 
     def _best_of_name(self, rivals):
         best = {}
-        for r in rivals:
-            known = best.get(r.name)
-            if known is None or sum(r.share.values()) > sum(known.share.values()):
-                best[r.name] = r
+        for r in sorted(rivals, key=lambda r: CLOSE * r.at_edge - sum(r.share.values())):
+            best.setdefault(r.name, r)
         return list(best.values())
-
-    # -- choice ----------------------------------------------------------------------------
-    def _admissible(self, rivals, current, cut):
-        """Return the rivals that act in a cut and leave no other cut worse."""
-        found = []
-        for r in rivals:
-            if not self._touches(r, current, cut):
-                continue
-            worse = any(
-                gap(c, r.found.errors[c.subsystem]) - gap(c, current.errors[c.subsystem])
-                > max(self.seen_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
-                for c in self.problem.cuts if c is not cut)
-            if not worse:
-                found.append(r)
-        return found
-
-    @staticmethod
-    def _touches(rival, current, cut):
-        h, known = rival.found.hypothesis, current.hypothesis
-        return Hypothesis(tuple(c for c in h.effects if c not in known.effects),
-                          tuple(f for f in h.freed if f not in known.freed)).touches(cut)
-
-    def _tied(self, rivals, current, cut):
-        """Return the rivals in a cut that the data cannot tell from the best, best first."""
-        s = cut.subsystem
-        ranked = sorted(self._admissible(rivals, current, cut), key=lambda r: -r.share[s])
-        if not ranked:
-            return []
-        for r in ranked:
-            if r.share[s] > ranked[0].share[s] - CLOSE and gap(
-                    cut, r.found.errors[s]) > self.seen_gap:
-                r.found = self.problem.polish(r.found)
-                r.share = self._rival(r.found, r.name).share
-        ranked.sort(key=lambda r: -r.share[s])
-        best = ranked[0].found.errors[s]
-        for r in ranked:
-            r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
-        half = RIVAL * ranked[0].share[s]
-        tied = [r for r in ranked if r is ranked[0]
-                or (r.t[s] < CERTAIN_T and r.share[s] > half)]
-        strain = min(self._strain(r.found) for r in tied)
-        tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
-        names = {r.name for r in tied}
-        as_good = {r.name for r in tied if r.t[s] < BETTER_T}
-        return [r for r in tied
-                if not any((simple, r.name) in LIMITS for simple in as_good)
-                and SAME_AS.get(r.name) not in names]
-
-    def _strain(self, found):
-        """Return the squared pulls of all numbers that should have stayed where they were."""
-        return sum(float(z) ** 2 for cut in self.problem.cuts
-                   for known, z in zip(cut.known, found.known_z[cut.subsystem])
-                   if known.of_rig and known.name not in found.hypothesis.freed)
-
-    def _winner(self, rivals, current, cut):
-        tied = self._tied(rivals, current, cut)
-        s = cut.subsystem
-        if not tied:
-            return None
-        before = share(cut, self.base.errors[s], current.errors[s])
-        gained = tied[0].share[s] - before
-        least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
-        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s])
-        if gained < least or sure < CERTAIN_T:
-            return None
-        return Named(tied[0].name, s, sorted(
-            rivals, key=lambda r: -r.share[s]), tuple(r.name for r in tied),
-            [r for r in self.fitted if r.name == tied[0].name])
-
-    def _joint_winner(self, rivals, current, cuts):
-        """Return a cause that explains several cuts as well as the best in each, or None."""
-        if len(cuts) < 2:
-            return None
-        tied = {c.subsystem: self._tied(rivals, current, c) for c in cuts}
-        for r in tied[cuts[0].subsystem]:
-            everywhere = all(
-                r in tied[s] or (tied[s] and r.share[s] > tied[s][0].share[s] - CLOSE)
-                for s in tied)
-            if everywhere and all(self._touches(r, current, c) for c in cuts) \
-                    and min(r.share[s] for s in tied) > RIVAL:
-                same = [o.name for o in tied[cuts[0].subsystem]
-                        if o in tied[cuts[1].subsystem]]
-                names = tuple(dict.fromkeys([r.name, *same]))
-                return Named(r.name, cuts[0].subsystem, rivals, names,
-                             [o for o in self.fitted if o.name == r.name])
-        return None
 
     # -- state -----------------------------------------------------------------------------
     def _take(self, current, taken):
@@ -377,13 +267,13 @@ class Search:
                 break
             h = current.hypothesis
             old = h.effects[place]
-            first = sum(len(c.free) for c in h.effects[:place])
+            rows = h.rows(place)
             tried = [current]
             for c in self.pool:
                 if c.name != old.name or c == old or len(h.effects) < 2:
                     continue
-                theta = [*current.theta[:first], *(f.coordinate(f.scale) for f in c.free),
-                         *current.theta[first + len(old.free):]]
+                theta = [*current.theta[:rows.start], *(f.coordinate(f.scale) for f in c.free),
+                         *current.theta[rows.stop:]]
                 effects = (*h.effects[:place], c, *h.effects[place + 1:])
                 tried.append(self.problem.fit(Hypothesis(effects, h.freed), theta, current))
             current = max(tried, key=lambda f: sum(self._explained(f).values()))
@@ -395,12 +285,11 @@ class Search:
 
         ``put`` is a Rival that takes its place: what it adds as the last one.
         """
-        h, effects, theta, first = current.hypothesis, [], [], 0
-        for c in h.effects:
+        h, effects, theta = current.hypothesis, [], []
+        for place, c in enumerate(h.effects):
             if c.name != out:
                 effects.append(c)
-                theta += list(current.theta[first:first + len(c.free)])
-            first += len(c.free)
+                theta += list(current.theta_of(place))
         freed = [f for f in h.freed if f != out]
         if put is not None:
             added = put.found.hypothesis
@@ -408,7 +297,7 @@ class Search:
                 freed.append(put.name)
             else:
                 effects.append(added.effects[-1])
-                theta += list(put.found.theta[-len(added.effects[-1].free):])
+                theta += list(put.found.theta_of(len(added.effects) - 1))
         return self.problem.fit(Hypothesis(tuple(effects), tuple(freed)), theta, current)
 
     def _eliminate(self, current, named):
@@ -417,8 +306,7 @@ class Search:
             if len(named) < 2:
                 break
             without = self._swapped(current, w.name)
-            cut = next(c for c in self.problem.cuts if c.subsystem == w.subsystem)
-            s = w.subsystem
+            s, cut = w.subsystem, self._cut(w.subsystem)
             rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
             gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
             sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
@@ -427,11 +315,20 @@ class Search:
                 current, named = without, [o for o in named if o is not w]
         return current, named
 
+    def _established(self, current, named):
+        """Drop effects whose size does not clearly differ from none."""
+        for w in list(named):
+            names = [c.name for c in current.hypothesis.effects]
+            if w.name in names and self.problem.certainty(
+                    current, names.index(w.name)) < CERTAIN_SIZE:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
+        return current, named
+
     def _resolve(self, current, named):
         """Rank again the rivals of each effect now that the others are in the model."""
         found = []
         for w in named:
-            cut = next(c for c in self.problem.cuts if c.subsystem == w.subsystem)
             others = {o.name for o in named if o is not w}
             beside = [o for o in named if o is not w and o.subsystem == w.subsystem]
             if not beside:
@@ -443,8 +340,9 @@ class Search:
             swapped = [Rival(w.name, current)] + [
                 Rival(r.name, self._swapped(current, w.name, r)) for r in near]
             for r in swapped:
-                r.share = self._rival(r.found, r.name).share
-            tied = self._tied(swapped, self._swapped(current, w.name), cut)
+                r.share = self.choice.shares(r.found)
+            tied = self.choice.tied(
+                swapped, self._swapped(current, w.name), self._cut(w.subsystem))
             if tied:
                 current = tied[0].found
                 found.append(Named(tied[0].name, w.subsystem, swapped,

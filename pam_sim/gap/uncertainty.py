@@ -15,9 +15,11 @@
 """
 How well the numbers of a named effect are known.
 
-Two sources: the tempered likelihood around the solution, and the spread over the
-formulations of the same name that explain about as much; no formulation is the
-muscle's own. Results state quantities that mean the same in all of them.
+Three sources: the tempered likelihood around the solution, or how much time blocks differ
+where that is more; what latency and skew of the measurement took up, for it may be the
+effect's own; and the form: no formulation is the muscle's own, so the spread over those of
+the same name that explain about as much counts, and what is left of the gap. Results state
+quantities that mean the same in all formulations.
 """
 
 import numpy as np
@@ -27,10 +29,12 @@ NORMAL_95 = 1.96
 AS_GOOD = 2.0                # times the rest of the best formulation, plus what follows
 AS_GOOD_SHARE = 0.01
 FORM = 1.5                   # times the amplitude of what is left, relative to the gap
+HELD = 1.5                   # times what latency and skew took up
+LEAST = 0.02                 # relative; no formulation is worth less
 NUMERICS = 0.002             # relative, of step and interpolation
 
 
-def effect_numbers(rig, found, place, covariance, named, rest):
+def effect_numbers(rig, found, place, precision, named, rest):
     """
     Return (parameters, equivalent) of one effect of a fit as entries of gap.json.
 
@@ -42,8 +46,8 @@ def effect_numbers(rig, found, place, covariance, named, rest):
         The final fit.
     place : int
         Which effect of its hypothesis.
-    covariance : numpy.ndarray
-        As of ``Problem.covariance``.
+    precision : Precision
+        Of the same fit.
     named : Named
         With the fits in other formulations.
     rest : float
@@ -57,33 +61,45 @@ def effect_numbers(rig, found, place, covariance, named, rest):
 
     """
     candidate = found.hypothesis.effects[place]
-    first = sum(len(c.free) for c in found.hypothesis.effects[:place])
-    theta = found.theta[first:first + len(candidate.free)]
-    own = covariance[first:first + theta.size, first:first + theta.size]
+    theta, rows = found.theta_of(place), found.hypothesis.rows(place)
+    spreads = [c[rows, rows] for c in (precision.likelihood, precision.blocks)]
+    held = precision.held[rows]
     effect = get_effect(candidate.effect)
     units = {p.name: p.unit for p in effect.parameters}
     parameters = {}
     for j, f in enumerate(candidate.free):
-        half = NORMAL_95 * float(np.sqrt(own[j, j]))
+        half = half_width(precision, rows.start + j, theta[j])
         low, high = sorted((f.value(theta[j] - half), f.value(theta[j] + half)))
         parameters[f.name] = _entry(f.value(theta[j]), units[f.name], low, high)
     equivalent = {}
     spread = _formulation_spread(rig, candidate, named)
-    moved = _along_axes(candidate, theta, own, rig)
+    moved = [_along_axes(candidate, theta, own, rig) for own in spreads]
+    shifted = _report(candidate, held, rig)
     # What is left may be the effect's own: a formulation that is a little off.
     off = FORM * np.sqrt(max(rest, 0.0))
     scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
     push = np.where(scaled, [off if f.shape else off * t
                              for f, t in zip(candidate.free, theta)], 0.0)
-    moved.append([_report(candidate, theta + sign * push, rig) for sign in (-1.0, 1.0)])
+    off = [_report(candidate, theta + sign * push, rig) for sign in (-1.0, 1.0)]
     for name, (value, unit) in _report(candidate, theta, rig).items():
-        shifts = np.array([[report[name][0] - value for report in pair] for pair in moved])
-        extra = spread.get(name, 0.0) ** 2 + (NUMERICS * value) ** 2
-        # Each axis of the ellipsoid pushes one way or both; what is not linear is kept.
-        down, up = (float(np.sqrt(np.sum(np.max(sign * shifts, axis=1).clip(0.0) ** 2) + extra))
-                    for sign in (-1.0, 1.0))
+        extra = (spread.get(name, 0.0) ** 2 + (LEAST * value) ** 2
+                 + (HELD * (shifted[name][0] - value)) ** 2)
+        down, up = (np.sqrt(extra + _pushed([off], name, value, sign) + max(
+            _pushed(axes, name, value, sign) for axes in moved)) for sign in (-1.0, 1.0))
         equivalent[name] = _entry(value, unit, value - down, value + up)
     return parameters, equivalent
+
+
+def half_width(precision, place, value):
+    """Return half the 95 % interval of one normalised number, what has no form left out."""
+    variance = max(c[place, place] for c in (precision.likelihood, precision.blocks))
+    return float(np.hypot(NORMAL_95 * np.sqrt(variance), HELD * (precision.held[place] - value)))
+
+
+def _pushed(pairs, name, value, sign):
+    """Return the squared change of a quantity one way; each pair pushes one way or both."""
+    shifts = np.array([[report[name][0] - value for report in pair] for pair in pairs])
+    return float(np.sum(np.max(sign * shifts, axis=1).clip(0.0) ** 2))
 
 
 def _along_axes(candidate, theta, covariance, rig):
@@ -124,9 +140,7 @@ def _formulation_spread(rig, candidate, named):
 
 
 def _reported_in(rival, candidate, rig):
-    place = rival.found.hypothesis.effects.index(candidate)
-    first = sum(len(c.free) for c in rival.found.hypothesis.effects[:place])
-    theta = rival.found.theta[first:first + len(candidate.free)]
+    theta = rival.found.theta_of(rival.found.hypothesis.effects.index(candidate))
     return {name: value for name, (value, _) in _report(candidate, theta, rig).items()}
 
 

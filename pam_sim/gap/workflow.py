@@ -18,10 +18,10 @@ from dataclasses import replace
 import math
 import time
 
-import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Problem
+from pam_sim.gap.fingerprint import fingerprint
+from pam_sim.gap.fit import BOX, Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
@@ -30,7 +30,7 @@ from pam_sim.gap.prove import free_run_of, model_of, moved, numbers_of, Proof
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
-from pam_sim.gap.uncertainty import effect_numbers, NORMAL_95, NUMERICS
+from pam_sim.gap.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
 from pam_sim.gap.words import explain
 from scipy.stats import norm
 
@@ -38,7 +38,6 @@ SEEN_GAP = 0.05              # floors squared; smaller ones are within the error
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
-PULL = 3.5                   # prior deviations beyond which a number is wrong
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -99,8 +98,8 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
                      lambda: time.perf_counter() > deadline, matters).run()
     progress(0.8)
     problem.use = (FIT, SELECT)
-    final, base = problem.polish(outcome.final), problem.refit_base()
-    proof = Proof(certify or runs[0], witness, certify is not None, problem, base, final, seed)
+    final, base = problem.polish(outcome.final), problem.fit_base()
+    proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
@@ -108,6 +107,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     _judge(result, outcome, problem, proof, base, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
+    result.fingerprint = fingerprint(problem, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome)
     result.simulations = problem.simulations + proof.simulations
@@ -119,8 +119,8 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
 def _fill(result, problem, outcome, final, proof):
     """Put signals, numbers, effects and the model into a result."""
     result.signals = proof.signals()
-    covariance = problem.covariance(final)
-    result.calibration = _calibrated(problem, final, covariance)
+    precision = problem.precision(final)
+    result.calibration = _calibrated(problem, final, precision)
     freed = set(final.hypothesis.freed)
     result.parameters = [c for c in result.calibration if c.name in freed]
     model = model_of(problem, final)
@@ -130,7 +130,7 @@ def _fill(result, problem, outcome, final, proof):
         if place is None:
             continue
         parameters, equivalent = effect_numbers(
-            model, final, place, covariance, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
+            model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
         effect = get_effect(w.name)
         formulation = final.hypothesis.effects[place].effect
         result.effects.append({
@@ -156,7 +156,7 @@ def _judge(result, outcome, problem, proof, base, materiality, whole):
     result.evidence = [
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
-    wrong = [c for c in result.parameters if abs(c.pull) > PULL]
+    wrong = [c for c in result.parameters if abs(c.pull) > BOX]
     left = max((beyond(s.rmse_refit, FLOOR_ERROR * s.noise_floor) / max(proof.noise[name], 1e-12)
                 for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (
@@ -179,7 +179,7 @@ def beyond(value, floor):
     return math.sqrt(max(value ** 2 - floor ** 2, 0.0))
 
 
-def _calibrated(problem, found, covariance):
+def _calibrated(problem, found, precision):
     """Return every known number of the rig as Calibrated."""
     count, freed = len(found.theta), list(found.hypothesis.freed)
     numbers, _ = numbers_of(problem, found)
@@ -188,12 +188,11 @@ def _calibrated(problem, found, covariance):
         for known, z in zip(cut.known, found.known_z[cut.subsystem]):
             if not known.of_rig:
                 continue
-            deviation = 1.0
-            if known.name in freed:
-                place = count + freed.index(known.name)
-                deviation = float(np.sqrt(covariance[place, place]))
             value = numbers[known.name]
-            half = math.hypot(NORMAL_95 * deviation * known.sd, NUMERICS * value)
+            half = NORMAL_95 * known.sd
+            if known.name in freed:
+                half = math.hypot(NUMERICS * value, known.sd * half_width(
+                    precision, count + freed.index(known.name), float(z)))
             listed.append(Calibrated(known.name, known.unit, known.value, value,
                                      (value - half, value + half), float(z)))
     return listed

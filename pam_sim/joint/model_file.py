@@ -15,15 +15,15 @@
 """Model files and presets of joints: YAML in, JointRig out, and back."""
 
 from pam_sim.errors import InputError
-from pam_sim.joint.parameters import NAME, PARAMETERS
-from pam_sim.joint.rig import JointRig, SIDES
+from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
+from pam_sim.joint.rig import JointRig
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 from pam_sim.model_file import load_rig
 from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import check_parameters
 
 _PRESETS = NamedFiles('joint/presets')
-KEYS = ('name', 'joint', 'load', 'flexor', 'extensor', 'parameters')
+KEYS = ('name', 'joint', 'load', *SIDES, 'parameters')
 
 
 def joint_preset_names():
@@ -77,7 +77,7 @@ def load_rig_or_side(source, valve=None):
 
     """
     joint, _, side = str(source).rpartition('/')
-    if joint and side in ('flexor', 'extensor'):
+    if joint and side in SIDES:
         return getattr(load_joint(joint, valve=valve), side)
     return load_rig(source, valve=valve)
 

@@ -22,6 +22,7 @@ from pam_sim.parameters import Parameter
 from pam_sim.units import GRAVITY_M_PER_S2
 
 NAME = 'antagonistic_joint'
+SIDES = ('flexor', 'extensor')
 SENTENCE = 'Two muscles pull on a pulley each, against each other, and turn a limb with gravity.'
 EQUATION = ('J d2theta/dt2 = r_f T_f - r_e T_e - m g l sin(theta - theta_h) - d dtheta/dt - T_dry '
             '+ T_ext, x_f = x_f0 + r_f theta, x_e = x_e0 - r_e theta')

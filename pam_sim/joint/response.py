@@ -15,6 +15,7 @@
 """What a simulation of a joint returns."""
 
 from pam_sim.joint import layout
+from pam_sim.joint.parameters import SIDES
 from pam_sim.response import Response
 
 
@@ -53,7 +54,7 @@ class JointResponse:
         """Return name -> ndarray; names of a muscle begin with ``flexor/`` or ``extensor/``."""
         signals = {name: getattr(self, name) for name in (
             'time_s', 'angle_rad', 'velocity_rad_per_s', 'acceleration_rad_per_s2', 'torque_n_m')}
-        for side in ('flexor', 'extensor'):
+        for side in SIDES:
             signals.update({f'{side}/{name}': values
                             for name, values in getattr(self, side).as_dict().items()})
         return signals

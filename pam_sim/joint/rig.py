@@ -18,10 +18,8 @@ from dataclasses import dataclass, field, replace
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
-from pam_sim.joint.parameters import NAME, PARAMETERS
+from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.parameters import check_parameters
-
-SIDES = ('flexor', 'extensor')
 
 
 @dataclass(frozen=True)

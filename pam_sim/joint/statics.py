@@ -44,6 +44,15 @@ def _static_force(rig, pressure, contraction):
     return max(state[layout.S_MUSCLE_FORCE], 0.0)
 
 
+def largest_torque_n_m(joint, pressure_pa):
+    """Return the largest torque [N m] of either muscle alone, over the range, at a pressure."""
+    arms = (joint.parameters['flexor_radius_m'], joint.parameters['extensor_radius_m'])
+    return max(
+        arm * _static_force(rig, pressure_pa, contraction)
+        for angle in joint.range_rad for rig, contraction, arm in zip(
+            (joint.flexor, joint.extensor), joint.contractions_m(angle), arms))
+
+
 def static_angle(joint, pressures_pa, external_n_m=0.0, near_rad=None):
     """Return the angle [rad] of rest; see ``JointRig.static_angle_rad``."""
     lower, upper = joint.range_rad

@@ -25,11 +25,12 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.joint_plant_loop import JointPlantLoop, SIDES
+from pam_actuation.joint_plant_loop import JointPlantLoop
 from pam_actuation.messages import AngleReference, JointAngle, Pressure
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
 

@@ -20,12 +20,14 @@ from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
 from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Rival, without_limits
 from pam_sim.gap.compare import preference, share
 from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Hypothesis, Problem
+from pam_sim.gap.fit import Found, Hypothesis, Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.look_alikes import look_alikes
 from pam_sim.gap.parts import SELECT
+from pam_sim.gap.search import CERTAIN_SIZE
 import pytest
 
 
@@ -88,6 +90,28 @@ def test_a_formulation_never_fits_worse_than_the_one_it_contains():
     assert share(cut, base, one.errors['muscle']) > 0.95
     assert preference(cut, base, one.errors['muscle'], base, SELECT) > 3.0
     assert preference(cut, base, base, one.errors['muscle'], SELECT) < -3.0
+    # The size of what is there is certain, that of what is not may be none.
+    assert problem.certainty(two, 0) > CERTAIN_SIZE > problem.certainty(two, 1)
+
+
+@pytest.mark.parametrize('name, kept', [
+    ('coulomb_friction', False), ('pressure_friction', False), ('end_taper', True)])
+def test_a_loop_that_has_lost_its_width_is_the_simpler_friction(name, kept):
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
+
+    def rival(effect, theta, share_of_gap):
+        found = Found(Hypothesis((by_name[effect],)), np.array(theta), {}, {}, {})
+        return Rival(by_name[effect].name, found, {'muscle': share_of_gap})
+
+    stiffness = by_name['hysteresis_lugre'].free[2]
+    narrow = rival('hysteresis_lugre', [1.0, 0.0, stiffness.coordinate(stiffness.upper)], 0.99)
+    wide = rival('hysteresis_lugre', [1.0, 0.0, 0.0], 0.99)
+    near = rival(name, [1.0], 0.95)
+    bare = Found(Hypothesis(), np.zeros(0), {}, {}, {})
+    assert narrow.at_edge and not wide.at_edge and not near.at_edge
+    assert without_limits([near, narrow], bare, 'muscle') == ([narrow] if kept else []) + [near]
+    assert without_limits([near, wide], bare, 'muscle') == [wide, near]
+    assert without_limits([narrow], near.found, 'muscle') == ([narrow] if kept else [])
 
 
 def test_an_effect_knows_its_look_alikes_and_its_least_size():

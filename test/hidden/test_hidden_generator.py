@@ -30,6 +30,7 @@ import truth_commands
 import truth_effects
 import truth_gap
 import truth_key
+import truth_live
 import truth_rig as rig
 import truth_run
 import truth_sensors
@@ -108,6 +109,22 @@ def test_half_the_step_changes_little(monkeypatch):
     fine, _ = rig.simulate.py_func(numbers, rig.PPR, times, volts, none, 400e3, 0.5, False)
     change = np.abs(fine[::2][:len(rows)] - rows)
     assert change[:, rig.O_X].max() < 2e-6 and change[:, rig.O_P].max() < 20.0
+
+
+def test_the_live_rig_is_the_recorded_one():
+    numbers = {'dry': 2.0, 'loop': 1.0, 'delay': 0.004, 'play': 2e3}
+    live, found = truth_live.LiveRig(numbers), []
+    for k in range(600):
+        live.step((4.0 if k < 300 else 5.0,))
+        found.append((live.pressure_pa, live.contraction_m, live.force_n))
+    rows, _ = rig.simulate(rig.numbers(**numbers), rig.PPR, np.array([0.0, 0.3]),
+                           np.array([4.0, 5.0]), np.zeros(2), 0.0, 0.6, False)
+    found = np.array(found)
+    assert found[:, 1] == pytest.approx(rows[5:3001:5, rig.O_X], abs=1e-9)
+    # Pressure and force are those of the last step, 0.1 ms before the full millisecond.
+    before = 0.5 * (rows[4:3000:5] + rows[5:3001:5])
+    assert found[5:, 0] == pytest.approx(before[5:, rig.O_P], abs=1.0)
+    assert np.sqrt(np.mean((found[5:, 2] - before[5:, rig.O_F]) ** 2)) < 0.05
 
 
 def test_air_is_conserved_with_both_valves_shut():

@@ -55,7 +55,6 @@ NUMBERS = {
     'stop_stiffness': 0.0, 'stop_at': 0.0, 'resonance_hz': 0.0, 'resonance_damping': 0.3,
     'wander': 0.0, 'wander_hz': 1.3,
 }
-INDEX = {name: i for i, name in enumerate(NUMBERS)}
 (MASS, DAMPING, GAIN_MAP, K_M, T_M, C, V_DEAD, SUPPLY, DELAY, LAG_1, LAG_2, PLAY, DEAD_BAND,
  OPEN_DEAD, OPEN_RAMP, CLOSE_DEAD, CLOSE_RAMP, CAP_FILL, CAP_VENT, VENT_RATIO, LEAK_NOZZLE,
  LEAK_SLIT, RESERVOIR, BAND, REFILL, SECOND_VOLUME, HEAT_TIME, DRY, DRY_400, STRIBECK, LOOP,
@@ -371,6 +370,43 @@ def driver(p, wanted, x, n):
 
 
 @jit
+def acting(raw_a, raw_b, t, plays, valve, n):
+    """Return what acts behind play or lift: regulator aim [Pa gauge] and 0, or two openings."""
+    if valve != PPR:
+        return opening(raw_a, n), opening(raw_b, n)
+    aim = n[K_M] * (1.0 + n[GAIN_DRIFT] * t / 60.0) * min(max(raw_a, 0.0), 6.0)
+    if n[PLAY] > 0.0:
+        for j in range(3):
+            half = n[PLAY] * (0.6 + 0.4 * j)
+            plays[j] = min(max(plays[j], aim - half), aim + half)
+        aim = 0.25 * plays[0] + 0.5 * plays[1] + 0.25 * plays[2]
+    return aim, 0.0
+
+
+@jit
+def advance(y, middle, d, in_a, in_b, t, anchors, running, valve, n, step_s):
+    """Take one step from rates that are in ``d``; return whether the compressor runs."""
+    for j in range(SIZE):
+        middle[j] = y[j] + 0.5 * step_s * d[j]
+    rates(middle, in_a, in_b, t + 0.5 * step_s, anchors, valve, n, d)
+    for j in range(SIZE):
+        y[j] += step_s * d[j]
+    if y[Y_X] < 0.0 or y[Y_X] > TOP:
+        y[Y_X] = min(max(y[Y_X], 0.0), TOP)
+        y[Y_V] = 0.0
+    for j in range(6):
+        anchors[j] = min(max(anchors[j], y[Y_X] - SLIP_M[j]), y[Y_X] + SLIP_M[j])
+    if n[RESERVOIR] > 0.0:
+        level = y[Y_STORE] * RT / n[RESERVOIR]
+        if level <= n[SUPPLY] - n[BAND]:
+            running = 1.0
+        elif level >= n[SUPPLY]:
+            running = 0.0
+        y[Y_SPIN] += (running - y[Y_SPIN]) * step_s / 0.3
+    return running
+
+
+@jit
 def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
     """
     Return (rows, duties): the rig's answer to held inputs.
@@ -440,16 +476,7 @@ def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
             while pointer + 1 < times.size and times[pointer + 1] + n[DELAY] <= t + 1e-9:
                 pointer += 1
                 raw_a, raw_b = first[pointer], second[pointer]
-        if valve == PPR:
-            in_a = n[K_M] * (1.0 + n[GAIN_DRIFT] * t / 60.0) * min(max(raw_a, 0.0), 6.0)
-            in_b = 0.0
-            if n[PLAY] > 0.0:
-                for j in range(3):
-                    half = n[PLAY] * (0.6 + 0.4 * j)
-                    plays[j] = min(max(plays[j], in_a - half), in_a + half)
-                in_a = 0.25 * plays[0] + 0.5 * plays[1] + 0.25 * plays[2]
-        else:
-            in_a, in_b = opening(raw_a, n), opening(raw_b, n)
+        in_a, in_b = acting(raw_a, raw_b, t, plays, valve, n)
         pull, push, p = rates(y, in_a, in_b, t, anchors, valve, n, d)
         if k % EVERY == 0:
             row = rows[k // EVERY]
@@ -457,23 +484,7 @@ def simulate(n, valve, times, first, second, start_gauge, end_s, closed):
             row[O_F] = n[MASS] * (d[Y_V] + GRAVITY) + push
             row[O_SUPPLY] = n[SUPPLY] if n[RESERVOIR] == 0.0 else y[Y_STORE] * RT / n[RESERVOIR]
             row[O_MASS] = p * (volume(y[Y_X]) + n[V_DEAD]) / RT if valve == PPR else y[Y_AIR]
-        for j in range(SIZE):
-            middle[j] = y[j] + 0.5 * STEP_S * d[j]
-        rates(middle, in_a, in_b, t + 0.5 * STEP_S, anchors, valve, n, d)
-        for j in range(SIZE):
-            y[j] += STEP_S * d[j]
-        if y[Y_X] < 0.0 or y[Y_X] > TOP:
-            y[Y_X] = min(max(y[Y_X], 0.0), TOP)
-            y[Y_V] = 0.0
-        for j in range(6):
-            anchors[j] = min(max(anchors[j], y[Y_X] - SLIP_M[j]), y[Y_X] + SLIP_M[j])
-        if n[RESERVOIR] > 0.0:
-            level = y[Y_STORE] * RT / n[RESERVOIR]
-            if level <= n[SUPPLY] - n[BAND]:
-                running = 1.0
-            elif level >= n[SUPPLY]:
-                running = 0.0
-            y[Y_SPIN] += (running - y[Y_SPIN]) * STEP_S / 0.3
+        running = advance(y, middle, d, in_a, in_b, t, anchors, running, valve, n, STEP_S)
     return rows, duties[:sent]
 
 

@@ -41,7 +41,8 @@ class LiveRig:
         self._log_dir = log_dir
         self._namespace = namespace
         self._lock = DomainLock()
-        self.environment = node_environment(self._lock.domain_id, log_dir)
+        self.domain_id = self._lock.domain_id
+        self.environment = node_environment(self.domain_id, log_dir)
         self.processes = {}
         self.heard = {topic: [] for topic in MESSAGE_TYPES}
         self.health = collections.defaultdict(list)
@@ -63,7 +64,7 @@ class LiveRig:
     def listen(self):
         """Join the graph; processes are started before (forking with threads is unsafe)."""
         self._context = rclpy.Context()
-        rclpy.init(context=self._context, domain_id=self._lock.domain_id, args=[])
+        rclpy.init(context=self._context, domain_id=self.domain_id, args=[])
         self.node = Node('listener', namespace=self._namespace, context=self._context)
         for topic, message_type in MESSAGE_TYPES.items():
             self.node.create_subscription(

@@ -44,8 +44,6 @@ SAMPLES = {
 JOINT_SAMPLES = {
     'joint_state': messages.JointAngle(STAMP_NS, 0.25, -1.5),
     'joint_reference': messages.AngleReference(STAMP_NS, 0.25, -0.1),
-    'joint_trajectory': messages.AngleTrajectory(
-        STAMP_NS, (0, 20_000_000), (0.2, 0.3), (0.0, 5.0)),
     'co_contraction': messages.Pressure(STAMP_NS, 401_325.0),
 }
 
@@ -54,6 +52,13 @@ JOINT_SAMPLES = {
 def test_there_and_back_for_a_joint(topic):
     full = f'/left_knee/{topic}'
     assert from_ros(full, RosWriter(full).fill(JOINT_SAMPLES[topic])) == JOINT_SAMPLES[topic]
+
+
+def test_a_trajectory_arrives_with_names_and_points():
+    sent = messages.AngleTrajectory(STAMP_NS, (0, 20_000_000), (0.2, 0.3), (0.0, 5.0))
+    message = RosWriter('joint_trajectory', 'knee').fill(sent)
+    assert from_ros('/left/joint_trajectory', message) == messages.NamedTrajectory(
+        STAMP_NS, ('knee',), ((0, (0.2,), (0.0,)), (20_000_000, (0.3,), (5.0,))))
 
 
 def test_a_torque_not_known_is_empty_on_the_wire():

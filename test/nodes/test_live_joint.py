@@ -12,18 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A joint on real nodes: two drivers, one controller, one simulated limb."""
+"""A joint on real nodes, brought up by the supervisor: two muscles, a limb, a gait stack."""
 
 import math
+from pathlib import Path
 import signal
+import subprocess
+import sys
 import time
 
 from live_rig import LiveRig, wait_for
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import from_ros, RosWriter, type_of
+from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
+from pam_actuation.rigging.supervisor import Supervisor
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
+from std_msgs.msg import String
 
 pytestmark = pytest.mark.ros
 
@@ -35,7 +42,7 @@ segments:
   - ramp: {to_rad: 0.3, duration_s: 1.5}
   - hold: {duration_s: 60.0}
 """
-SIDES = ('flexor', 'extensor')
+EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'gait_stack.py'
 TOPICS = ('joint_state', 'joint_reference', *(
     f'{side}/{topic}' for side in SIDES
     for topic in ('pressure', 'pressure_command', 'valve_signal')))
@@ -47,12 +54,10 @@ def knee(tmp_path):
     file = tmp_path / 'experiment.yaml'
     file.write_text(EXPERIMENT)
     rig = LiveRig(tmp_path, namespace='/knee')
+    nodes = nodes_of_a_knee(experiment=str(file), seed=5)
     try:
-        for side in SIDES:
-            rig.start('valve_driver', below=side, rig='dmsp_5_300_realistic')
-        rig.start('joint_simulator', seed=5)
-        rig.start('joint_controller')
-        rig.start('reference_generator', experiment=str(file), await_receiver=True)
+        rig.supervisor = Supervisor(nodes, rig.domain_id, realtime_priority=1)
+        rig.supervisor.start()
         rig.listen()
         rig.heard.update({topic: [] for topic in TOPICS})
         for topic in TOPICS:
@@ -60,7 +65,11 @@ def knee(tmp_path):
                 type_of(topic), topic,
                 lambda message, topic=topic: rig.heard[topic].append(from_ros(topic, message)),
                 qos.reliable(1000))
-        yield rig
+        rig.descriptions = []
+        rig.node.create_subscription(
+            String, 'robot_description', rig.descriptions.append, qos.LATCHED)
+        with rig.supervisor:
+            yield rig
     finally:
         rig.close()
 
@@ -84,6 +93,17 @@ def holds(rig, angle_rad):
     return len(recent) == 100 and all(abs(m.angle_rad - angle_rad) < 0.03 for m in recent)
 
 
+def walk(rig):
+    """Let the gait stack walk one short stride; return the angles meanwhile."""
+    begin = len(rig.heard['joint_state'])
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE), '--ros-args', '-p', 'knees:=[/knee]', '-p', 'strides:=1',
+         '-p', 'stride_s:=1.5', '-p', 'place_s:=0.5'],
+        env=rig.environment, capture_output=True, text=True, timeout=120.0)
+    assert done.returncode == 0 and 'knee: error' in done.stderr, done.stderr
+    return [message.angle_rad for message in rig.heard['joint_state'][begin:]]
+
+
 def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(knee):
     wait_for(lambda: holds(knee, 0.3), 150.0, 'the angle of the experiment')
     assert math.isclose(newest(knee, 'joint_reference').angle_rad, 0.3)
@@ -100,7 +120,20 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
     wait_for(stiff, 30.0, 'the wanted co-contraction')
     wait_for(lambda: holds(knee, 0.3), 30.0, 'the angle after the change of stiffness')
 
-    knee.processes['joint_controller'].send_signal(signal.SIGKILL)
+    wait_for(lambda: knee.descriptions, 10.0, 'the robot description')
+    assert '<joint name="knee" type="revolute">' in knee.descriptions[0].data
+
+    # A larger stack takes over: a movement sent once, then a trajectory ahead of the stride.
+    processes = knee.supervisor.processes
+    processes['/knee/reference_generator'].send_signal(signal.SIGTERM)
+    assert processes['/knee/reference_generator'].wait(10.0)
+    angles = walk(knee)
+    assert max(angles) > 0.2 and min(angles) < 0.0
+
+    processes['/knee/joint_controller'].send_signal(signal.SIGKILL)
     wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')
     wait_for(lambda: max(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES)
              < P_ATM_PA + 20e3, 30.0, 'the air of both muscles to leave')
+    problems = knee.supervisor.finish()
+    assert problems == ['/knee/joint_controller: joint_controller was ended by SIGKILL']
+    assert {process.exit_code for process in processes.values()} == {0, -signal.SIGKILL}

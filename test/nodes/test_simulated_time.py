@@ -27,10 +27,10 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
 from lifecycle_msgs.srv import ChangeState                                  # noqa: E402
 from live_rig import LiveRig, wait_for                                      # noqa: E402
+from pam_actuation.messages import START_NS                                 # noqa: E402
 from pam_actuation.nodes.lockstep import EachTick, OneTickOld               # noqa: E402
 from pam_actuation.nodes.lockstep import participants_of, Stamped           # noqa: E402
 from pam_actuation.nodes.lockstep import TickInputs                         # noqa: E402
-from pam_actuation.nodes.simulated_time import START_NS                     # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 from sensor_msgs.msg import FluidPressure                                   # noqa: E402
 from std_srvs.srv import SetBool, Trigger                                   # noqa: E402

@@ -27,6 +27,7 @@ TABLE = """
 valve transport valve_dead_time delay_s
 valve transport tube_lag time_constant_s
 valve valve_nonlinearity valve_dead_zone half_width_pa open_time_s close_time_s
+valve valve_nonlinearity valve_dead_zone_gradual half_width_pa open_time_s close_time_s
 valve valve_nonlinearity valve_hysteresis half_width_pa
 valve valve_nonlinearity flow_limit fill_rate_at_400kpa_pa_per_s vent_rate_at_400kpa_pa_per_s
 valve valve_nonlinearity vent_asymmetry vent_to_fill_time_ratio

@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.errors import InputError
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from profiles import duties
@@ -63,6 +64,31 @@ def test_tube_lag_of_the_switching_valves_delays_the_air_and_loses_none(fidelity
     assert late.filled_kg[-1] == pytest.approx(prompt.filled_kg[-1], rel=1e-6)
     gained = late.air_mass_kg - late.air_mass_kg[0]
     assert np.max(np.abs(gained - late.filled_kg + late.vented_kg)) < 1e-14
+
+
+@pytest.mark.parametrize('duty', [0.05, 0.12, 0.15, 0.2, 0.5, 0.95])
+@pytest.mark.parametrize('ramp_s', [0.2e-3, 1.4e-3])
+def test_gradual_dead_zone_of_a_switching_valve_is_the_area_under_its_lift(duty, ramp_s):
+    period_s, open_s, close_s = 0.010, 1.5e-3, 0.8e-3
+    t = (np.arange(40000) + 0.5) * 0.5e-6
+    pulse_s = duty * period_s
+    lift = np.clip((np.minimum(t, pulse_s) - open_s) / ramp_s + 0.5, 0.0, 1.0)
+    shut = np.maximum(t - pulse_s - close_s + 0.5 * ramp_s, 0.0) / ramp_s
+    expected = min(np.sum(np.maximum(lift - shut, 0.0)) * 0.5e-6 / period_s, 1.0)
+    found = mean_opening_with_lift(duty, period_s, open_s, close_s, ramp_s)
+    # A valve that is not shut when the next pulse comes stays open.
+    assert found == pytest.approx(1.0 if duty == 0.95 else expected, abs=1e-4)
+
+
+def test_gradual_dead_zone_of_the_regulator_is_slow_near_the_set_point():
+    width_pa, start = 4e3, P_ATM_PA + 300e3
+    rig = held('ppr', ('valve_dead_zone_gradual', {'half_width_pa': width_pa}))
+    for distance_pa in (1e3, 4e3, 40e3):
+        response = rig.simulate(np.full(2, 3.0 + 1e-5 * distance_pa), initial_signal=3.0,
+                                initial_pressure_pa=start)
+        left = distance_pa - width_pa * distance_pa / np.hypot(width_pa, distance_pa)
+        rate = (response.pressure_pa[1] - start) / 1e-3
+        assert rate == pytest.approx(left / 0.060, rel=0.03)
 
 
 def test_valve_hysteresis_ends_apart_by_its_width():

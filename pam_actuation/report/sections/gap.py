@@ -18,6 +18,7 @@ import numpy as np
 
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, table
+from pam_actuation.report.sections.gap_witness import coloured_part, witness_part
 from pam_actuation.report.sections.replay import SHOWN
 
 VERDICT_TEXT = {
@@ -52,11 +53,11 @@ def gap_section(result, key='gap', title='Recording against model', remark='',
             'data that neither the fit nor the choice used. The noise floor is what sensor noise '
             'and stamps explain. Gap closed: of what calibrating the numbers left.', 'note')
     body += _effects(result) + _evidence(result) + _next(result)
-    body += _where(result) + _calibration(result)
+    body += _where(result) + witness_part(result) + _calibration(result)
     for note in result.remarks:
         body += paragraph(note, 'note')
     if result.traces:
-        body += plot(_overlay(result, max_points))
+        body += plot(_overlay(result, max_points)) + coloured_part(result)
     return Section(key, title, body)
 
 

@@ -1,0 +1,311 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The rig of the fault table: real nodes as processes, a relay that spoils sensors, a witness.
+
+Run as a program it is the relay: sensors of the plant come in on ``true/...``, go out on the
+topics of the rig, and are spoiled on the way as the lines on its standard input ask for.
+"""
+
+import collections
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from pam_actuation.messages import Pressure, SAFE_EFFORTS
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import from_ros, RosWriter, stamp_ns, type_of
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.rigging.client import RigClient
+from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_sim.units import P_ATM_PA
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+
+NAMESPACE = '/muscle'
+RIG = 'dmsp_5_300_realistic'
+EXPERIMENT = """
+name: swing
+domain: contraction
+segments:
+  - ramp: {to_m: 0.004, duration_s: 1.0}
+  - sine: {center_m: 0.014, amplitude_m: 0.010, frequency_hz: 0.5, cycles: 1000}
+"""
+RELAYED = ('pressure', 'supply_pressure', 'contraction')
+HEARD = ('valve_signal', 'pressure_command', 'true/pressure')
+# What each node says when all is well.
+SOUND = {
+    'experiment_recorder': 'recording', 'plant_simulator': 'active',
+    'valve_driver': 'following the pressure command', 'valve_watchdog': 'hears the driver',
+    'sofc_controller': 'following the reference', 'reference_generator': 'playing swing'}
+START_S = 90.0
+FLOOD_PER_ROUND = 4         # messages, about every 2 ms
+DELAY_S = 0.4
+FAR_S = 1.0
+NEAR_SUPPLY_PA = P_ATM_PA + 30_000.0
+ABSURD = {'pressure': 3.0e6, 'supply_pressure': 3.0e7, 'contraction': 1.0}
+
+Status = collections.namedtuple('Status', 'stamp_ns level message values')
+
+
+class FaultRig:
+    """
+    Six nodes and the relay in a domain of their own.
+
+    Parameters
+    ----------
+    valve : {'ppr', 'hsv'}
+    folder : Path
+        For bags and logs.
+
+    """
+
+    def __init__(self, valve, folder):
+        self.valve = valve
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = DomainLock()
+        self._environment = node_environment(self._lock.domain_id, folder)
+        experiment = folder / 'swing.yaml'
+        experiment.write_text(EXPERIMENT)
+        kind = {'valve_type': valve}
+        self._parameters = {
+            'experiment_recorder': kind, 'plant_simulator': {**kind, 'rig': RIG},
+            'valve_driver': {**kind, 'rig': RIG}, 'valve_watchdog': kind,
+            'sofc_controller': {**kind, 'rig': RIG},
+            'reference_generator': {**kind, 'experiment': str(experiment)}}
+        self.processes = {}
+        self.bag = None
+        self._bags = 0
+        self._relay = subprocess.Popen(
+            [sys.executable, __file__], env=self._environment, stdin=subprocess.PIPE, text=True,
+            start_new_session=True)
+        for name in self._parameters:
+            self.start(name)
+        self.witness = Witness(self._lock.domain_id, valve)
+
+    def start(self, name):
+        """Start a node, the recorder with a new bag."""
+        parameters = {'realtime_priority': 1, **self._parameters[name]}
+        if name == 'experiment_recorder':
+            self.bag = self.folder / f'bag_{self._bags}'
+            self._bags += 1
+            parameters['output'] = str(self.bag)
+        remap = {topic: f'true/{topic}' for topic in RELAYED} if name == 'plant_simulator' else {}
+        self.processes[name] = NodeProcess(
+            name, NAMESPACE, parameters, self._environment, self.folder, remap)
+
+    def spoil(self, topic, how):
+        """Have the relay spoil a sensor, or stop it with ``none``."""
+        self._relay.stdin.write(f'{topic} {how}\n')
+        self._relay.stdin.flush()
+
+    def signal(self, name, number):
+        """Send a signal to a node."""
+        self.processes[name].send_signal(number)
+
+    def wait_until_sound(self, timeout_s):
+        """Wait until every node says that all is well and the bag grows; return whether."""
+        begin_ns = time.time_ns()
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline and all(
+                process.running for process in self.processes.values()):
+            self.witness.listen(0.05)
+            if self._sound(begin_ns):
+                return True
+        return False
+
+    def _sound(self, since_ns):
+        for name, words in SOUND.items():
+            said = self.witness.last.get(name)
+            if said is None or said.stamp_ns < since_ns or not said.message.startswith(words):
+                return False
+        counts = self.witness.last['experiment_recorder'].values
+        return int(counts.get(f'recorded.{NAMESPACE}/valve_signal', 0)) > 0
+
+    def close(self):
+        """End everything, the driver first, so that it vents; the recorder closes its bag."""
+        for process in self.processes.values():
+            process.send_signal(signal.SIGCONT)
+        for name in ('valve_driver', 'experiment_recorder'):
+            end_all([self.processes[name]], 30.0)
+        end_all(self.processes.values())
+        self._relay.terminate()
+        self._relay.wait(10.0)
+        self.witness.close()
+        self._lock.release()
+
+
+class Witness:
+    """
+    A node that hears what is judged.
+
+    Attributes
+    ----------
+    last : dict
+        Node to its newest ``Status``.
+    said : list of (str, Status)
+        Every change of a status since ``forget``.
+    heard : dict
+        Topic to plain messages since ``forget``.
+
+    """
+
+    def __init__(self, domain_id, valve):
+        self._safe = SAFE_EFFORTS[valve]
+        self._client = RigClient(domain_id)
+        node = self._client.node
+        self._sources = {
+            topic: PolledSubscription(node, type_of(topic), f'{NAMESPACE}/{topic}', qos.RECORDER)
+            for topic in HEARD}
+        self._health = PolledSubscription(node, DiagnosticArray, '/diagnostics', qos.RECORDER)
+        self.last = {}
+        self.forget()
+
+    def forget(self):
+        """Begin anew with what is heard and said."""
+        self.heard = {topic: [] for topic in HEARD}
+        self.said = []
+
+    def listen(self, duration_s):
+        """Take what arrives for a while."""
+        deadline = time.monotonic() + duration_s
+        while True:
+            for topic, source in self._sources.items():
+                self.heard[topic] += [from_ros(topic, message) for message, _ in source.take()]
+            for message, _ in self._health.take():
+                self._note(message)
+            left_s = deadline - time.monotonic()
+            if left_s <= 0.0:
+                return
+            time.sleep(min(left_s, 0.02))
+
+    def _note(self, message):
+        for status in message.status:
+            name = status.name.rsplit('/', 1)[-1]
+            now = Status(stamp_ns(message), status.level[0], status.message,
+                         {item.key: item.value for item in status.values})
+            before = self.last.get(name)
+            self.last[name] = now
+            if before is None or before[1:3] != now[1:3]:
+                self.said.append((name, now))
+
+    def first_said(self, name, words, since_ns):
+        """Return the first status of a node since a time that has some words, or None."""
+        return next((status for who, status in self.said if who == name
+                     and status.stamp_ns >= since_ns and re.search(words, status.message)), None)
+
+    def safe_since(self, since_ns):
+        """Return the stamp of the first of three safe valve signals in a row, None if none."""
+        after = sorted((one for one in self.heard['valve_signal'] if one.stamp_ns >= since_ns),
+                       key=lambda one: one.stamp_ns)
+        safe = [one.efforts == self._safe for one in after]
+        return next((after[k].stamp_ns for k in range(len(safe) - 2) if all(safe[k:k + 3])), None)
+
+    def atmosphere_since(self, since_ns):
+        """Return the stamp of the first command of atmospheric pressure, None if none."""
+        return next((one.stamp_ns for one in self.heard['pressure_command']
+                     if one.stamp_ns >= since_ns and one.pressure_pa == P_ATM_PA), None)
+
+    def highest_gauge_pa(self):
+        """Return the highest gauge pressure [Pa] the plant's own sensor read since ``forget``."""
+        return max((one.pressure_pa for one in self.heard['true/pressure']),
+                   default=math.nan) - P_ATM_PA
+
+    def close(self):
+        """Leave the graph."""
+        self._client.close()
+
+
+def spoiled(topic, how, plain, memory):
+    """
+    Return the messages to send in place of a sound one.
+
+    ``memory`` is a dict that lives as long as the topic is spoiled this way.
+    """
+    field = 'contraction_m' if topic == 'contraction' else 'pressure_pa'
+
+    def altered(value=None, later_s=0.0):
+        if value is None:
+            value = getattr(plain, field)
+        return type(plain)(plain.stamp_ns + round(later_s * 1e9), value)
+
+    if how == 'nan':
+        return [altered(math.nan)]
+    if how == 'absurd':
+        return [altered(ABSURD[topic])]
+    if how == 'low':
+        return [altered(NEAR_SUPPLY_PA)]
+    if how == 'frozen':
+        return [altered(memory.setdefault('value', getattr(plain, field)))]
+    if how == 'ahead':
+        return [altered(later_s=FAR_S)]
+    if how == 'travelling':
+        memory['sign'] = -memory.get('sign', 1.0)
+        return [altered(later_s=memory['sign'] * FAR_S)]
+    if how == 'delayed':
+        queue = memory.setdefault('queue', collections.deque())
+        queue.append(plain)
+        ripe_ns = plain.stamp_ns - DELAY_S * 1e9
+        return [queue.popleft() for _ in range(len(queue)) if queue[0].stamp_ns <= ripe_ns]
+    return [plain]
+
+
+def relay():
+    """Pass sensors on until stopped; spoil them as asked."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node('sensor_relay', namespace=NAMESPACE)
+    sources = {topic: PolledSubscription(node, type_of(topic), f'true/{topic}')
+               for topic in RELAYED}
+    sinks = {topic: (node.create_publisher(type_of(topic), topic, qos.PUBLISHER),
+                     RosWriter(topic)) for topic in RELAYED}
+    modes = {topic: ('none', {}) for topic in (*RELAYED, 'pressure_command')}
+    threading.Thread(target=_read_modes, args=(modes,), daemon=True).start()
+    flood = None
+    while True:
+        sources['contraction'].wait(0.002)
+        for topic, source in sources.items():
+            publisher, writer = sinks[topic]
+            how, memory = modes[topic]
+            for message, _ in source.take():
+                for plain in spoiled(topic, how, from_ros(topic, message), memory):
+                    publisher.publish(writer.fill(plain))
+        if modes['pressure_command'][0] == 'flood':
+            flood = flood or (node.create_publisher(
+                type_of('pressure_command'), 'pressure_command', qos.PUBLISHER),
+                RosWriter('pressure_command'))
+            for k in range(FLOOD_PER_ROUND):
+                flood[0].publish(flood[1].fill(Pressure(time.time_ns(), P_ATM_PA + 1e5 * k)))
+        elif flood is not None:
+            node.destroy_publisher(flood[0])
+            flood = None
+
+
+def _read_modes(modes):
+    for line in sys.stdin:
+        topic, how = line.split()
+        modes[topic] = (how, {})
+    os._exit(0)             # whoever asks is gone
+
+
+if __name__ == '__main__':
+    relay()

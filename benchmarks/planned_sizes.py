@@ -1,0 +1,72 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Do the sizes of `pam gap --plan` hold? Effects at and below them, simulated and looked for.
+
+    python benchmarks/planned_sizes.py                       # every effect, Markdown table
+    python benchmarks/planned_sizes.py --effects coulomb_friction,leakage --times 0.5,1.5
+
+Each effect is put into the rig at multiples of the size from which on the plan says it can be
+named, the protocol is simulated with the noise of the sensors, and the gap workflow looks at the
+record with the nominal model, every fifth block kept for the proof.
+"""
+
+import argparse
+
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.protocols import sensitivities
+from pam_actuation.experiments.separating import sensors_for, simulated
+from pam_sim import load_rig
+from pam_sim.gap import find_gap
+from pam_sim.gap.plan import outlooks, sized
+
+MODEL, PROTOCOL = 'dmsp_5_300_hanging_mass', 'pressure_identification'
+
+
+def at_size(looks, outlook, times):
+    """Return the effect as an entry of a model file, at a multiple of its nameable size."""
+    return looks.probes[outlook.name].setting(
+        sized(looks.probes[outlook.name], times * outlook.factors[1]))
+
+
+def main():
+    """Print one line per effect."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--effects', default=None)
+    parser.add_argument('--times', default='0.5,1.5')
+    parser.add_argument('--valve', default='ppr')
+    parser.add_argument('--seconds', type=float, default=600.0, help='budget of each look')
+    args = parser.parse_args()
+    rig = load_rig(MODEL, valve=args.valve)
+    noisy = sensors_for(rig)[1]
+    plain = load_experiment(PROTOCOL).to_dict()
+    looks = sensitivities(plain, noisy)
+    times = [float(t) for t in args.times.split(',')]
+    print('| effect | ' + ' | '.join(f'{t:g} times the size' for t in times) + ' |')
+    print('|---' * (len(times) + 1) + '|')
+    for outlook in outlooks(looks):
+        if outlook.named is None or args.effects and outlook.name not in args.effects.split(','):
+            continue
+        cells = []
+        for t in times:
+            truth = noisy.with_(effects=[at_size(looks, outlook, t)])
+            result = find_gap(simulated(plain, truth), rig, seconds=args.seconds)
+            said = result.ambiguity_set or [p.name for p in result.parameters]
+            cells.append(' '.join([result.verdict, *said]))
+        print(f'| {outlook.name} | ' + ' | '.join(cells) + ' |', flush=True)
+
+
+if __name__ == '__main__':
+    main()

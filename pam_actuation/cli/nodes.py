@@ -1,0 +1,53 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam nodes``: parameters, topics and services of every node, from the nodes themselves."""
+
+from pathlib import Path
+
+from pam_actuation.cli.common import emit, EXIT_DONE
+
+HELP = 'List the nodes with parameters, topics and services; write their pages.'
+EXAMPLE = 'pam nodes valve_driver'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('name', nargs='?', default=None, help='show the page of this node')
+    parser.add_argument('--markdown', metavar='DIR', default=None,
+                        help='write a Markdown page per node into this folder')
+
+
+def run(args):
+    """Print the names, or one page; write the pages asked for."""
+    from pam_sim.errors import InputError
+    try:
+        from pam_actuation.nodes.pages import pages
+    except ImportError as error:
+        raise InputError(f'the nodes need ROS 2 ({error.name} is missing)') from None
+    texts = {Path(file).stem: text for file, text in pages().items()}
+    if args.name is not None and args.name not in texts:
+        raise InputError(f'no node {args.name!r}, known are {", ".join(texts)}', 'name')
+    if args.markdown is not None:
+        from pam_actuation.report.page import write_text
+        Path(args.markdown).mkdir(parents=True, exist_ok=True)
+        written = [str(write_text(Path(args.markdown) / f'{name}.md', text))
+                   for name, text in texts.items()]
+        shown = '\n'.join(f'page: {path}' for path in written)
+    else:
+        written = []
+        shown = texts[args.name] if args.name else '\n'.join(
+            f'{name}: {text.splitlines()[2]}' for name, text in texts.items())
+    emit(args, {'schema': 1, 'nodes': texts, 'written': written}, shown)
+    return EXIT_DONE

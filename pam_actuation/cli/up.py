@@ -1,0 +1,99 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
+
+from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_sim.errors import InputError
+
+HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
+EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'
+
+
+def add_arguments(parser):
+    """Declare the options of the verb."""
+    parser.add_argument('what', choices=('rig', 'knee', 'exo'),
+                        help='one muscle, a joint with two, two joints')
+    parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
+    parser.add_argument('--model', default='', metavar='NAME',
+                        help='rig or joint: preset, or path of a model file')
+    parser.add_argument('--controller', default='', metavar='NAME',
+                        help='controller preset or file (default: that of the valve)')
+    parser.add_argument('--experiment', default='', metavar='NAME',
+                        help='what is played (default: references come from elsewhere)')
+    parser.add_argument('--hardware', default='sim', metavar='NAME',
+                        help='rig only: sim, another name in config/hardware, or a file')
+    parser.add_argument('--record', default='', metavar='DIR', help='rig only: folder of a bag')
+    parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
+    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+                        help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
+    parser.add_argument('--realtime-priority', type=int, choices=range(100), default=0,
+                        metavar='N', help='of all nodes, 1 to 99 (default: none)')
+    parser.add_argument('--seconds', type=float, default=None, metavar='S',
+                        help='end after this time (default: on Ctrl-C, or when a node ends)')
+    parser.add_argument('--policy', metavar='FILE', default=None,
+                        help='start nothing; write the access policy of these nodes (SROS2)')
+
+
+def run(args):
+    """Bring up, watch, take down; exit code 1 if a node ended or did not end in order."""
+    from pam_actuation.rigging.supervisor import Supervisor
+    from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
+    nodes = _nodes(args)
+    if args.policy is not None:
+        return _write_policy(args, nodes)
+    failure, problems = '', []
+    with termination_as_interrupt(), Supervisor(
+            nodes, args.domain_id, args.realtime_priority) as supervisor:
+        try:
+            supervisor.start()
+            if not args.json:
+                print(f'{len(supervisor.processes)} nodes are active, Ctrl-C vents and ends:\n  '
+                      + '\n  '.join(supervisor.processes), flush=True)
+            supervisor.watch(args.seconds)
+        except SessionFailed as error:
+            failure = str(error)
+        except KeyboardInterrupt:
+            pass
+        problems = supervisor.finish()
+        codes = {name: process.exit_code for name, process in supervisor.processes.items()}
+    findings = list(dict.fromkeys(filter(None, [failure, *problems])))
+    text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
+    emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
+    return EXIT_FINDING if failure or problems else EXIT_DONE
+
+
+def _write_policy(args, nodes):
+    from pam_actuation.nodes.policy import policy
+    from pam_actuation.report.page import write_text
+    path = str(write_text(args.policy, policy(nodes)))
+    emit(args, {'policy': path, 'nodes': len(nodes)}, f'policy of {len(nodes)} nodes: {path}')
+    return EXIT_DONE
+
+
+def _nodes(args):
+    """Return the nodes that are asked for."""
+    from pam_actuation.rigging import layouts
+    options = {'valve': args.valve, 'controller': args.controller,
+               'experiment': args.experiment}
+    if args.namespace is not None:
+        options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
+    if args.model:
+        options['rig' if args.what == 'rig' else 'joint'] = args.model
+    if args.what == 'rig':
+        return layouts.rig(hardware=args.hardware, record=args.record, **options)
+    for name, given in (('--hardware', args.hardware != 'sim'), ('--record', args.record)):
+        if given:
+            raise InputError(f'is for a rig only, not for {args.what}', name)
+    return getattr(layouts, args.what)(**options)

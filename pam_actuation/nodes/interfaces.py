@@ -1,0 +1,144 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a node offers, found by configuring it: parameters, topics, services.
+
+The pages of the nodes and the access policy are made from this, so that they say what the
+code does. Nothing is activated and nothing sent.
+"""
+
+from dataclasses import dataclass, replace
+import importlib
+import inspect
+
+from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.rigging.client import local_context
+from pam_actuation.rigging.domain import DomainLock
+import rclpy
+from rclpy.parameter import Parameter
+
+NAMESPACE = '/ns'       # any: what lies below it is relative
+KINDS = ('publishes', 'subscribes', 'serves')
+OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout')
+# Node to the sets of parameters that, beside the defaults, bring other topics or services.
+VARIANTS = {
+    'plant_simulator': ({'valve_type': 'hsv'}, {'use_sim_time': True}),
+    'hardware_sensors': (),
+    'valve_driver': ({'accept_valve_command': True},),
+    'valve_watchdog': (),
+    'sofc_controller': (), 'pid_controller': (),
+    'reference_generator': (
+        {'experiment': 'disturbance'}, {'experiment': 'pressure_identification'},
+        {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'}),
+    'experiment_recorder': (),
+    'joint_simulator': ({'valve_type': 'hsv'},),
+    'joint_controller': ()}
+NEEDED = {'hardware_sensors': {'backend': 'dummy'}}
+
+
+@dataclass(frozen=True)
+class NodeInterface:
+    """
+    What one node offers.
+
+    ``publishes``, ``subscribes`` and ``serves`` map a name, relative to the node's namespace or
+    with ``~/`` to the node, to its type. Those of every node are left out.
+    """
+
+    name: str
+    description: str
+    parameters: tuple
+    publishes: dict
+    subscribes: dict
+    serves: dict
+
+
+def node_class(name):
+    """Return the class of a node by the name of its executable."""
+    module = importlib.import_module(f'pam_actuation.nodes.{name}')
+    return next(one for one in vars(module).values()
+                if inspect.isclass(one) and issubclass(one, ManagedNode) and one.NAME == name)
+
+
+class Inspector:
+    """A context manager: nodes are made and configured in a ROS domain of its own."""
+
+    def __enter__(self):
+        """Open the domain."""
+        self._lock = DomainLock()
+        self._context = local_context(self._lock.domain_id)
+        return self
+
+    def __exit__(self, *_):
+        """Leave the domain."""
+        rclpy.try_shutdown(context=self._context)
+        self._lock.release()
+
+    def interface(self, name, parameters=None, namespace=NAMESPACE):
+        """
+        Return the NodeInterface of a node with some parameters.
+
+        Raises
+        ------
+        InputError
+            It could not be configured.
+
+        """
+        kind = node_class(name)
+        node = kind(
+            context=self._context, namespace=namespace, enable_rosout=False,
+            parameter_overrides=[Parameter(key, value=value) for key, value in {
+                **NEEDED.get(name, {}), **(parameters or {})}.items()])
+        try:
+            node.trigger_configure()
+            if node.input_error is not None:
+                raise node.input_error
+            return NodeInterface(
+                name, inspect.getdoc(kind), kind.PARAMETERS,
+                _by_name(namespace, ((one.topic_name, one.msg_type) for one in node.publishers)),
+                _by_name(namespace, (
+                    (one.topic_name, one.msg_type) for one in node.subscriptions)),
+                _by_name(namespace, ((one.srv_name, one.srv_type) for one in node.services
+                                     if one.srv_name.startswith('~/'))))
+        finally:
+            node.destroy_node()
+
+    def whole_interface(self, name):
+        """
+        Return (NodeInterface, notes): everything a node can offer.
+
+        ``notes`` maps the names that come with certain parameters only to these, as
+        ``experiment:=voltage_steps``.
+        """
+        base, notes = self.interface(name), {}
+        whole = {kind: dict(getattr(base, kind)) for kind in KINDS}
+        for parameters in VARIANTS[name]:
+            variant = self.interface(name, parameters)
+            words = ' '.join(f'{key}:={str(value).lower()}' for key, value in parameters.items())
+            for kind, known in whole.items():
+                for key, type_name in getattr(variant, kind).items():
+                    if key not in known:
+                        known[key], notes[key] = type_name, words
+        return replace(base, **whole), notes
+
+
+def _by_name(namespace, items):
+    """Return name, as relative as can be, to type name; what every node has is left out."""
+    found = {}
+    for name, kind in items:
+        if name not in OF_EVERY_NODE:
+            package, folder, *_ = kind.__module__.split('.')
+            found[name.removeprefix(f'{namespace}/')] = f'{package}/{folder}/{kind.__name__}'
+    return found

@@ -1,0 +1,88 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The access policy of some nodes, for the security tools of ROS 2 (SROS2, policy 0.2.0).
+
+Least rights: each node may publish, subscribe and serve what it does with exactly its
+parameters, and nothing else. One enclave per node, named after it.
+"""
+
+import xml.etree.ElementTree as ElementTree
+
+from pam_actuation.nodes.interfaces import Inspector
+from pam_actuation.rigging.client import NAME
+
+PARAMETER_SERVICES = (
+    'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
+    'set_parameters', 'set_parameters_atomically', 'get_type_description')
+LIFECYCLE_SERVICES = (
+    'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
+    'get_transition_graph')
+OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '~/transition_event')
+
+
+def policy(nodes):
+    """
+    Return the text of the policy of a list of NodeSpec.
+
+    Raises
+    ------
+    InputError
+        A node cannot be configured with its parameters.
+
+    """
+    root = ElementTree.Element('policy', version='0.2.0')
+    root.append(ElementTree.Comment(
+        ' Made from the code, as docs/security.md says; do not edit. '))
+    enclaves = ElementTree.SubElement(root, 'enclaves')
+    with Inspector() as inspector:
+        for node in nodes:
+            # What only matters once it runs is left out: it may not exist here.
+            given = {key: value for key, value in node.parameters.items()
+                     if key not in ('output', 'await_subscriber')}
+            interface = inspector.interface(node.name, given, node.namespace)
+            profile = _profile(enclaves, node.namespace, node.name)
+            _topics(profile, 'publish', (*interface.publishes, *OF_EVERY_NODE))
+            _topics(profile, 'subscribe', (*interface.subscribes, '/clock', '/parameter_events'))
+            _services(profile, 'reply', (
+                *interface.serves, *(f'~/{one}' for one in PARAMETER_SERVICES),
+                *(f'~/{one}' for one in LIFECYCLE_SERVICES)))
+    session = _profile(enclaves, '/', NAME)
+    _topics(session, 'subscribe', ('/diagnostics',))
+    _services(session, 'request', [
+        f'{node.namespace}/{node.name}/change_state' for node in nodes])
+    ElementTree.indent(root)
+    return ('<?xml version="1.0" encoding="UTF-8"?>\n'
+            + ElementTree.tostring(root, encoding='unicode') + '\n')
+
+
+def _profile(enclaves, namespace, name):
+    """Add an enclave with one node; return the node's profile."""
+    enclave = ElementTree.SubElement(
+        enclaves, 'enclave', path=f'{namespace.rstrip("/")}/{name}')
+    profiles = ElementTree.SubElement(enclave, 'profiles')
+    return ElementTree.SubElement(profiles, 'profile', ns=namespace, node=name)
+
+
+def _topics(profile, right, names):
+    allowed = ElementTree.SubElement(profile, 'topics', {right: 'ALLOW'})
+    for name in names:
+        ElementTree.SubElement(allowed, 'topic').text = name
+
+
+def _services(profile, right, names):
+    allowed = ElementTree.SubElement(profile, 'services', {right: 'ALLOW'})
+    for name in names:
+        ElementTree.SubElement(allowed, 'service').text = name

@@ -1,0 +1,93 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the gap depends on: binned maps as a second witness, residuals coloured by condition."""
+
+import numpy as np
+
+from pam_actuation.report import figures
+from pam_actuation.report.page import paragraph, plot, table
+from pam_actuation.report.sections.replay import SHOWN
+from pam_sim.gap.fingerprint import CONDITIONS, Conditions, MOTIONS
+
+COLOURS = dict(zip(MOTIONS, ('simulated', 'residual', 'after')))
+MOST_POINTS = 700            # of each colour
+
+
+def witness_part(result):
+    """Return the table of what binned maps of the errors explain, before and after."""
+    rows = []
+    for subsystem, found in result.fingerprint.items():
+        factor, _, unit, _ = SHOWN[found['signal']]
+        shares, left = found['explained'], found['explained_left']
+        pair = max((n for n in shares if n not in (*CONDITIONS, 'constant')), key=shares.get)
+        rest = '-' if found['rms_left'] is None else 'within the noise' if left is None else (
+            f'{found["rms_left"] * factor:.3g} {unit}, {max(left, key=left.get)} '
+            f'{100 * max(left.values()):.0f} %')
+        rows.append([subsystem, f'{found["rms"] * factor:.3g} {unit}',
+                     *(f'{100 * shares[n]:.0f} %' for n in ('constant', *CONDITIONS)),
+                     f'{pair}: {100 * shares[pair]:.0f} %', rest])
+    if not rows:
+        return ''
+    return '<h3>What the gap depends on</h3>' + table(
+        ['subsystem', 'error', 'constant', *CONDITIONS, 'best pair', 'left by the final model'],
+        rows) + paragraph(
+        'A witness that knows no effect: errors of the calibrated model with all that was '
+        'measured put in (pressure of the valve; balance of forces of muscle and load, while '
+        'moving), averaged in bins of what was measured. Share of the squared errors beyond the '
+        'noise that such a map explains on data it was not made from. Friction shows in '
+        'direction, damping in rate, a wrong static map in pressure and contraction, what relaxes '
+        'in the time since the last reversal.', 'note')
+
+
+def coloured_part(result):
+    """Return residuals of the proof over pressure and contraction, coloured by direction."""
+    if not {'pressure', 'contraction'} <= set(result.traces):
+        return ''
+    body = '<h3>Residuals by condition</h3>'
+    for abscissa in ('pressure', 'contraction'):
+        unit, rows = SHOWN[abscissa][2], []
+        for name, trace in result.traces.items():
+            at, motion = _at(result, trace, name, abscissa)
+            scale, _, own, _ = SHOWN[name]
+            for text, model in (('calibrated', trace.refit), ('final', trace.after)):
+                rows.append((f'{name} [{own}], {text}', [
+                    figures.points(at[motion == k], ((trace.measured - model) * scale)[
+                        motion == k], label, COLOURS[label], MOST_POINTS)
+                    for k, label in zip((-1, 0, 1), MOTIONS)]))
+        body += plot(figures.stack(rows, f'{abscissa} [{unit}]', row_px=120),
+                     'Recorded minus simulated in free run, on the data of the proof.')
+    return body
+
+
+def _at(result, trace, name, abscissa):
+    """Return (abscissa as shown, -1, 0 or 1 by motion) at the stamps of a trace."""
+    factor, offset, _, _ = SHOWN[abscissa]
+    recording = _Measured(result.traces)
+    motion = Conditions.of(recording, 'valve' if name == 'pressure' else 'muscle', (
+        trace.stamp_ns - recording.start_ns) * 1e-9).values['motion']
+    other = result.traces[abscissa]
+    value = np.interp(trace.stamp_ns, other.stamp_ns, other.measured)
+    return (value + offset) * factor, motion
+
+
+class _Measured:
+    """What :class:`Conditions` reads of a recording, from the traces of a result."""
+
+    def __init__(self, traces):
+        self.start_ns = min(int(t.stamp_ns[0]) for t in traces.values())
+        self.time_s = {s: (t.stamp_ns - self.start_ns) * 1e-9 for s, t in traces.items()}
+        self.measured = {s: t.measured for s, t in traces.items()}
+        end = max(float(t[-1]) for t in self.time_s.values())
+        self.grid_s = np.arange(0.0, end, 1e-3)

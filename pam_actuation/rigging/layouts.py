@@ -1,0 +1,112 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Whole rigs as lists of nodes: one muscle, a joint, both knees of an exoskeleton.
+
+What the launch files of the same names describe, for those who start nodes without
+``ros2 launch``.
+"""
+
+from dataclasses import dataclass, field
+
+from pam_actuation.resources import find_config
+from pam_sim.joint.parameters import SIDES
+
+# The order in which nodes become active; it is that of the end, read backwards.
+ORDER = ('experiment_recorder', 'plant_simulator', 'hardware_sensors', 'joint_simulator',
+         'valve_watchdog', 'valve_driver', 'sofc_controller', 'pid_controller',
+         'joint_controller', 'reference_generator')
+KNEES = ('left_knee', 'right_knee')
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One node: executable, namespace, parameters, and a file with further ones or ''."""
+
+    name: str
+    namespace: str
+    parameters: dict = field(default_factory=dict)
+    parameter_file: str = ''
+
+
+def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='sim',
+        controller='', experiment='', record=''):
+    """
+    Return the nodes of one muscle.
+
+    Parameters
+    ----------
+    namespace : str
+        Of all nodes.
+    rig : str
+        Rig preset, or path of a model file.
+    valve : {'ppr', 'hsv'}
+        Kind of valve.
+    hardware : str
+        ``sim``, another name in config/hardware, or a parameter file.
+    controller : str
+        Controller preset or file; '' for the preset of the valve.
+    experiment : str
+        Name or file; '': none, references come from elsewhere.
+    record : str
+        Folder of the bag; '': no recorder.
+
+    """
+    kind = {'valve_type': valve}
+    driver = {**kind, 'rig': rig}
+    nodes = [NodeSpec('sofc_controller', namespace, {**driver, 'controller': controller})]
+    if hardware == 'sim':
+        nodes += [NodeSpec('plant_simulator', namespace, driver),
+                  NodeSpec('valve_watchdog', namespace, kind),
+                  NodeSpec('valve_driver', namespace, driver)]
+    else:
+        file = str(find_config('hardware', hardware))
+        nodes += [NodeSpec('hardware_sensors', namespace, {}, file),
+                  NodeSpec('valve_driver', namespace, driver, file)]
+    nodes += _reference(namespace, experiment, kind)
+    if record:
+        nodes = [NodeSpec(node.name, node.namespace, {
+            **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'},
+            node.parameter_file) for node in nodes]
+        nodes.append(NodeSpec('experiment_recorder', namespace, {
+            **driver, 'output': record, 'experiment': experiment}))
+    return nodes
+
+
+def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', controller='',
+         experiment='', seed=0):
+    """Return the nodes of one simulated joint; its name is the last part of the namespace."""
+    common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1]}
+    of_joint = {**common, 'joint': joint}
+    nodes = [NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed}),
+             NodeSpec('joint_controller', namespace, {**of_joint, 'controller': controller})]
+    for side in SIDES:
+        below = f'{namespace}/{side}'
+        nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}),
+                  NodeSpec('valve_watchdog', below, common)]
+    return nodes + _reference(namespace, experiment, common)
+
+
+def exo(namespace='', **options):
+    """Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``."""
+    return [node for k, name in enumerate(KNEES)
+            for node in knee(f'{namespace}/{name}', seed=2 * k, **options)]
+
+
+def _reference(namespace, experiment, parameters):
+    if not experiment:
+        return []
+    return [NodeSpec('reference_generator', namespace, {
+        **parameters, 'experiment': experiment, 'await_receiver': True})]

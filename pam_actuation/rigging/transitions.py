@@ -1,0 +1,76 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lifecycle transitions of node processes, with a sentence on whoever does not make it."""
+
+from contextlib import contextmanager
+import signal
+import threading
+
+TRANSITION_TIMEOUT_S = 15.0
+
+
+class SessionFailed(Exception):
+    """The nodes could not be brought up or did not stay up; the text says why."""
+
+
+def change(client, processes, transition, timeout_s=TRANSITION_TIMEOUT_S):
+    """
+    Ask nodes for a transition at the same time.
+
+    Parameters
+    ----------
+    client : RigClient
+        Whose services are asked.
+    processes : iterable of NodeProcess
+        Of the nodes.
+    transition : str
+        A key of ``client.TRANSITIONS``.
+    timeout_s : float
+        Longest wait [s].
+
+    Raises
+    ------
+    SessionFailed
+        A node ended or refused.
+
+    """
+    by_name = {process.full_name: process for process in processes}
+    refused = client.change_states(
+        by_name, transition, timeout_s, lambda full_name: by_name[full_name].running)
+    # A node that ended explains more than one that only did not answer.
+    for full_name in sorted(refused, key=lambda name: by_name[name].running):
+        process = by_name[full_name]
+        if not process.running:
+            raise SessionFailed(process.how_it_ended())
+        last = process.last_line()
+        raise SessionFailed(
+            f'{process.name} did not {transition}' + (f': {last}' if last else ''))
+
+
+@contextmanager
+def termination_as_interrupt():
+    """Turn SIGTERM into KeyboardInterrupt while the nodes run, so that they end in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _interrupt(number, frame):
+    raise KeyboardInterrupt

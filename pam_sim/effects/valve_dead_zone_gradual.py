@@ -1,0 +1,112 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Small commands are swallowed, larger ones by and by: a dead zone without edges.
+
+PPR: the overlap of the main valve uncovers gradually,
+
+    T_m dp_g/dt = e - w e / sqrt(w^2 + e^2),  e = K_m u - p_g
+
+so that far from the set point it is the threshold w. HSV: the lift of a poppet takes
+time. It rises evenly over t_ramp around t_open and falls as fast around t_close; a
+pulse that ends before it is whole opens partially and closes sooner.
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+
+_HALF_WIDTH, _OPEN, _CLOSE, _RAMP = range(4)
+
+
+def _active(values, numbers):
+    if numbers.valve == 'ppr':
+        return values['half_width_pa'] != 0.0
+    return values['open_time_s'] != 0.0 or values['close_time_s'] != 0.0
+
+
+EFFECT = Effect(
+    name='valve_dead_zone_gradual',
+    variant_of='valve_dead_zone',
+    family='valve_nonlinearity',
+    subsystem='valve',
+    sentence='The valve ignores small commands, and medium ones in part: gradual overlap of a '
+             'regulator, partial lift of switching valves.',
+    source='Averaged PWM opening with delays and ramps of the lift, gradual overlap: design '
+           'choices.',
+    equation='PPR: T_m dp_g/dt = e - w e / sqrt(w^2 + e^2); HSV: lift from 0 to 1 within t_ramp '
+             'around t_open, back around d T_pwm + t_close, averaged',
+    parameters=(
+        Parameter('half_width_pa', 'Pa', 0.0, 0.0, 100e3,
+                  description='PPR: by how much a distance of set point and pressure far from 0 '
+                              'is lessened.'),
+        Parameter('open_time_s', 's', 0.0, 0.0, 0.02,
+                  description='HSV: delay from switching on to half open.'),
+        Parameter('close_time_s', 's', 0.0, 0.0, 0.02,
+                  description='HSV: delay from switching off to half shut.'),
+        Parameter('ramp_s', 's', 0.8e-3, 0.0, 0.02,
+                  description='HSV: time the lift takes, at most twice the shorter delay.'),
+    ),
+    amplitude=('half_width_pa', 'open_time_s', 'close_time_s'),
+    reported=(
+        Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),
+        Reported('open_time_s', 's', lambda values, rig: values['open_time_s']),
+        Reported('close_time_s', 's', lambda values, rig: values['close_time_s']),
+    ),
+    active=_active,
+)
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the set point less what the overlap swallows of the distance."""
+    distance = set_point_pa - pressure_pa
+    width = par[k + _HALF_WIDTH]
+    if width > 0.0:
+        set_point_pa -= width * distance / math.sqrt(width * width + distance * distance)
+    return set_point_pa, time_constant_s
+
+
+@compiled
+def mean_opening_with_lift(duty, period_s, open_s, close_s, ramp_s):
+    """Return the mean opening of one valve driven with a constant duty, its lift on a ramp."""
+    ramp_s = min(ramp_s, 2.0 * open_s, 2.0 * close_s)
+    pulse = duty * period_s
+    lifted = pulse - open_s + 0.5 * ramp_s      # since the lift began
+    if pulse <= 0.0 or lifted <= 0.0:
+        return 0.0
+    if period_s - pulse < close_s:
+        return 1.0                       # never shut between pulses
+    if lifted >= ramp_s:
+        return min((pulse - open_s + close_s) / period_s, 1.0)
+    lift = lifted / ramp_s
+    shutting = lift * (close_s - 0.5 * ramp_s) + 0.5 * lift * lift * ramp_s
+    return min((0.5 * lift * lifted + shutting) / period_s, 1.0)
+
+
+@compiled
+def opening(fill, vent, period_s, state, i, par, k):
+    """Return the mean openings of the averaged pair."""
+    return (
+        mean_opening_with_lift(fill, period_s, par[k + _OPEN], par[k + _CLOSE], par[k + _RAMP]),
+        mean_opening_with_lift(vent, period_s, par[k + _OPEN], par[k + _CLOSE], par[k + _RAMP]))
+
+
+@compiled
+def switch_times(open_s, close_s, state, i, par, k):
+    """Return the delays of the switching pair, which has no partial lift."""
+    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]

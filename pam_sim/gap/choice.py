@@ -1,0 +1,203 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which rival wins: the best in a cut, those the data cannot tell from it, and a common cause.
+
+A rival must leave no other cut worse. Where two explain as much, the one that needs the
+numbers of the model bent is dropped, and the simpler one stands for the one it is a limit of.
+"""
+
+from dataclasses import dataclass, field
+
+from pam_sim.gap.candidates import LIMITS
+from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.fit import Found, Hypothesis
+
+FIRST_STEP = 0.25            # least share of the gap a first effect explains
+LATER_STEP = 0.7             # least share of what is left that a further effect explains
+RIVAL = 0.5                  # of the best share; a name that explains less is no rival
+BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
+CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
+UNPOLISHED = 0.5             # of the rest a fit may still be better than it seems
+EDGE = 0.02                  # of a shape to the end of its range, in its logarithm
+ALMOST = 0.9                 # of the best share; a simpler name with it stands for its limit
+STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
+SAME_AS = {'viscous_damping': 'damping_n_s_per_m', 'dead_volume': 'V_dead'}
+
+
+@dataclass
+class Rival:
+    """One hypothesis with its share of the gap and, against the best, its t, by subsystem."""
+
+    name: str
+    found: Found
+    share: dict = field(default_factory=dict)
+    t: dict = field(default_factory=dict)
+    polished: bool = False
+
+    @property
+    def at_edge(self):
+        """
+        Return whether a shape of the effect went to the end of its range.
+
+        There an effect turns into another one, its limit, and its name means nothing.
+        """
+        for place, c in enumerate(self.found.hypothesis.effects):
+            if c.name == self.name:
+                return any(f.shape and min(abs(x - f.coordinate(end)) for end in (
+                    f.lower, f.upper)) < EDGE
+                    for f, x in zip(c.free, self.found.theta_of(place)))
+        return False
+
+
+@dataclass
+class Named:
+    """
+    An effect or a number that was taken in.
+
+    ``names`` explain as much, itself first; ``formulations`` are all fits under its name.
+    """
+
+    name: str
+    subsystem: str
+    rivals: list
+    names: tuple
+    formulations: list = field(default_factory=list)
+
+
+class Choice:
+    """
+    Choose among fitted rivals.
+
+    Parameters
+    ----------
+    problem : Problem
+    base : Found
+        The baseline, whose gap the shares are taken of.
+    seen_gap : float
+        Gap, in floors squared, from which on a cut needs an explanation.
+
+    """
+
+    def __init__(self, problem, base, seen_gap):
+        self.problem, self.base, self.seen_gap = problem, base, seen_gap
+
+    def shares(self, found):
+        """Return by subsystem the share of the gap that a fit explains."""
+        return {c.subsystem: share(c, self.base.errors[c.subsystem], found.errors[c.subsystem])
+                for c in self.problem.cuts}
+
+    def _admissible(self, rivals, current, cut):
+        """Return the rivals that act in a cut and leave no other cut worse."""
+        found = []
+        for r in rivals:
+            if not self._touches(r, current, cut):
+                continue
+            worse = any(
+                gap(c, r.found.errors[c.subsystem]) - gap(c, current.errors[c.subsystem])
+                > max(self.seen_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
+                for c in self.problem.cuts if c is not cut)
+            if not worse:
+                found.append(r)
+        return found
+
+    @staticmethod
+    def _touches(rival, current, cut):
+        h, known = rival.found.hypothesis, current.hypothesis
+        return Hypothesis(tuple(c for c in h.effects if c not in known.effects),
+                          tuple(f for f in h.freed if f not in known.freed)).touches(cut)
+
+    def tied(self, rivals, current, cut):
+        """Return the rivals in a cut that the data cannot tell from the best, best first."""
+        s = cut.subsystem
+        ranked = sorted(self._admissible(rivals, current, cut), key=lambda r: -r.share[s])
+        top = max((r.share[s] for r in ranked), default=0.0)
+        # The worse the best explains, the further a fit may be from where it will end.
+        near = top - max(CLOSE, UNPOLISHED * (1.0 - top))
+        for r in ranked:
+            if not r.polished and r.share[s] > near and gap(
+                    cut, r.found.errors[s]) > self.seen_gap:
+                r.found, r.polished = self.problem.polish(r.found), True
+                r.share = self.shares(r.found)
+        ranked = without_limits(ranked, current, s)
+        if not ranked:
+            return []
+        best = ranked[0].found.errors[s]
+        for r in ranked:
+            r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
+        half = RIVAL * ranked[0].share[s]
+        tied = [r for r in ranked if r is ranked[0]
+                or (r.t[s] < CERTAIN_T and r.share[s] > half)]
+        strain = min(self._strain(r.found) for r in tied)
+        tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
+        names = {r.name for r in tied}
+        as_good = {r.name for r in tied if r.t[s] < BETTER_T}
+        return [r for r in tied
+                if not any((simple, r.name) in LIMITS for simple in as_good)
+                and SAME_AS.get(r.name) not in names]
+
+    def _strain(self, found):
+        """Return the squared pulls of all numbers that should have stayed where they were."""
+        return sum(float(z) ** 2 for cut in self.problem.cuts
+                   for known, z in zip(cut.known, found.known_z[cut.subsystem])
+                   if known.of_rig and known.name not in found.hypothesis.freed)
+
+    def winner(self, rivals, current, cut, fitted):
+        """Return the rival that a cut takes in as Named, None where none explains enough."""
+        tied = self.tied(rivals, current, cut)
+        s = cut.subsystem
+        if not tied:
+            return None
+        before = share(cut, self.base.errors[s], current.errors[s])
+        gained = tied[0].share[s] - before
+        least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
+        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s])
+        if gained < least or sure < CERTAIN_T:
+            return None
+        return Named(tied[0].name, s, sorted(
+            rivals, key=lambda r: -r.share[s]), tuple(r.name for r in tied),
+            [r for r in fitted if r.name == tied[0].name])
+
+    def joint_winner(self, rivals, current, cuts, fitted):
+        """Return a cause that explains several cuts as well as the best in each, or None."""
+        if len(cuts) < 2:
+            return None
+        tied = {c.subsystem: self.tied(rivals, current, c) for c in cuts}
+        for r in tied[cuts[0].subsystem]:
+            everywhere = all(
+                r in tied[s] or (tied[s] and r.share[s] > tied[s][0].share[s] - CLOSE)
+                for s in tied)
+            if everywhere and all(self._touches(r, current, c) for c in cuts) \
+                    and min(r.share[s] for s in tied) > RIVAL:
+                same = [o.name for o in tied[cuts[0].subsystem]
+                        if o in tied[cuts[1].subsystem]]
+                names = tuple(dict.fromkeys([r.name, *same]))
+                return Named(r.name, cuts[0].subsystem, rivals, names,
+                             [o for o in fitted if o.name == r.name])
+        return None
+
+
+def without_limits(rivals, current, subsystem):
+    """
+    Return the rivals, best first, less those that have turned into a simpler effect.
+
+    That is, those at the edge of a shape where an effect they contain as a limit explains
+    almost as much or is in the present fit ``current``.
+    """
+    ranked = sorted(rivals, key=lambda r: -r.share[subsystem])
+    simple = {r.name for r in ranked if r.share[subsystem] > ALMOST * ranked[0].share[subsystem]}
+    simple |= set(current.hypothesis.names)
+    return [r for r in ranked if not r.at_edge
+            or not any((name, r.name) in LIMITS for name in simple)]

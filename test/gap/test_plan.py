@@ -1,0 +1,117 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planning before any data exist: least sizes, pairs that look alike, the best protocol."""
+
+import json
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_actuation.cli.main import main
+from pam_actuation.experiments import load_experiment, protocols
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.plan import in_proportion, least_factors, outlooks, score, Sensitivities
+from pam_sim.located_yaml import dump_yaml
+import pytest
+
+NAMES = ('coulomb_friction', 'guide_friction', 'parallel_spring', 'flow_limit')
+
+
+def looks(topics=('pressure', 'contraction', 'force'), seconds=10.0, seed=3):
+    run = recorded(nominal(), voltages(seconds, seed), topics=topics)
+    return Sensitivities(nominal(), Recording(run, 'ppr'), NAMES)
+
+
+@pytest.fixture(scope='module')
+def with_cell():
+    """Return the Sensitivities of a protocol with a load cell."""
+    return looks()
+
+
+def test_friction_at_the_rail_needs_a_load_cell_to_be_told_from_the_muscles(with_cell):
+    seen = {o.name: o for o in outlooks(with_cell)}
+    assert seen['coulomb_friction'].inseparable == ()
+    assert seen['coulomb_friction'].named is not None
+    blind = {o.name: o for o in outlooks(looks(('pressure', 'contraction')))}
+    assert 'guide_friction' in blind['coulomb_friction'].inseparable
+    assert blind['coulomb_friction'].named is None
+
+
+def test_at_its_least_size_an_effect_moves_a_signal_by_one_floor(with_cell):
+    # By a fit of the numbers with scipy, not by inner products.
+    from scipy.optimize import lsq_linear
+    o = next(o for o in outlooks(with_cell) if o.name == 'coulomb_friction')
+    rig = nominal().with_(effects=[{'name': o.name, 'parameters': o.visible}])
+    cut = next(c for c in cuts_of(nominal(), [Recording(
+        recorded(nominal(), voltages(10.0)), 'ppr')], own_proof=False)
+        if c.subsystem == 'muscle')
+    rows, zero = cut.part < 3, np.zeros(len(cut.known))
+    base = cut.errors(nominal(), zero)
+    slopes = np.column_stack([(cut.errors(nominal(), k.step * unit) - base) / k.step
+                              for k, unit in zip(cut.known, np.eye(len(cut.known)))])[rows]
+    change = (cut.errors(rig, zero) - base)[rows]
+    fit = lsq_linear(np.vstack([slopes, np.eye(zero.size)]),
+                     -np.append(change, zero), (-3.5, 3.5)).x
+    left = change + slopes @ fit
+    worst = max(np.sqrt(np.mean(left[cut.signal[rows] == s] ** 2))
+                for s in range(len(cut.signals)))
+    assert worst == pytest.approx(1.0, rel=0.15)
+
+
+def test_protocols_join_by_adding_their_inner_products(with_cell):
+    factors, seen = least_factors([with_cell])
+    assert seen['coulomb_friction'] == pytest.approx(1.0, rel=0.1)
+    first = with_cell.inner(factors)
+    both = first + first
+    assert both.samples['force'] == 2 * first.samples['force']
+    # The same again: no better by rms, but that the tolerance of the numbers hides less.
+    friction = first.names.index('coulomb_friction')
+    once, twice = (in_proportion(i, factors)[friction] for i in (first, both))
+    assert twice == pytest.approx(once, rel=0.1)
+
+
+def test_a_protocol_that_shows_more_scores_higher():
+    assert score([(0.1, 0.2), (1.0, 1.0)]) > score([(0.1, 0.5), (1.0, 1.0)])
+    assert score([(np.inf, np.inf)]) == 0.0
+
+
+def test_candidates_fill_a_minute_and_none_could_take_in_more():
+    for valve, extra in (('ppr', set()), ('hsv', {'shut'})):
+        parts = protocols.pieces(valve)
+        assert extra <= set(parts)
+        choices = protocols.choices(parts, valve)
+        lengths = [protocols.length_of(names, valve) for names in choices]
+        assert len(choices) > 20 and max(lengths) <= protocols.LONGEST_S
+        assert min(lengths) > 0.7 * protocols.LONGEST_S
+
+
+def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):
+    whole = protocols.pieces('ppr')
+    monkeypatch.setattr(protocols, 'pieces', lambda valve: {'slow': whole['slow']})
+    short = tmp_path / 'short.yaml'
+    short.write_text(dump_yaml({'name': 'short', 'domain': 'pressure', 'segments': [
+        {'rest': {'duration_s': 1.0}}, *whole['quick']]}))
+    done = main(['gap', '--plan', str(short), '--model', 'dmsp_5_300_hanging_mass',
+                 '--effects', 'coulomb_friction,viscous_damping', '--out', str(tmp_path),
+                 '--json'])
+    said = json.loads(capsys.readouterr().out)
+    assert done == 0 and said == json.loads((tmp_path / 'plan.json').read_text())
+    assert [p['name'] for p in said['protocols']] == ['short', protocols.NAME]
+    friction = next(e for e in said['protocols'][-1]['effects'] if e['name'].startswith('coul'))
+    assert friction['visible_from']['equivalent']['force_n']['unit'] == 'N'
+    assert 0.0 < friction['visible_from']['parameters']['force_n']['value'] < 1.0
+    planned = load_experiment(str(tmp_path / 'experiment.yaml'))
+    assert planned.domain == 'pressure' and planned.duration_s <= protocols.LONGEST_S
+    assert planned.needs == ('pressure', 'contraction', 'force')

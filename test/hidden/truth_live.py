@@ -1,0 +1,77 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The hidden rig step by step, for a controller that acts on what it measures."""
+
+import numpy as np
+import truth_rig as rig
+
+
+@rig.jit
+def hold(n, valve, y, work, anchors, plays, raw_a, raw_b, start, steps):
+    """Advance held inputs by steps of the rig; return (pressure, contraction, cell force)."""
+    middle, d = work[0], work[1]
+    p, force = 0.0, 0.0
+    for k in range(steps):
+        t = (start + k) * rig.STEP_S
+        in_a, in_b = rig.acting(raw_a, raw_b, t, plays, valve, n)
+        _, push, p = rig.rates(y, in_a, in_b, t, anchors, valve, n, d)
+        force = n[rig.MASS] * (d[rig.Y_V] + rig.GRAVITY) + push
+        rig.advance(y, middle, d, in_a, in_b, t, anchors, 0.0, valve, n, rig.STEP_S)
+    return p, y[rig.Y_X], force
+
+
+class LiveRig:
+    """
+    A hidden rig with a regulator, from rest at atmosphere, its supply constant.
+
+    It has what a simulated plant has: ``step`` with the valve signal held, and readings.
+
+    Parameters
+    ----------
+    numbers : dict
+        Numbers of the rig that are not neutral.
+    readings : callable, optional
+        ``readings(pressure, contraction, force)`` returns what the sensors show.
+
+    """
+
+    dt_s = 1e-3
+
+    def __init__(self, numbers, readings=lambda *values: values):
+        self._n, self._readings = rig.numbers(**numbers), readings
+        self._y, self._work = np.zeros(rig.SIZE), np.zeros((2, rig.SIZE))
+        self._anchors, self._plays = np.zeros(6), np.zeros(3)
+        self._y[rig.Y_AIR] = rig.ATM
+        self._waiting, self._acting, self._done = [], 0.0, 0
+        self.pressure_pa, self.contraction_m, self.force_n = readings(rig.ATM, 0.0, 0.0)
+
+    @property
+    def time_s(self):
+        """Return the time since the start [s]."""
+        return self._done * rig.STEP_S
+
+    def step(self, signal, external_force_n=0.0):
+        """Advance by ``dt_s``; a signal acts after the hidden delay, at the next step of 1 ms."""
+        if external_force_n:
+            raise ValueError('the hidden rig knows no disturbance')
+        late = int(round(self._n[rig.DELAY] / rig.STEP_S))
+        self._waiting.append((self._done + late, float(signal[0])))
+        while self._waiting and self._waiting[0][0] <= self._done:
+            self._acting = self._waiting.pop(0)[1]
+        steps = int(round(self.dt_s / rig.STEP_S))
+        found = hold(self._n, rig.PPR, self._y, self._work, self._anchors, self._plays,
+                     self._acting, 0.0, self._done, steps)
+        self._done += steps
+        self.pressure_pa, self.contraction_m, self.force_n = self._readings(*found)

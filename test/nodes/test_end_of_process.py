@@ -1,0 +1,63 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test that a node leaves nothing in the middleware before its process ends."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
+from pam_actuation.rigging.processes import node_environment                # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+# The threads of the participant are named dds.*; the watchdog belongs to the library.
+PROGRAM = """
+import os
+from pam_actuation.nodes.pid_controller import PidNode
+from pam_actuation.nodes.runner import run
+
+code = run(PidNode)
+threads = [open(f'/proc/self/task/{task}/comm').read().strip()
+           for task in os.listdir('/proc/self/task')]
+print('left:', sorted(name for name in threads if name.startswith('dds.')), flush=True)
+raise SystemExit(code)
+"""
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='thread names are read from /proc')
+@pytest.mark.parametrize('parameter, code', [('controller:=nobody', 2), ('autostart:=true', 0)])
+def test_participant_is_gone(tmp_path, parameter, code):
+    lock = DomainLock()
+    process = subprocess.Popen(
+        [sys.executable, '-c', PROGRAM, '--ros-args', '-p', parameter],
+        env=node_environment(lock.domain_id, tmp_path), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        if code == 0:
+            for line in process.stderr:
+                if line.rstrip().endswith('active'):
+                    break
+            process.send_signal(signal.SIGTERM)
+        output, errors = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        lock.release()
+    assert process.returncode == code, errors
+    assert "left: ['dds.shm.wdog']" in output or 'left: []' in output, output

@@ -1,0 +1,86 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test that pages and access policies say what the nodes do."""
+
+from pathlib import Path
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.nodes.interfaces import Inspector, VARIANTS              # noqa: E402, I100
+from pam_actuation.nodes.pages import pages                                 # noqa: E402
+from pam_actuation.nodes.policy import policy                               # noqa: E402
+from pam_actuation.rigging import layouts                                   # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parents[2]
+POLICIES = {
+    'rig': lambda: layouts.rig(valve='hsv', experiment='sine_quarter_hz', record='bag'),
+    'exo': lambda: layouts.exo(valve='hsv')}
+
+
+@pytest.fixture(scope='module')
+def made():
+    return pages()
+
+
+def test_every_executable_has_its_page(made):
+    scripts = re.findall(r'(\w+) = pam_actuation\.nodes', (ROOT / 'setup.py').read_text())
+    assert {f'{name}.md' for name in scripts} == set(made)
+    assert {path.name for path in (ROOT / 'docs' / 'nodes').iterdir()} == set(made)
+
+
+@pytest.mark.parametrize('name', VARIANTS)
+def test_the_page_of_a_node_is_current(made, name):
+    committed = (ROOT / 'docs' / 'nodes' / f'{name}.md').read_text(encoding='utf-8')
+    assert committed == made[f'{name}.md'], 'run: pam nodes --markdown docs/nodes'
+
+
+def test_what_comes_with_certain_parameters_is_said_so(made):
+    line, = re.findall(r'.*`valve_command`.*', made['valve_driver.md'].split('## Param')[0])
+    assert '`accept_valve_command:=true`' in line
+    assert '| serves | `~/pause` | `std_srvs/srv/SetBool` | `use_sim_time:=true` |' in (
+        made['plant_simulator.md'])
+
+
+@pytest.mark.parametrize('name', POLICIES)
+def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
+    text = (ROOT / 'config' / 'security' / f'{name}.policy.xml').read_text(encoding='utf-8')
+    nodes = POLICIES[name]()
+    assert text == policy(nodes), 'make it anew, see docs/security.md'
+    publishers, enclaves = {}, ElementTree.fromstring(text.encode()).findall('.//enclave')
+    assert [enclave.get('path') for enclave in enclaves] == [
+        *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session']
+    for profile in ElementTree.fromstring(text.encode()).iter('profile'):
+        for topic in profile.findall("topics[@publish='ALLOW']/topic"):
+            if not topic.text.startswith(('/', '~')):
+                publishers.setdefault(f'{profile.get("ns")}/{topic.text}', set()).add(
+                    profile.get('node'))
+    for topic, who in publishers.items():
+        if topic.endswith('/valve_signal'):
+            assert who == {'valve_driver', 'valve_watchdog'}
+        else:
+            assert len(who) == 1, topic
+    assert not any(topic.endswith('/clock') for topic in publishers)
+
+
+def test_a_node_that_cannot_be_configured_says_why():
+    from pam_sim.errors import InputError
+    with Inspector() as inspector, pytest.raises(InputError, match='dmsp_99'):
+        inspector.interface('plant_simulator', {'rig': 'dmsp_99'})

@@ -1,0 +1,68 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test which nodes a rig is made of, and that mistakes are told before anything starts."""
+
+from pam_actuation.cli.main import main
+from pam_actuation.rigging import layouts
+import pytest
+
+
+def names(nodes):
+    return sorted(f'{node.namespace}/{node.name}' for node in nodes)
+
+
+def test_a_simulated_rig_has_a_watchdog_and_a_real_one_sensors():
+    assert names(layouts.rig()) == [
+        '/muscle/plant_simulator', '/muscle/sofc_controller', '/muscle/valve_driver',
+        '/muscle/valve_watchdog']
+    real = layouts.rig('/leg', hardware='dummy', experiment='rest', record='bag')
+    assert names(real) == [
+        '/leg/experiment_recorder', '/leg/hardware_sensors', '/leg/reference_generator',
+        '/leg/sofc_controller', '/leg/valve_driver']
+    for node in real:
+        awaited = node.parameters.get('await_subscriber')
+        assert awaited == (
+            None if node.name == 'experiment_recorder' else '/leg/experiment_recorder')
+        assert node.parameter_file.endswith('dummy.yaml') == (
+            node.name in ('valve_driver', 'hardware_sensors'))
+
+
+def test_both_knees_have_all_nodes_their_names_and_seeds():
+    nodes = layouts.exo('/me', valve='hsv')
+    left = [name for name in names(nodes) if name.startswith('/me/left_knee/')]
+    assert names(nodes) == sorted(
+        left + [name.replace('left_knee', 'right_knee') for name in left])
+    assert left == [
+        '/me/left_knee/extensor/valve_driver', '/me/left_knee/extensor/valve_watchdog',
+        '/me/left_knee/flexor/valve_driver', '/me/left_knee/flexor/valve_watchdog',
+        '/me/left_knee/joint_controller', '/me/left_knee/joint_simulator']
+    assert {node.parameters['muscle'] for node in nodes} == {'left_knee', 'right_knee'}
+    assert {node.parameters['valve_type'] for node in nodes} == {'hsv'}
+    seeds = [node.parameters['seed'] for node in nodes if node.name == 'joint_simulator']
+    assert seeds == [0, 2]          # a joint takes two
+
+
+def test_every_node_has_its_place_in_the_order():
+    nodes = [*layouts.rig(hardware='dummy', experiment='rest', record='bag'), *layouts.rig(),
+             *layouts.exo(experiment='joint_sine')]
+    assert {node.name for node in nodes} <= set(layouts.ORDER)
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['knee', '--record', 'bag'], '--record'), (['exo', '--hardware', 'dummy'], '--hardware'),
+    (['rig', '--hardware', 'nothing'], 'nothing')])
+def test_a_mistake_is_one_sentence(arguments, words, capsys):
+    assert main(['up', *arguments]) == 2
+    assert words in capsys.readouterr().err
