@@ -77,7 +77,7 @@ class HsvConfig:
     dead_time_range_s: float = 0.015
     flow_scale_pa: float = 4_000.0
     gain_limit: float = 2.0
-    drift_limit_pa_per_s: float = 100_000.0
+    drift_limit_pa_per_s: float = 20_000.0
     supply_margin_pa: float = 5_000.0
     slope_share: float = 1.0
 

@@ -46,7 +46,7 @@ def _entry(entry):
     if entry['kind'] != 'rig':          # its parameters stand with muscle, valve and load
         for head, rows in tables(entry):
             lines += ['', row(head), '|---' * len(head) + '|',
-                      *(row((f'`{row[0]}`', *map(escaped, row[1:]))) for row in rows)]
+                      *(row((f'`{name}`', *map(escaped, rest))) for name, *rest in rows)]
     return '\n'.join(lines).rstrip() + '\n'
 
 
