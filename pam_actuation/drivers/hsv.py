@@ -183,6 +183,11 @@ class HsvLaw:
         hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
         self.out[kernel.O_SATURATED] = 0.0
 
+    def lasted(self, periods):
+        """Tell how long [PWM periods] the newest opening was held before the next tick came."""
+        self.state[kernel.S_SENT] *= periods
+        self.state[kernel.S_THROUGH] *= periods
+
     @property
     def saturated(self):
         """Return -1, 0 or +1: vent fully open, free, fill fully open."""

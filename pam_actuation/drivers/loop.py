@@ -157,12 +157,16 @@ class DriverLoop:
         measured = self._new_measurement()
         age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / _NS, 0.0)
         supply_pa = self.safety.supply_pa(now_ns)
-        elapsed = 1
+        elapsed, late = 1, 0.0
         if self._law_ns is not None:
-            elapsed = round((now_ns - self._law_ns) / (self.period_s * _NS))
+            periods = (now_ns - self._law_ns) / (self.period_s * _NS)
+            elapsed = round(periods)
+            late = periods - elapsed
         followed = decision.pressure_pa is not None or decision.duty is not None
         if elapsed == 0 and followed and self._efforts != (0.0, 1.0):
             return self._efforts      # called within a period: the running one goes on
+        if elapsed >= 1:
+            self.law.lasted(1.0 + late)     # a late tick leaves the valves as they are for longer
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
             self.law.hold(*self._efforts, supply_pa=supply_pa)
             self.safety.flow(self.law.flow_pa)

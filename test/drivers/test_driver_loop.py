@@ -15,9 +15,12 @@
 """The driver loop with the simulated rig: whole chain, venting, status, bad input."""
 
 import math
+import random
 
+import numpy as np
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.messages import Pressure
 from pam_actuation.plant_loop import PlantLoop
@@ -207,3 +210,33 @@ def test_parameters_round_trip():
     config = DriverConfig.from_parameters({'hsv.gain': 0.5, 'max_pressure_gauge_pa': 5e5})
     assert DriverConfig.from_parameters(config.as_parameters()) == config
     assert config.hsv.gain == 0.5 and config.safety.max_pressure_gauge_pa == 5e5
+
+
+def scatter_kpa_with_ticks_up_to_3_ms_late():
+    """Return how far the pressure scatters about a sine of 300 kPa +- 100 kPa it follows."""
+    chain, draw = Chain('hsv'), random.Random(1)
+    chain.run(1000)
+    begin, rows = chain.now, []
+    for k in range(1, 1000):
+        tick = begin + k * 10 * MS + draw.randint(-3, 3) * MS
+        turn = math.pi * (tick - begin) * 1e-9
+        wanted_kpa = 300.0 + 100.0 * math.sin(turn)
+        chain.now = tick
+        chain.plant.advance_to(tick)
+        chain.loop.on_pressure(chain.plant.sample(tick)['pressure'])
+        chain.loop.on_command(Pressure(tick, P_ATM_PA + 1e3 * wanted_kpa))
+        signal, _ = chain.loop.tick(tick)
+        chain.plant.set_signal(signal)
+        waves = [f(n * turn) for n in (1, 2, 3, 4) for f in (math.sin, math.cos)]
+        rows.append([(chain.plant.plant.pressure_pa - P_ATM_PA) * 1e-3, 1.0, *waves])
+    rows = np.array(rows[400:])
+    smooth = np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0]
+    return np.std(rows[:, 0] - rows[:, 1:] @ smooth)
+
+
+def test_late_ticks_are_counted_by_their_length(monkeypatch):
+    """A duty held for 13 ms is more air than one held for 7 ms, and the law knows."""
+    known = scatter_kpa_with_ticks_up_to_3_ms_late()
+    monkeypatch.setattr(HsvLaw, 'lasted', lambda self, periods: None)
+    unknown = scatter_kpa_with_ticks_up_to_3_ms_late()
+    assert known < 0.9 * unknown
