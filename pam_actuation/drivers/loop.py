@@ -25,7 +25,7 @@ from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import SafetySupervisor
-from pam_actuation.messages import Pressure, Status, VALVE_NAMES, ValveSignal
+from pam_actuation.messages import Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 _NS = 1_000_000_000
@@ -143,7 +143,7 @@ class DriverLoop:
         target_pa = decision.pressure_pa
         dt_s = None if self._last_ns is None else max(now_ns - self._last_ns, 0) / _NS
         if target_pa is None:
-            volts = max(self.config.ppr.lowest_v, 0.0)
+            volts, = self._safe_efforts()
             self.law.force(volts)
             target_pa = P_ATM_PA
         else:
@@ -163,7 +163,7 @@ class DriverLoop:
             elapsed = round(periods)
             late = periods - elapsed
         followed = decision.pressure_pa is not None or decision.duty is not None
-        if elapsed == 0 and followed and self._efforts != (0.0, 1.0):
+        if elapsed == 0 and followed and self._efforts != self._safe_efforts():
             return self._efforts      # called within a period: the running one goes on
         if elapsed >= 1:
             self.law.lasted(1.0 + late)     # a late tick leaves the valves as they are for longer
@@ -194,7 +194,7 @@ class DriverLoop:
         return channel.pressure_pa
 
     def _safe_efforts(self):
-        return (0.0, 1.0) if self.is_hsv else (max(self.config.ppr.lowest_v, 0.0),)
+        return SAFE_EFFORTS['hsv'] if self.is_hsv else (max(self.config.ppr.lowest_v, 0.0),)
 
     def _signal(self, now_ns, efforts):
         return ValveSignal(now_ns, self._names, efforts)

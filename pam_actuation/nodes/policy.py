@@ -21,7 +21,7 @@ parameters, and nothing else. One enclave per node, named after it.
 
 import xml.etree.ElementTree as ElementTree
 
-from pam_actuation.nodes.interfaces import Inspector
+from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
 
 PARAMETER_SERVICES = (
@@ -30,7 +30,7 @@ PARAMETER_SERVICES = (
 LIFECYCLE_SERVICES = (
     'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
     'get_transition_graph')
-OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '~/transition_event')
+SENT_BY_EVERY_NODE = (*OF_EVERY_NODE, '~/transition_event')
 
 
 def policy(nodes):
@@ -54,14 +54,15 @@ def policy(nodes):
                      if key not in ('output', 'await_subscriber')}
             interface = inspector.interface(node.name, given, node.namespace)
             profile = _profile(enclaves, node.namespace, node.name)
-            _topics(profile, 'publish', (*interface.publishes, *OF_EVERY_NODE))
-            _topics(profile, 'subscribe', (*interface.subscribes, '/clock', '/parameter_events'))
-            _services(profile, 'reply', (
+            _allow(profile, 'topic', 'publish', (*interface.publishes, *SENT_BY_EVERY_NODE))
+            _allow(profile, 'topic', 'subscribe', (
+                *interface.subscribes, '/clock', '/parameter_events'))
+            _allow(profile, 'service', 'reply', (
                 *interface.serves, *(f'~/{one}' for one in PARAMETER_SERVICES),
                 *(f'~/{one}' for one in LIFECYCLE_SERVICES)))
     session = _profile(enclaves, '/', NAME)
-    _topics(session, 'subscribe', ('/diagnostics',))
-    _services(session, 'request', [
+    _allow(session, 'topic', 'subscribe', ('/diagnostics',))
+    _allow(session, 'service', 'request', [
         f'{node.namespace}/{node.name}/change_state' for node in nodes])
     ElementTree.indent(root)
     return ('<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -76,13 +77,8 @@ def _profile(enclaves, namespace, name):
     return ElementTree.SubElement(profiles, 'profile', ns=namespace, node=name)
 
 
-def _topics(profile, right, names):
-    allowed = ElementTree.SubElement(profile, 'topics', {right: 'ALLOW'})
+def _allow(profile, kind, right, names):
+    """Allow a right to topics or services, ``kind`` is the word for one of them."""
+    allowed = ElementTree.SubElement(profile, f'{kind}s', {right: 'ALLOW'})
     for name in names:
-        ElementTree.SubElement(allowed, 'topic').text = name
-
-
-def _services(profile, right, names):
-    allowed = ElementTree.SubElement(profile, 'services', {right: 'ALLOW'})
-    for name in names:
-        ElementTree.SubElement(allowed, 'service').text = name
+        ElementTree.SubElement(allowed, kind).text = name

@@ -19,7 +19,7 @@ What the launch files of the same names describe, for those who start nodes with
 ``ros2 launch``.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from pam_actuation.resources import find_config
 from pam_sim.joint.parameters import SIDES
@@ -77,9 +77,9 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
                   NodeSpec('valve_driver', namespace, driver, file)]
     nodes += _reference(namespace, experiment, kind)
     if record:
-        nodes = [NodeSpec(node.name, node.namespace, {
-            **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'},
-            node.parameter_file) for node in nodes]
+        nodes = [replace(node, parameters={
+            **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'})
+            for node in nodes]
         nodes.append(NodeSpec('experiment_recorder', namespace, {
             **driver, 'output': record, 'experiment': experiment}))
     return nodes

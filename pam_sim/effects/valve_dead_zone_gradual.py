@@ -27,23 +27,18 @@ pulse that ends before it is whole opens partially and closes sooner.
 import math
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.valve_dead_zone import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
 
 _HALF_WIDTH, _OPEN, _CLOSE, _RAMP = range(4)
 
 
-def _active(values, numbers):
-    if numbers.valve == 'ppr':
-        return values['half_width_pa'] != 0.0
-    return values['open_time_s'] != 0.0 or values['close_time_s'] != 0.0
-
-
 EFFECT = Effect(
     name='valve_dead_zone_gradual',
     variant_of='valve_dead_zone',
-    family='valve_nonlinearity',
-    subsystem='valve',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
     sentence='The valve ignores small commands, and medium ones in part: gradual overlap of a '
              'regulator, partial lift of switching valves.',
     source='Averaged PWM opening with delays and ramps of the lift, gradual overlap: design '
@@ -61,13 +56,9 @@ EFFECT = Effect(
         Parameter('ramp_s', 's', 0.8e-3, 0.0, 0.02,
                   description='HSV: time the lift takes, at most twice the shorter delay.'),
     ),
-    amplitude=('half_width_pa', 'open_time_s', 'close_time_s'),
-    reported=(
-        Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),
-        Reported('open_time_s', 's', lambda values, rig: values['open_time_s']),
-        Reported('close_time_s', 's', lambda values, rig: values['close_time_s']),
-    ),
-    active=_active,
+    amplitude=_SIBLING.amplitude,
+    reported=_SIBLING.reported,
+    active=_SIBLING.active,
 )
 
 

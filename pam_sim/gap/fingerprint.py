@@ -26,8 +26,6 @@ tension at measured pressure and contraction against the load cell, and the cell
 weight and inertia of the measured motion; without a cell the first against the last.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.free_run import GRID_S, pressure_driven, simulate_driven
@@ -52,35 +50,28 @@ PAIRS = (('pressure', 'contraction'), ('pressure', 'direction'), ('contraction',
          ('direction', 'time since reversal'))
 
 
-@dataclass(frozen=True)
-class Conditions:
+def conditions_of(recording, subsystem, time_s):
     """
-    What was measured at some instants, one array per condition.
+    Return what was measured at instants [s], one array per condition.
 
     ``direction`` is -1 or 1, at rest that of the last motion; ``motion`` is 0 there. ``rate`` is
     that of the contraction [m/s], of the pressure [Pa/s] where the subsystem is the valve or
     nothing moves; pressure in Pa gauge.
     """
-
-    values: dict
-
-    @classmethod
-    def of(cls, recording, subsystem, time_s):
-        """Return the conditions of a recording at instants [s]."""
-        grid = recording.grid_s
-        level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
-                 for s in ('pressure', 'contraction')}
-        moves = np.ptp(level['contraction']) > 10.0 * REST['contraction'] * GRID_S
-        leading = 'pressure' if subsystem == 'valve' or not moves else 'contraction'
-        window = min(SMOOTH_STEPS, 2 * ((grid.size - 1) // 2) - 1)
-        rate = savgol_filter(level[leading], window, 2, deriv=1, delta=GRID_S)
-        motion = np.where(rate > REST[leading], 1, np.where(rate < -REST[leading], -1, 0))
-        direction = _direction(motion)
-        place = np.clip(np.rint(np.asarray(time_s) / GRID_S).astype(int), 0, grid.size - 1)
-        return cls({'pressure': level['pressure'][place] - P_ATM_PA,
-                    'contraction': level['contraction'][place],
-                    'motion': motion[place], 'direction': direction[place], 'rate': rate[place],
-                    'time since reversal': _since_reversal(direction)[place]})
+    grid = recording.grid_s
+    level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
+             for s in ('pressure', 'contraction')}
+    moves = np.ptp(level['contraction']) > 10.0 * REST['contraction'] * GRID_S
+    leading = 'pressure' if subsystem == 'valve' or not moves else 'contraction'
+    window = min(SMOOTH_STEPS, 2 * ((grid.size - 1) // 2) - 1)
+    rate = savgol_filter(level[leading], window, 2, deriv=1, delta=GRID_S)
+    motion = np.where(rate > REST[leading], 1, np.where(rate < -REST[leading], -1, 0))
+    direction = _direction(motion)
+    place = np.clip(np.rint(np.asarray(time_s) / GRID_S).astype(int), 0, grid.size - 1)
+    return {'pressure': level['pressure'][place] - P_ATM_PA,
+            'contraction': level['contraction'][place],
+            'motion': motion[place], 'direction': direction[place], 'rate': rate[place],
+            'time since reversal': _since_reversal(direction)[place]}
 
 
 def _direction(motion):
@@ -140,7 +131,7 @@ def explained(conditions, errors, learn, judge):
     Parameters
     ----------
     conditions : dict of str -> numpy.ndarray, shape (N,)
-        As of :class:`Conditions`.
+        As of :func:`conditions_of`.
     errors : numpy.ndarray, shape (N,)
         In noise floors.
     learn, judge : numpy.ndarray of bool, shape (N,)
@@ -237,7 +228,7 @@ def _errors_of(problem, cut):
 def _valve_errors(cut, index, fits):
     """Return (conditions, part, errors of both fits [Pa], noise) of a recording."""
     mine = cut.run == index
-    values = Conditions.of(cut.recordings[index], 'valve', cut.time_s[mine]).values
+    values = conditions_of(cut.recordings[index], 'valve', cut.time_s[mine])
     floor = cut.floor['pressure']
     before, after = (f.errors['valve'][mine] * floor for f in fits)
     return values, cut.part[mine], before, after, floor
@@ -253,7 +244,7 @@ def _force_errors(problem, cut, index, fits, subsystem):
     recording = cut.recordings[index]
     chosen = (cut.run == index) & (cut.signal == len(cut.signals) - 1)
     time_s, part = cut.time_s[chosen], cut.part[chosen]
-    values = Conditions.of(recording, subsystem, time_s).values
+    values = conditions_of(recording, subsystem, time_s)
     free = values['motion'] != 0
     if problem.rig.load == 'hanging_mass':
         free &= values['contraction'] > AT_STOP_M

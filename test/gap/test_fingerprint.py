@@ -20,7 +20,7 @@ from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.sections.gap import gap_section
 from pam_sim.gap import find_gap
-from pam_sim.gap.fingerprint import BinnedMap, CONDITIONS, Conditions, explained
+from pam_sim.gap.fingerprint import BinnedMap, CONDITIONS, conditions_of, explained
 from pam_sim.gap.free_run import Recording
 import pytest
 
@@ -29,7 +29,7 @@ import pytest
 def conditions():
     """Return the conditions of a protocol at 200 Hz."""
     recording = Recording(recorded(nominal(), voltages(20.0)), 'ppr')
-    return Conditions.of(recording, 'muscle', np.arange(0.5, 19.5, 5e-3)).values
+    return conditions_of(recording, 'muscle', np.arange(0.5, 19.5, 5e-3))
 
 
 @pytest.mark.parametrize('strongest, errors', [

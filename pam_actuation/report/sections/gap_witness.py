@@ -19,7 +19,7 @@ import numpy as np
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, table
 from pam_actuation.report.sections.replay import SHOWN
-from pam_sim.gap.fingerprint import CONDITIONS, Conditions, MOTIONS
+from pam_sim.gap.fingerprint import CONDITIONS, conditions_of, MOTIONS
 
 COLOURS = dict(zip(MOTIONS, ('simulated', 'residual', 'after')))
 MOST_POINTS = 700            # of each colour
@@ -75,15 +75,15 @@ def _at(result, trace, name, abscissa):
     """Return (abscissa as shown, -1, 0 or 1 by motion) at the stamps of a trace."""
     factor, offset, _, _ = SHOWN[abscissa]
     recording = _Measured(result.traces)
-    motion = Conditions.of(recording, 'valve' if name == 'pressure' else 'muscle', (
-        trace.stamp_ns - recording.start_ns) * 1e-9).values['motion']
+    motion = conditions_of(recording, 'valve' if name == 'pressure' else 'muscle', (
+        trace.stamp_ns - recording.start_ns) * 1e-9)['motion']
     other = result.traces[abscissa]
     value = np.interp(trace.stamp_ns, other.stamp_ns, other.measured)
     return (value + offset) * factor, motion
 
 
 class _Measured:
-    """What :class:`Conditions` reads of a recording, from the traces of a result."""
+    """What :func:`conditions_of` reads of a recording, from the traces of a result."""
 
     def __init__(self, traces):
         self.start_ns = min(int(t.stamp_ns[0]) for t in traces.values())
