@@ -20,8 +20,9 @@ A small gait stack that drives both knees: what a larger one would do, in plain 
 
 It knows of the knees only what any stack knows: ``joint_trajectory`` and ``co_contraction`` go
 in, ``joint_state`` comes out, by joint name. First both legs go to their places, a movement
-sent once; then the next 0.6 s of the stride are sent 20 times a second, the stance stiffer than
-the swing. All joints together are on ``joint_states``, where viewers look.
+sent as a whole, and again should a leg not be there at its end (whoever has just been connected
+may miss the first message); then the next 0.6 s of the stride are sent 20 times a second, the
+stance stiffer than the swing. All joints together are on ``joint_states``, where viewers look.
 Exit code: 0 done, 1 a knee fell silent or did not get to its place.
 """
 
@@ -43,6 +44,7 @@ SEND_PERIOD_S = 0.05
 POINT_S, POINTS = 0.02, 31
 SILENT_S = 1.0
 START_TIMEOUT_S = 60.0
+IN_PLACE_RAD = 0.1
 STANCE = 0.6                    # share of the stride
 HUMPS = ((0.14, 0.07, 0.3), (0.72, 0.09, 1.0))      # where, how wide, how high: a design profile
 
@@ -114,8 +116,9 @@ class GaitStack(Node):
     def tick(self):
         """Send what is due."""
         now_s = time.monotonic()
-        if self.placed_s is None:
-            self._go_to_places(now_s)
+        missing = [knee.name for knee in self.knees if not knee.present]
+        if missing and self.begin_s is None:
+            self._give_up_late(now_s, 'nobody is there for', missing)
             return
         silent = [knee.name for knee in self.knees if knee.silent]
         if silent:
@@ -123,10 +126,9 @@ class GaitStack(Node):
             self.exit_code = 1
             return
         self._send_all_joints()
-        if now_s < self.placed_s:
-            return
         if self.begin_s is None:
-            self.begin_s = now_s
+            self._go_to_places(now_s)
+            return
         strides_done = (now_s - self.begin_s) / self.stride_s
         for knee in self.knees:
             self._note_error(knee)
@@ -141,17 +143,24 @@ class GaitStack(Node):
         return self.low_rad + span * flexion, span * slope / self.stride_s
 
     def _go_to_places(self, now_s):
-        missing = [knee.name for knee in self.knees if not knee.present]
-        if missing and now_s - self.created_s > START_TIMEOUT_S:
-            self.get_logger().error(f'nobody is there for {", ".join(missing)}')
-            self.exit_code = 1
-        if missing:
+        if self.placed_s is not None and now_s < self.placed_s:
             return
-        for knee in self.knees:
+        away = [knee for knee in self.knees if abs(
+            knee.state.position[0] - self.wanted(knee.offset)[0]) > IN_PLACE_RAD]
+        if self.placed_s is not None and not away:
+            self.begin_s = now_s
+            return
+        for knee in away or self.knees:
             angle, rate = self.wanted(knee.offset)
             self._send(knee, [(self.place_s, angle, rate)])
         self.placed_s = now_s + self.place_s
         self.get_logger().info('going to the first posture')
+        self._give_up_late(now_s, 'these do not go to their place:', [k.name for k in away])
+
+    def _give_up_late(self, now_s, what, names):
+        if names and now_s - self.created_s > START_TIMEOUT_S:
+            self.get_logger().error(f'{what} {", ".join(names)}')
+            self.exit_code = 1
 
     def _send_stride(self, knee, strides):
         ahead = [k * POINT_S for k in range(POINTS)]

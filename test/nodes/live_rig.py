@@ -22,6 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES, RosWriter
+from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 import rclpy
@@ -29,6 +30,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 NAMESPACE = '/muscle'
+LISTEN_PERIOD_S = 0.002
 
 Heard = collections.namedtuple('Heard', 'time_s plain sequence')
 Health = collections.namedtuple('Health', 'time_s level message values')
@@ -47,6 +49,7 @@ class LiveRig:
         self.heard = {topic: [] for topic in MESSAGE_TYPES}
         self.health = collections.defaultdict(list)
         self._context = None
+        self._polled = []
 
     def start(self, name, below='', **parameters):
         """
@@ -61,26 +64,49 @@ class LiveRig:
             name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
             log_dir)
 
-    def listen(self):
-        """Join the graph; processes are started before (forking with threads is unsafe)."""
+    def listen(self, topics=None):
+        """
+        Join the graph; processes are started before (forking with threads is unsafe).
+
+        ``topics`` are types by topic, ``None`` for all of a muscle.
+        """
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=self.domain_id, args=[])
         self.node = Node('listener', namespace=self._namespace, context=self._context)
-        for topic, message_type in MESSAGE_TYPES.items():
-            self.node.create_subscription(
-                message_type, topic, self._hearer(topic), qos.reliable(1000))
-        self.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.reliable(1000))
+        for topic, message_type in (topics or MESSAGE_TYPES).items():
+            self.hear(message_type, topic, self._hearer(topic))
+        self.hear(DiagnosticArray, '/diagnostics', self._on_diagnostics)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
+        self._ending = threading.Event()
+        self._threads = [threading.Thread(target=self._spin, daemon=True),
+                         threading.Thread(target=self._take, daemon=True)]
+        for thread in self._threads:
+            thread.start()
+
+    def hear(self, message_type, topic, handler, profile=None):
+        """
+        Subscribe; the handler gets each message and what rclpy says about it.
+
+        Polled: an executor waits anew on every entity for each message, and falls seconds
+        behind a whole rig on a busy machine.
+        """
+        name = topic if topic.startswith('/') else f'{self._namespace}/{topic}'
+        self._polled.append((
+            PolledSubscription(self.node, message_type, name, profile or qos.reliable(1000)),
+            handler))
 
     def _spin(self):
         try:
-            self._executor.spin()
+            self._executor.spin()       # what is left to it are the services
         except ExternalShutdownException:
             pass
+
+    def _take(self):
+        while not self._ending.wait(LISTEN_PERIOD_S):
+            for subscription, handler in list(self._polled):
+                for message, info in subscription.take():
+                    handler(message, info)
 
     def _hearer(self, topic):
         def hear(message, info):
@@ -88,7 +114,7 @@ class LiveRig:
                 time.monotonic(), from_ros(topic, message), info['publication_sequence_number']))
         return hear
 
-    def _on_diagnostics(self, message):
+    def _on_diagnostics(self, message, _):
         for status in message.status:
             self.health[status.name.rsplit('/', 1)[-1]].append(Health(
                 time.monotonic(), status.level[0], status.message,
@@ -111,8 +137,10 @@ class LiveRig:
         """End everything."""
         end_all(self.processes.values())
         if self._context is not None:
+            self._ending.set()
             self._executor.shutdown(timeout_sec=1.0)
-            self._thread.join(2.0)
+            for thread in self._threads:
+                thread.join(2.0)
             self.node.destroy_node()
             rclpy.try_shutdown(context=self._context)
         self._lock.release()

@@ -24,7 +24,7 @@ import time
 from live_rig import LiveRig, wait_for
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import from_ros, RosWriter, type_of
+from pam_actuation.nodes.conversions import RosWriter, type_of
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_sim.joint.parameters import SIDES
@@ -58,16 +58,11 @@ def knee(tmp_path):
     try:
         rig.supervisor = Supervisor(nodes, rig.domain_id, realtime_priority=1)
         rig.supervisor.start()
-        rig.listen()
-        rig.heard.update({topic: [] for topic in TOPICS})
-        for topic in TOPICS:
-            rig.node.create_subscription(
-                type_of(topic), topic,
-                lambda message, topic=topic: rig.heard[topic].append(from_ros(topic, message)),
-                qos.reliable(1000))
+        rig.heard = {topic: [] for topic in TOPICS}
+        rig.listen({topic: type_of(topic) for topic in TOPICS})
         rig.descriptions = []
-        rig.node.create_subscription(
-            String, 'robot_description', rig.descriptions.append, qos.LATCHED)
+        rig.hear(String, 'robot_description',
+                 lambda message, _: rig.descriptions.append(message), qos.LATCHED)
         with rig.supervisor:
             yield rig
     finally:
@@ -81,7 +76,7 @@ def send(rig, topic, plain_at):
 
 
 def newest(rig, topic):
-    return rig.heard[topic][-1]
+    return rig.heard[topic][-1].plain
 
 
 def vented(rig):
@@ -90,21 +85,26 @@ def vented(rig):
 
 def holds(rig, angle_rad):
     recent = rig.heard['joint_state'][-100:]
-    return len(recent) == 100 and all(abs(m.angle_rad - angle_rad) < 0.03 for m in recent)
+    return len(recent) == 100 and all(
+        abs(heard.plain.angle_rad - angle_rad) < 0.03 for heard in recent)
 
 
 def walk(rig):
     """Let the gait stack walk one short stride; return the angles meanwhile."""
-    begin = len(rig.heard['joint_state'])
+    begin_ns = time.time_ns()
     done = subprocess.run(
         [sys.executable, str(EXAMPLE), '--ros-args', '-p', 'knees:=[/knee]', '-p', 'strides:=1',
          '-p', 'stride_s:=1.5', '-p', 'place_s:=0.5'],
         env=rig.environment, capture_output=True, text=True, timeout=120.0)
     assert done.returncode == 0 and 'knee: error' in done.stderr, done.stderr
-    return [message.angle_rad for message in rig.heard['joint_state'][begin:]]
+    end_ns = time.time_ns()
+    wait_for(lambda: newest(rig, 'joint_state').stamp_ns > end_ns, 60.0, 'the end of the walk')
+    return [heard.plain.angle_rad for heard in rig.heard['joint_state']
+            if begin_ns < heard.plain.stamp_ns < end_ns]
 
 
 def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(knee):
+    wait_for(lambda: all(knee.heard.values()), 60.0, 'a message of every topic')
     wait_for(lambda: holds(knee, 0.3), 150.0, 'the angle of the experiment')
     assert math.isclose(newest(knee, 'joint_reference').angle_rad, 0.3)
     for side in SIDES:      # both pull: co-contraction
