@@ -36,7 +36,7 @@ HANDED_ON = {
     'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),
     'learning': ('true', 'Whether the rules of the controllers may change.'),
     'experiment': ('', 'Experiment both knees play; empty: they wait for references.'),
-    'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 99; 0: none.'),
+    'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 96; 0: none.'),
 }
 
 

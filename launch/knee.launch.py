@@ -60,7 +60,7 @@ def _arguments():
             'seed', default_value='0', description='Seed of the simulated sensors.'),
         DeclareLaunchArgument(
             'realtime_priority', default_value='0',
-            description='Real-time priority of the nodes, 1 to 99; 0: none.'),
+            description='Real-time priority of the nodes, 1 to 96; 0: none.'),
         DeclareLaunchArgument(
             'namespace', default_value='knee', description='Namespace of the joint.'),
     ]

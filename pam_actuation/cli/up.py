@@ -38,8 +38,8 @@ def add_arguments(parser):
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
     parser.add_argument('--domain-id', type=int, default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
-    parser.add_argument('--realtime-priority', type=int, choices=range(100), default=0,
-                        metavar='N', help='of all nodes, 1 to 99 (default: none)')
+    parser.add_argument('--realtime-priority', type=int, choices=range(97), default=0,
+                        metavar='N', help='of all nodes, 1 to 96 (default: none)')
     parser.add_argument('--seconds', type=float, default=None, metavar='S',
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
     parser.add_argument('--policy', metavar='FILE', default=None,

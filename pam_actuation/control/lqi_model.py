@@ -28,9 +28,11 @@ model of low order explains, and the integral of the controller makes up for.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from pam_actuation.experiments.experiment import load_experiment
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 from scipy.linalg import lstsq
@@ -197,6 +199,12 @@ def identify_on_rig(rig, rate_hz, contraction_m=0.014, seed=0):
     """Return the linear model of a rig with a hanging mass, see ``identification_record``."""
     if rig.load != 'hanging_mass':
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
+    return _identified(rig.to_yaml(), rate_hz, contraction_m, seed)
+
+
+@lru_cache(maxsize=16)      # more than a second each; the same rig is asked for again and again
+def _identified(rig_text, rate_hz, contraction_m, seed):
+    rig = load_rig(rig_text)
     return identify(*identification_record(rig, rate_hz, contraction_m, seed), rate_hz)
 
 

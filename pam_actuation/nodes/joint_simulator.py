@@ -32,6 +32,7 @@ class JointSimulator(PhysicsNode):
     """
 
     NAME = 'joint_simulator'
+    REALTIME_RANK = 2
     PARAMETERS = (
         NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint preset, or path of its file.'),
         NodeParameter('valve_type', 'ppr', 'Valves of both muscles.', choices=('ppr', 'hsv')),

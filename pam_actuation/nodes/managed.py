@@ -65,8 +65,9 @@ COMMON_PARAMETERS = (
     NodeParameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
     NodeParameter(
-        'realtime_priority', 0, 'Real-time priority of this process (Linux, SCHED_RR); 0: none. '
-        'Without the right to it the node runs as before.', 0, 99),
+        'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of a '
+        'rig; 0: none. What must be on time comes first: to it watchdog and driver add 3, plant '
+        'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
     NodeParameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
     NodeParameter(
         'lockstep', [''], 'Names of all nodes that go through the simulated time tick by tick '
@@ -88,6 +89,7 @@ class ManagedNode(LifecycleNode):
 
     NAME = ''
     STUCK_AFTER_S = 2.0         # how long the way out may take
+    REALTIME_RANK = 0           # added to a real-time priority: among equals nobody gives way
     FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
     PARAMETERS = ()
 
@@ -345,7 +347,8 @@ class ManagedNode(LifecycleNode):
         self._await_subscriber()
         gc.collect()
         gc.freeze()                  # what exists now stays: no long collections in the loop
-        refused = ask_for_realtime(self.value('realtime_priority'))
+        priority = self.value('realtime_priority')
+        refused = ask_for_realtime(priority and priority + self.REALTIME_RANK)
         if refused:
             self.get_logger().info(f'no real-time scheduling: {refused}')
         if self.simulated_time is not None:

@@ -24,6 +24,7 @@ class PidNode(ControllerNode):
     """Control with fixed gains."""
 
     NAME = 'pid_controller'
+    REALTIME_RANK = 1
     DEFAULT_CONTROLLER = 'pid'
 
 

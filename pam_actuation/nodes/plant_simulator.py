@@ -39,6 +39,7 @@ class PlantSimulator(PhysicsNode):
     """
 
     NAME = 'plant_simulator'
+    REALTIME_RANK = 2
     PARAMETERS = (
         NodeParameter('rig', 'dmsp_5_300_realistic', 'Rig preset, or path of a model file.'),
         NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),

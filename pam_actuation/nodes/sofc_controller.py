@@ -29,6 +29,7 @@ class SofcNode(LearningSwitch, ControllerNode):
     """Control with rules that change while running, unless learning is frozen."""
 
     NAME = 'sofc_controller'
+    REALTIME_RANK = 1
     DEFAULT_CONTROLLER = 'sofc_{valve}'
     PARAMETERS = (
         *ControllerNode.PARAMETERS,

@@ -48,6 +48,7 @@ class ValveDriver(ManagedNode):
     """
 
     NAME = 'valve_driver'
+    REALTIME_RANK = 3
     PARAMETERS = (
         NodeParameter(
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '

@@ -35,6 +35,7 @@ class ValveWatchdog(ManagedNode):
     """
 
     NAME = 'valve_watchdog'
+    REALTIME_RANK = 3
     PARAMETERS = (
         NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
         NodeParameter(

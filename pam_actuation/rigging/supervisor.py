@@ -48,7 +48,7 @@ class Supervisor:
     domain_id : int, optional
         ROS domain; default: that of the environment, else 0.
     realtime_priority : int
-        Of all nodes, 1 to 99; 0: none.
+        Of all nodes, 1 to 96; 0: none.
 
     Attributes
     ----------
