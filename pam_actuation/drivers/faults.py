@@ -102,7 +102,8 @@ FAULT_TABLE = (
           'ahead)', VENT, False, 'next valid reading, ' + _RAMP),
     Fault('pressure_frozen', 'Measured pressure frozen (HSV)',
           'reading unchanged to the last bit for 0.2 s or longer while the valve flow should have '
-          'moved it by 100 kPa', VENT, False, 'first reading that differs, ' + _RAMP),
+          'moved it by 100 kPa; where filling comes near the pressure limit less is enough, '
+          'down to 0.06 s and 10 kPa', VENT, False, 'first reading that differs, ' + _RAMP),
     Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
           'as above, from the lag of the regulator', IGNORE, False,
           'warning: the regulator closes its own loop; ends with a reading that differs'),

@@ -26,6 +26,10 @@ from pam_sim.units import gauge_kpa
 
 NS_PER_S = 1_000_000_000
 _NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all bits set
+# A frozen reading near the pressure limit: full times and changes count with 1.5 times the change
+# of room or more, and never less than these parts of them.
+_SAFE_ROOM = 1.5
+_LEAST_CHANGE, _SHORTEST = 0.1, 0.3
 
 
 def stamp_problem(stamp_ns, now_ns, oldest_s, ahead_s):
@@ -123,10 +127,24 @@ class FrozenMonitor:
         """Add the pressure change [Pa] expected from the flow of one tick."""
         self.expected_pa += change_pa
 
-    def check(self, stamp_ns):
-        """Return True while the reading is frozen as of the newest stamp."""
-        if self._value_pa is not None and abs(self.expected_pa) > self.change_pa:
-            if stamp_ns - self._since_ns >= self.after_s * 1e9:
+    def check(self, stamp_ns, room_pa=math.inf):
+        """
+        Return True while the reading is frozen as of the newest stamp.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        room_pa : float
+            From the reading to the pressure limit [Pa]. Where filling blindly would soon be
+            beyond it, less air and a shorter time are enough.
+
+        """
+        part = 1.0
+        if self.expected_pa > 0.0:
+            part = min(room_pa / (_SAFE_ROOM * self.change_pa), 1.0)
+        if self._value_pa is not None and (
+                abs(self.expected_pa) > max(part, _LEAST_CHANGE) * self.change_pa):
+            if stamp_ns - self._since_ns >= max(part, _SHORTEST) * self.after_s * 1e9:
                 self.frozen = True
         return self.frozen
 

@@ -330,7 +330,8 @@ class SafetySupervisor:
             return 'pressure_timeout', (
                 f'no valid measured pressure for {age_s * 1e3:.0f} ms '
                 f'(limit {lim.measurement_timeout_s * 1e3:.0f} ms){why}')
-        if channel.stamp_ns is not None and self.frozen.check(channel.stamp_ns):
+        room_pa = lim.max_pressure_gauge_pa + P_ATM_PA - channel.pressure_pa
+        if channel.stamp_ns is not None and self.frozen.check(channel.stamp_ns, room_pa):
             text = (f'the measured pressure stands still at {gauge_kpa(channel.pressure_pa):.1f} '
                     f'kPa gauge for {self.frozen.unchanged_s(channel.stamp_ns) * 1e3:.0f} ms, '
                     'although the valve moved air: sensor frozen or valve without effect')
