@@ -29,6 +29,7 @@ from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 from std_msgs.msg import String
 
+GIVING = 'giving the wanted torque'
 INPUTS = {
     'joint_trajectory': 'on_named_trajectory', 'joint_reference': 'on_joint_reference',
     'joint_effort': 'on_named_efforts', 'co_contraction': 'on_co_contraction',
@@ -113,7 +114,7 @@ class JointNode(LearningSwitch, ManagedNode):
         self._warn_of_refusals()
         report_reason(
             self.diagnostics, self.loop.reason,
-            'giving the wanted torque' if self.loop.follows_torque else FOLLOWING)
+            GIVING if self.loop.follows_torque else FOLLOWING)
 
     def _warn_of_refusals(self):
         """Log why a wish was not taken, once per reason."""
