@@ -20,9 +20,9 @@ joint angle in place of the contraction; while it does not run, both muscles are
 A missing pressure or force of either muscle is not used. A wanted co-contraction counts
 until the next one; one that is not finite is ignored, one beyond the limits stops there.
 
-A wanted torque is followed in place of an angle where no wish of an angle is fresh (0.5 s
-after the last ``joint_reference``, at the end of a trajectory). It counts for 0.1 s; then both
-muscles are vented, until there is a torque or an angle again. Every change is bumpless: each
+A wanted torque is followed in place of an angle where no wish of an angle is fresh, 0.5 s
+after the last ``joint_reference`` or the end of a trajectory. It counts for 0.1 s; then both
+muscles are vented until there is a torque or an angle again. Every change is bumpless: each
 law starts from what the other one commanded last.
 """
 
@@ -132,7 +132,8 @@ class JointControllerLoop:
         message, self._trajectory = self._trajectory, None
         references = self.references
         present = math.nan if self._angle is None else self._angle.angle_rad
-        if references.state(now_ns) in (reference_buffer.FRESH, reference_buffer.HELD):
+        if not self.follows_torque and references.state(now_ns) in (
+                reference_buffer.FRESH, reference_buffer.HELD):
             present = references.at(now_ns, now_ns)[0]
         try:
             references.set_trajectory(angle_trajectory(

@@ -22,7 +22,8 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.effort_buffer import EffortBuffer
 from pam_actuation.control.joint_loop import JointControllerLoop
 from pam_actuation.experiments.joint_offline import JointLoops
-from pam_actuation.messages import AngleReference, NamedEfforts, START_NS
+from pam_actuation.messages import (
+    AngleReference, NamedEfforts, NamedTrajectory, START_NS)
 from pam_sim.joint import load_joint
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -81,7 +82,13 @@ def test_an_angle_comes_first_every_change_is_bumpless_and_without_both_it_vents
     assert seen[-1][0] == 1.0 and bench.control.efforts.refusal == ''
     assert bench.internal('flexor_command_pa') == seen[-1][1]
     assert bench.internal('learning') == 0.0
-    run(30, angle=True, torque=True)        # at once
+    present_rad = bench.internal('angle_rad')
+    bench.control.on_named_trajectory(
+        NamedTrajectory(bench.now_ns, (), ((100 * MS_NS, (ANGLE_RAD,), ()),)))
+    run(30, angle=True, torque=True)        # at once, from where it is
+    begin_rad = bench.control.references.trajectory.angle_rad[0]
+    assert begin_rad == pytest.approx(present_rad, abs=5e-3)
+    assert abs(begin_rad - ANGLE_RAD) > 0.02
     assert [row[0] for row in seen[-31:]] == [1.0] + [0.0] * 30
     changes = np.flatnonzero(np.diff([row[0] for row in seen]))
     assert len(changes) == 2
