@@ -120,6 +120,7 @@ def nominal_force_n(rig, pressure_pa, contraction_m):
     Parameters
     ----------
     rig : pam_sim.rig.Rig
+        Its muscle and ``force_map_gain`` count.
     pressure_pa, contraction_m : float or numpy.ndarray
         Absolute pressure and contraction, broadcast. Never negative, 0 beyond the stroke.
 
