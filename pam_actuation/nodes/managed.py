@@ -65,8 +65,8 @@ COMMON_PARAMETERS = (
     NodeParameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
     NodeParameter(
-        'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of a '
-        'rig; 0: none. What must be on time comes first: to it watchdog and driver add 3, plant '
+        'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of '
+        'a rig; 0: none. What must be on time comes first: watchdog and driver add 3 to it, plant '
         'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
     NodeParameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
     NodeParameter(
