@@ -133,6 +133,15 @@ class NamedTrajectory:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedEfforts:
+    """Wanted torques [N m] of the tendons of joints, by name, flexion positive: joint_effort."""
+
+    stamp_ns: int
+    names: tuple
+    efforts: tuple
+
+
+@dataclass(frozen=True, slots=True)
 class ValveSignal:
     """
     What goes to the valve: topics valve_signal and, as a wish to the driver, valve_command.

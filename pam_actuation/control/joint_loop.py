@@ -19,11 +19,18 @@ No ROS inside. The faults of its inputs are handled as by ``loop.ControllerLoop`
 joint angle in place of the contraction; while it does not run, both muscles are vented.
 A missing pressure or force of either muscle is not used. A wanted co-contraction counts
 until the next one; one that is not finite is ignored, one beyond the limits stops there.
+
+A wanted torque is followed in place of an angle where no wish of an angle is fresh, 0.5 s
+after the last ``joint_reference`` or the end of a trajectory. It counts for 0.1 s; then both
+muscles are vented until there is a torque or an angle again. Every change is bumpless: each
+law starts from what the other one commanded last.
 """
 
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.effort_buffer import EffortBuffer
+from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory
 from pam_actuation.control.loop import (
     fresh, measurement_reason, REFERENCE_REASONS, STALL_NS)
@@ -41,6 +48,9 @@ _INPUT_NAMES = (
     'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced', 'joint_state_stamp_sec',
     'joint_state_stamp_nanosec', 'angle_rad', *codes.reference_names('rad'), 'elapsed_s',
     *(f'{side}_pressure_pa' for side in SIDES), *(f'{side}_force_n' for side in SIDES))
+_TORQUE_NAMES = (
+    'follows_torque', 'joint_effort_stamp_sec', 'joint_effort_stamp_nanosec', 'wanted_torque_n_m',
+    *JointTorque.STATE_NAMES)
 
 
 class JointControllerLoop:
@@ -51,11 +61,11 @@ class JointControllerLoop:
     ----------
     controller : JointController
         As ``load_controller`` gives it for a joint.
-    angle_range_rad : tuple of float
-        Measurements outside are implausible: the encoder is wrong, not the joint. Wishes
-        outside are refused.
-    joint : str
-        Name by which it is found in a trajectory of several joints.
+    joint : pam_sim.joint.JointRig
+        Measurements outside its range are implausible: the encoder is wrong, not the joint.
+        Wishes outside are refused. Its muscles turn wanted torques into pressures.
+    name : str
+        Of the joint, by which it is found in messages to several joints.
 
     Raises
     ------
@@ -64,25 +74,29 @@ class JointControllerLoop:
 
     """
 
-    def __init__(self, controller, angle_range_rad=(-math.pi, math.pi), joint='muscle'):
+    def __init__(self, controller, joint, name='muscle'):
         if tracked_by(controller) != JOINT:
             raise InputError('this controller tracks a single muscle; a joint needs one with '
                              '`mode: joint`', controller.rig_name)
         self.controller = controller
+        self.torque = JointTorque(joint, controller)
         self.references = ReferenceBuffer(JOINT)
+        self.efforts = EffortBuffer(name)
+        self.follows_torque = False     # and not an angle
         self.rejected_references = 0
         self.refusal = ''           # why the newest trajectory was not taken
         self.reason = codes.REASONS[codes.NO_ANGLE]
         self.ticks = 0
-        self.names = _INPUT_NAMES + tuple(controller.state_names)
-        self._range = angle_range_rad
-        self._joint = joint
+        self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
+        self._range = joint.range_rad
+        self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
         self._pressures = [None, None]
         self._forces = [None, None]
         self._last_tick_ns = None
         self._used_ns = None
+        self._commands_pa = None    # of the last tick, while a law runs
 
     @property
     def rate_hz(self):
@@ -118,16 +132,21 @@ class JointControllerLoop:
         message, self._trajectory = self._trajectory, None
         references = self.references
         present = math.nan if self._angle is None else self._angle.angle_rad
-        if references.state(now_ns) in (reference_buffer.FRESH, reference_buffer.HELD):
+        if not self.follows_torque and references.state(now_ns) in (
+                reference_buffer.FRESH, reference_buffer.HELD):
             present = references.at(now_ns, now_ns)[0]
         try:
             references.set_trajectory(angle_trajectory(
-                message.stamp_ns, message.names, message.points, self._joint, self._range, now_ns,
+                message.stamp_ns, message.names, message.points, self._name, self._range, now_ns,
                 present))
             self.refusal = ''
         except InputError as error:
             self.refusal = str(error)
             self.rejected_references += 1
+
+    def on_named_efforts(self, message):
+        """Take ``NamedEfforts``; the next tick counts them or, where unusable, refuses them."""
+        self.efforts.take(message)
 
     def on_co_contraction(self, message):
         """Take a wanted mean ``Pressure`` of both muscles, absolute."""
@@ -146,46 +165,84 @@ class JointControllerLoop:
             Every input used and every internal of the tick.
 
         """
-        controller, references = self.controller, self.references
+        controller = self.controller
         if self._trajectory is not None:
             self._take_trajectory(now_ns)
+        changed = self._choose_law(now_ns)
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
-        angle = math.nan if self._angle is None else self._angle.angle_rad
-        reason = measurement_reason(self._angle, angle, self._range, _REASONS, now_ns)
-        if reason == codes.OK:
-            reason = REFERENCE_REASONS[references.state(now_ns)]
+        reason = self._reason(now_ns)
         self.reason = codes.REASONS[reason]
         running = reason in codes.RUNNING
         if stalled or not running:
             controller.pause()
-        may_learn = bool(learning and reason == codes.OK and not controller.freeze_learning)
-        inputs = (math.nan,) * 10
-        stamp_ns, commands_pa = -1, (P_ATM_PA, P_ATM_PA)
+            self.torque.pause()
+            self._commands_pa = None
+        may_learn = bool(learning and reason == codes.OK and not self.follows_torque
+                         and not controller.freeze_learning)
+        inputs, stamp_ns, commands_pa = (math.nan,) * 10, -1, (P_ATM_PA, P_ATM_PA)
         if running:
             stamp_ns = self._angle.stamp_ns
-            inputs = self._inputs(now_ns, stamp_ns, angle)
-            commands_pa = controller.step(
-                *inputs[:5], may_learn, inputs[5], inputs[6:8], inputs[8:])
+            inputs = self._inputs(now_ns, stamp_ns, changed)
+            commands_pa = self._commands_pa = self._run(inputs, may_learn)
         self._used_ns = stamp_ns if running else None
         values = (
             float(self.ticks), float(reason), float(may_learn), float(stalled),
             float(controller.rules_replaced), *codes.split_stamp(stamp_ns), *inputs,
-            *controller.state_values())
+            *controller.state_values(), float(self.follows_torque),
+            *codes.split_stamp(self.efforts.stamp_ns), self.efforts.torque_n_m,
+            *self.torque.state_values())
         self.ticks += 1
         return (tuple(Pressure(now_ns, pressure_pa) for pressure_pa in commands_pa),
                 ControllerState(now_ns, self.names, values))
 
-    def _inputs(self, now_ns, measured_ns, angle):
+    def _choose_law(self, now_ns):
+        """Let a fresh wish of an angle decide, else a fresh torque; return if that changed."""
+        before = self.follows_torque
+        angle_wanted = self.references.state(now_ns) == reference_buffer.FRESH
+        self.efforts.judge(now_ns, angle_wanted)
+        if angle_wanted:
+            self.follows_torque = False
+        elif self.efforts.fresh(now_ns):
+            self.follows_torque = True
+        return self.follows_torque != before
+
+    def _reason(self, now_ns):
+        """Return the code for the inputs of this tick, one of ``codes.RUNNING`` if usable."""
+        angle = math.nan if self._angle is None else self._angle.angle_rad
+        reason = measurement_reason(self._angle, angle, self._range, _REASONS, now_ns)
+        if reason != codes.OK:
+            return reason
+        if self.follows_torque:
+            return codes.OK if self.efforts.fresh(now_ns) else codes.EFFORT_LOST
+        return REFERENCE_REASONS[self.references.state(now_ns)]
+
+    def _run(self, inputs, may_learn):
+        """Return the commands [Pa] of the law that counts; the other one stands aside."""
+        controller, pressures_pa, forces_n = self.controller, inputs[6:8], inputs[8:]
+        if not self.follows_torque:
+            self.torque.pause()
+            return controller.step(*inputs[:5], may_learn, inputs[5], pressures_pa, forces_n)
+        commands_pa = self.torque.step(
+            inputs[0], self.efforts.torque_n_m, controller.wanted_co_contraction_pa, forces_n,
+            pressures_pa)
+        controller.stand_aside(commands_pa)
+        return commands_pa
+
+    def _inputs(self, now_ns, measured_ns, changed):
         """Return angle, references, time passed, pressures and forces as one tuple of floats."""
-        # The error belongs to the time of the measurement, the preview to now.
-        reference = self.references.at(now_ns, measured_ns)
-        lead = self.references.at(now_ns, now_ns + round(self.controller.lead_s * 1e9))
+        reference = lead = (math.nan, math.nan)
+        if not self.follows_torque:
+            # The error belongs to the time of the measurement, the preview to now.
+            reference = self.references.at(now_ns, measured_ns)
+            lead = self.references.at(now_ns, now_ns + round(self.controller.lead_s * 1e9))
         elapsed_s = math.nan
         if self._used_ns is not None:
             elapsed_s = (measured_ns - self._used_ns) * 1e-9
         pressures = (self._pressures[side].pressure_pa if fresh(self._pressures[side], now_ns)
                      else math.nan for side in (FLEXOR, EXTENSOR))
+        if changed and self._commands_pa is not None:
+            pressures = self._commands_pa       # a law goes on from the commands of the other
         forces = (self._forces[side].force_n if fresh(self._forces[side], now_ns)
                   else math.nan for side in (FLEXOR, EXTENSOR))
-        return (angle, *reference, *lead, elapsed_s, *pressures, *forces)
+        return (self._angle.angle_rad, *reference, *lead, elapsed_s, *pressures, *forces)

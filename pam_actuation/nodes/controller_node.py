@@ -29,12 +29,17 @@ MOST_WRONG_STEPS = 20
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
 INPUTS = ('reference_trajectory', 'reference', *MEASURED)
+FOLLOWING = 'following the reference'
 
 
-def report_reason(diagnostics, reason):
-    """Report what a controller loop says of its tick: one of ``REASONS``, the first is well."""
+def report_reason(diagnostics, reason, well=FOLLOWING):
+    """
+    Report what a controller loop says of its tick, one of ``REASONS``.
+
+    The first of them is well; what the loop does then are the words ``well``.
+    """
     if reason == REASONS[0]:
-        diagnostics.update(OK, 'following the reference')
+        diagnostics.update(OK, well)
     else:
         diagnostics.update(WARN, reason)
 

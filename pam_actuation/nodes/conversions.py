@@ -34,6 +34,7 @@ from pam_actuation.messages import Contraction
 from pam_actuation.messages import ControllerState
 from pam_actuation.messages import Force
 from pam_actuation.messages import JointAngle
+from pam_actuation.messages import NamedEfforts
 from pam_actuation.messages import NamedTrajectory
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import Reference
@@ -63,6 +64,7 @@ JOINT_MESSAGE_TYPES = {
     'joint_state': JointState,
     'joint_reference': JointState,
     'joint_trajectory': JointTrajectory,
+    'joint_effort': JointState,
     'co_contraction': FluidPressure,
 }
 
@@ -122,9 +124,7 @@ def _read_trajectory(message):
     if not any(len(p.positions) for p in points):
         return ReferenceTrajectory(
             stamp_ns(message), times_ns, force_n=tuple(_first(p.effort) for p in points))
-    return ReferenceTrajectory(
-        stamp_ns(message), times_ns,
-        *_motion(points))
+    return ReferenceTrajectory(stamp_ns(message), times_ns, *_motion(points))
 
 
 def _motion(points):
@@ -147,6 +147,10 @@ def _read_joint_trajectory(message):
     return NamedTrajectory(stamp_ns(message), tuple(message.joint_names), tuple(
         (time_ns, tuple(point.positions), tuple(point.velocities))
         for time_ns, point in zip(_times_ns(points), points)))
+
+
+def _read_joint_effort(message):
+    return NamedEfforts(stamp_ns(message), tuple(message.name), tuple(message.effort))
 
 
 def _read_valve_signal(message):
@@ -172,6 +176,7 @@ _READERS = {
     'joint_state': _read_joint_state,
     'joint_reference': _read_joint_reference,
     'joint_trajectory': _read_joint_trajectory,
+    'joint_effort': _read_joint_effort,
     'co_contraction': _read_pressure,
 }
 
@@ -216,7 +221,7 @@ class RosWriter:
         self._fill = getattr(self, '_fill_' + {
             'pressure_command': 'pressure', 'supply_pressure': 'pressure',
             'co_contraction': 'pressure', 'external_force': 'force',
-            'valve_command': 'valve_signal'}.get(topic, topic))
+            'valve_command': 'valve_signal', 'joint_effort': 'valve_signal'}.get(topic, topic))
         if topic in ('reference', 'contraction', 'joint_state', 'joint_reference'):
             self._message.name = [muscle]
         elif topic in ('reference_trajectory', 'joint_trajectory'):

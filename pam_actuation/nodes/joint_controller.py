@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The controller of a joint on ROS: angle and reference in, two pressure commands out."""
+"""The controller of a joint on ROS: angle and wishes in, two pressure commands out."""
 
 import sys
 
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.controller_node import FOLLOWING
 from pam_actuation.nodes.controller_node import report_reason
 from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.learning_switch import LearningSwitch
@@ -28,18 +29,21 @@ from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 from std_msgs.msg import String
 
+GIVING = 'giving the wanted torque'
 INPUTS = {
     'joint_trajectory': 'on_named_trajectory', 'joint_reference': 'on_joint_reference',
-    'co_contraction': 'on_co_contraction', 'joint_state': 'on_joint_state'}
+    'joint_effort': 'on_named_efforts', 'co_contraction': 'on_co_contraction',
+    'joint_state': 'on_joint_state'}
 
 
 class JointNode(LearningSwitch, ManagedNode):
     """
-    Track the angle of a joint with both its muscles; on every way out ask both to be vented.
+    Turn a joint with both its muscles; on every way out ask both to be vented.
 
-    Its own namespace is that of the joint; the drivers of the muscles run in ``flexor`` and
-    ``extensor`` below it. The joint's URDF is on ``robot_description``, as other programs
-    expect it; the parameter ``muscle`` is the joint's name there and in trajectories.
+    It tracks an angle or, where none is asked for, gives a torque. Its own namespace is that
+    of the joint; the drivers of the muscles run in ``flexor`` and ``extensor`` below it. The
+    joint's URDF is on ``robot_description``, as other programs expect it; the parameter
+    ``muscle`` is the joint's name there, in trajectories and in efforts.
     """
 
     NAME = 'joint_controller'
@@ -55,7 +59,7 @@ class JointNode(LearningSwitch, ManagedNode):
     )
 
     loop = None
-    _refusal = ''
+    _refusals = ()
 
     def setup(self):
         """Load the controller, create the topics."""
@@ -68,7 +72,7 @@ class JointNode(LearningSwitch, ManagedNode):
         name = self.value('controller') or f'sofc_joint_{valve}'
         load_controller(name, joint).step(0.0, 0.0, 0.0, 0.0, 0.0)  # compiled before time counts
         self.loop = JointControllerLoop(
-            load_controller(name, joint), joint.range_rad, self.value('muscle'))
+            load_controller(name, joint), joint, self.value('muscle'))
         self._description = self.create_publisher(String, 'robot_description', qos.LATCHED)
         self._description.publish(String(data=joint_urdf(joint, self.value('muscle'))))
         self.learning = self.value('learning')
@@ -107,11 +111,17 @@ class JointNode(LearningSwitch, ManagedNode):
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)
         self.send('controller_state', state)
-        if self.loop.refusal != self._refusal:
-            self._refusal = self.loop.refusal
-            if self._refusal:
-                self.get_logger().warning(f'a trajectory was refused: {self._refusal}')
-        report_reason(self.diagnostics, self.loop.reason)
+        self._warn_of_refusals()
+        report_reason(
+            self.diagnostics, self.loop.reason,
+            GIVING if self.loop.follows_torque else FOLLOWING)
+
+    def _warn_of_refusals(self):
+        """Log why a wish was not taken, once per reason."""
+        before, self._refusals = self._refusals, (self.loop.refusal, self.loop.efforts.refusal)
+        for refusal in self._refusals:
+            if refusal and refusal not in before:
+                self.get_logger().warning(f'a wish was refused: {refusal}')
 
     def safe_stop(self, why):
         """Command atmospheric pressure: both drivers vent."""
@@ -125,8 +135,11 @@ class JointNode(LearningSwitch, ManagedNode):
         if self.loop is None:
             return values
         return (*values, ('learning', self.learning),
+                ('follows', 'torque' if self.loop.follows_torque else 'angle'),
                 ('references.refused', self.loop.rejected_references),
-                ('references.refusal', self.loop.refusal))
+                ('references.refusal', self.loop.refusal),
+                ('efforts.refused', self.loop.efforts.rejected),
+                ('efforts.refusal', self.loop.efforts.refusal))
 
 
 def main(args=None):

@@ -21,22 +21,17 @@ from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.joint_loop import JointControllerLoop
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.joint_plant_loop import JointPlantLoop
-from pam_actuation.messages import AngleReference, JointAngle, Pressure
+from pam_actuation.messages import AngleReference, JointAngle, Pressure, START_NS
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
-from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
 
 MS_NS = 1_000_000
-PERIOD_NS = 5 * MS_NS
-START_NS = 1_000_000_000
 
 
 @pytest.fixture(scope='module')
@@ -46,45 +41,23 @@ def joint():
 
 @pytest.fixture
 def loop(joint):
-    return JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint.range_rad)
+    return JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint)
 
 
-class Bench:
-    """Plant, two drivers, controller and reference, tick by tick as the nodes run them."""
+class Bench(JointLoops):
+    """The live loops, with a reference if one is given."""
 
-    def __init__(self, joint, loop, reference=None, seed=3):
-        self.joint, self.loop, self.reference = joint, loop, reference
-        self.plant = JointPlantLoop(joint, seed=seed)
-        self.drivers = [DriverLoop('ppr', driver_config(rig))
-                        for rig in (joint.flexor, joint.extensor)]
-        self.now_ns = START_NS
-        self.plant.advance_to(self.now_ns)
-        self.ticks = 0
+    def __init__(self, joint, loop, reference=None):
+        super().__init__(joint, loop, seed=3)
+        self.reference = reference
 
-    def tick(self, angle=None):
+    def tick(self, **instead):
         """Run one period; return the true angle [rad] and the commands."""
-        self.now_ns += PERIOD_NS
-        self.plant.advance_to(self.now_ns)
-        messages = self.plant.sample(self.now_ns)
         if self.reference is not None:
-            for topic, plain in self.reference.tick(self.now_ns).items():
-                getattr(self.loop, f'on_{topic}')(plain)
-        state = messages['joint_state']
-        self.loop.on_joint_state(state if angle is None else angle)
-        for k, side in enumerate(SIDES):
-            self.loop.on_pressure(k, messages[f'{side}/pressure'])
-            self.loop.on_force(k, messages[f'{side}/force'])
-        commands, self.state = self.loop.tick(self.now_ns)
-        self.ticks += 1
-        for k, (side, driver) in enumerate(zip(SIDES, self.drivers)):
-            driver.on_pressure(messages[f'{side}/pressure'])
-            driver.on_command(commands[k], self.ticks)
-            self.plant.signals[side].take(driver.tick(self.now_ns)[0])
+            for topic, plain in self.reference.tick(self.now_ns + self.period_ns).items():
+                getattr(self.control, f'on_{topic}')(plain)
+        commands = super().tick(**instead)
         return self.plant.plant.angle_rad, commands
-
-
-def internal(state, name):
-    return state.values[state.names.index(name)]
 
 
 def test_it_tracks_a_sine_of_the_joint(joint, loop):
@@ -98,7 +71,7 @@ def test_it_tracks_a_sine_of_the_joint(joint, loop):
     first, last = (math.sqrt(np.mean(part ** 2)) for part in (degrees[1200:1600], degrees[-400:]))
     assert last < 0.3 < first
     assert loop.reason == codes.REASONS[codes.OK]
-    assert internal(bench.state, 'extensor_pressure_pa') > P_ATM_PA + 50e3
+    assert bench.internal('extensor_pressure_pa') > P_ATM_PA + 50e3
 
 
 @pytest.mark.parametrize('spoiled, reason', [
@@ -112,12 +85,12 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
     for _ in range(20):
         _, commands = bench.tick()
     assert min(command.pressure_pa for command in commands) > P_ATM_PA + 10e3
-    _, commands = bench.tick(spoiled(bench.now_ns + PERIOD_NS))
+    _, commands = bench.tick(joint_state=spoiled(bench.now_ns + bench.period_ns))
     assert [command.pressure_pa for command in commands] == [P_ATM_PA] * 2
     assert loop.reason == codes.REASONS[reason]
     _, commands = bench.tick()
     assert loop.reason == codes.REASONS[codes.OK]
-    assert internal(bench.state, 'tick') == 21
+    assert bench.internal('tick') == 21
 
 
 def test_without_reference_or_with_one_long_lost_it_vents(joint, loop):
@@ -157,7 +130,7 @@ def test_co_contraction_follows_what_is_asked_within_the_limits(joint, loop):
 
 def test_each_loop_refuses_the_controller_of_the_other(joint):
     with pytest.raises(InputError, match='single muscle'):
-        JointControllerLoop(load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic')))
+        JointControllerLoop(load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic')), joint)
     with pytest.raises(InputError, match='joint'):
         ControllerLoop(load_controller('sofc_joint_ppr', joint))
 

@@ -44,6 +44,7 @@ SAMPLES = {
 JOINT_SAMPLES = {
     'joint_state': messages.JointAngle(STAMP_NS, 0.25, -1.5),
     'joint_reference': messages.AngleReference(STAMP_NS, 0.25, -0.1),
+    'joint_effort': messages.NamedEfforts(STAMP_NS, ('hip', 'knee'), (1.5, -20.0)),
     'co_contraction': messages.Pressure(STAMP_NS, 401_325.0),
 }
 

@@ -22,9 +22,10 @@ import sys
 import time
 
 from live_rig import LiveRig, wait_for
-from pam_actuation.messages import Pressure
+from pam_actuation.messages import NamedEfforts, Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import RosWriter, type_of
+from pam_actuation.nodes.joint_controller import GIVING
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_sim.joint.parameters import SIDES
@@ -129,6 +130,15 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
     assert processes['/knee/reference_generator'].wait(10.0)
     angles = walk(knee)
     assert max(angles) > 0.2 and min(angles) < 0.0
+
+    # A torque counts once no angle is wanted any more.
+    push = send(knee, 'joint_effort', lambda now: NamedEfforts(now, ('knee',), (0.1,)))
+
+    def pushed():
+        push()
+        return (abs(newest(knee, 'joint_state').torque_n_m - 0.1) < 0.02
+                and knee.health['joint_controller'][-1].message == GIVING)
+    wait_for(pushed, 30.0, 'the wanted torque')
 
     processes['/knee/joint_controller'].send_signal(signal.SIGKILL)
     wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')

@@ -224,6 +224,28 @@ class JointController(WrappedLaw):
         self._par[P_CO_CONTRACTION] = min(
             max(P_ATM_PA + gauge_pa, par[P_LOWEST]), par[P_HIGHEST])
 
+    @property
+    def wanted_co_contraction_pa(self):
+        """Mean pressure of both muscles asked for [Pa absolute]."""
+        return float(self._par[P_CO_CONTRACTION])
+
+    @property
+    def co_contraction_reach_pa(self):
+        """How far the co-contraction may move in one tick [Pa]."""
+        return float(self._par[P_REACH])
+
+    def stand_aside(self, commands_pa):
+        """
+        Take note of what another law commands in place of this one.
+
+        ``commands_pa``: pressures of flexor and extensor, absolute Pa. The next tick starts
+        bumplessly, and with their mean as co-contraction.
+        """
+        self.pause()
+        self._commands[:] = commands_pa
+        self._st[S_KNOWN] = 1.0
+        self._st[S_CO_CONTRACTION] = self._commands.mean()
+
     def compiled_arguments(self):
         """Return (par, state) of this module's functions and the arguments of the law."""
         return (self._par, self._st), self.law.compiled_arguments()

@@ -109,8 +109,23 @@ def _torque_n_m(joint, angle, u_pa, co_contraction_pa, lowest_pa, highest_pa):
             (joint.flexor, joint.extensor), joint.contractions_m(angle),
             (mean + difference, mean - difference),
             (value['flexor_radius_m'], -value['extensor_radius_m'])):
-        strain = np.clip(contraction, 0.0, rig.muscle.stroke_m) / rig.muscle.length_m
-        force = rig.muscle.law.law.force_n(pressure - P_ATM_PA, strain, 'allow')
-        force = np.where(contraction > rig.muscle.stroke_m, 0.0, force)
-        torque = torque + arm * rig.parameters['force_map_gain'] * force
+        torque = torque + arm * nominal_force_n(rig, pressure, contraction)
     return torque
+
+
+def nominal_force_n(rig, pressure_pa, contraction_m):
+    """
+    Return the force [N] of the nominal muscle of a rig at rest, without effects.
+
+    Parameters
+    ----------
+    rig : pam_sim.rig.Rig
+        Its muscle and ``force_map_gain`` count.
+    pressure_pa, contraction_m : float or numpy.ndarray
+        Absolute pressure and contraction, broadcast. Never negative, 0 beyond the stroke.
+
+    """
+    strain = np.clip(contraction_m, 0.0, rig.muscle.stroke_m) / rig.muscle.length_m
+    force = rig.muscle.law.law.force_n(pressure_pa - P_ATM_PA, strain, 'allow')
+    return np.where(contraction_m > rig.muscle.stroke_m, 0.0,
+                    rig.parameters['force_map_gain'] * force)
