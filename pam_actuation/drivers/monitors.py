@@ -134,6 +134,7 @@ class FrozenMonitor:
         Parameters
         ----------
         stamp_ns : int
+            Of the newest reading.
         room_pa : float
             From the reading to the pressure limit [Pa]. Where filling blindly would soon be
             beyond it, less air and a shorter time are enough.
