@@ -116,10 +116,11 @@ class GaitStack(Node):
     def tick(self):
         """Send what is due."""
         now_s = time.monotonic()
-        missing = [knee.name for knee in self.knees if not knee.present]
-        if missing and self.begin_s is None:
-            self._give_up_late(now_s, 'nobody is there for', missing)
-            return
+        if self.begin_s is None:
+            missing = [knee.name for knee in self.knees if not knee.present]
+            if missing:
+                self._give_up_late(now_s, 'nobody is there for', missing)
+                return
         silent = [knee.name for knee in self.knees if knee.silent]
         if silent:
             self.get_logger().error(f'nothing heard of {", ".join(silent)}')

@@ -23,11 +23,12 @@ leak) stay unknown to the driver.
 import math
 
 from pam_actuation.drivers.config import DriverConfig
+from pam_actuation.drivers.hsv import HsvConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 _UNKNOWN_SWING_HZ = 5.9
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
-_GAIN, _GAIN_AT_ONCE = 0.29, 0.7
+_GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
 _GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
 
 

@@ -211,13 +211,11 @@ def run(count, first=0, progress=None):
     """
     found, outcomes, bad = sources(), Counter(), []
     with tempfile.TemporaryDirectory() as folder:
-        for name, text, load in found:      # what only the first load takes is not the file's
-            path = Path(folder) / 'right.yaml'
+        path = Path(folder) / 'wrong.yaml'
+        for _, text, load in found:     # right so far; what a first load takes is not the file's
             path.write_text(text, encoding='utf-8')
             load(path)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'wrong.yaml'
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         for number in range(first, first + count):
             name, raw, load = mutated(number, found)
             path.write_bytes(raw)
