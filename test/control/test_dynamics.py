@@ -24,14 +24,18 @@ STILL = {'integral_pa_per_m_s': 0.0, 'feedback_gain_pa': 0.0, 'proportional_pa_p
          'derivative_pa_s_per_m': 0.0, 'start_time_s': 0.01}
 
 
-def test_a_move_starts_and_ends_at_rest_and_its_rate_is_its_slope():
-    assert dynamics.to_go(0.01, 0.3, 0.3) == (0.01, 0.0)
-    assert dynamics.to_go(0.01, 0.0, 0.3) == (0.0, 0.0)
-    assert dynamics.to_go(0.01, 0.15, 0.3)[0] == pytest.approx(0.005)
-    assert dynamics.to_go(0.01, 0.4, 0.3) == (0.01, 0.0)        # has not begun
+@pytest.mark.parametrize('form', [0.0, 1.0])
+def test_a_move_starts_and_ends_at_rest_and_its_rate_is_its_slope(form):
+    assert dynamics.to_go(0.01, 0.3, 0.3, form) == (0.01, 0.0)
+    assert dynamics.to_go(0.01, 0.0, 0.3, form) == (0.0, 0.0)
+    assert dynamics.to_go(0.01, 0.15, 0.3, form)[0] == pytest.approx(0.005)
+    assert dynamics.to_go(0.01, 0.4, 0.3, form) == (0.01, 0.0)        # has not begun
     left = np.linspace(0.3, 0.0, 301)
-    rest = np.array([dynamics.to_go(0.01, t, 0.3) for t in left])
-    assert np.allclose(np.gradient(-rest[:, 0], 1e-3)[1:-1], rest[1:-1, 1], atol=2e-5)
+    rest = np.array([dynamics.to_go(0.01, t, 0.3, form) for t in left])
+    assert np.allclose(np.gradient(-rest[:, 0], 1e-3)[1:-1], rest[1:-1, 1], atol=3e-5)
+    jerk = np.abs(np.diff(rest[:, 1], 2))
+    first = jerk[0] / jerk.max()
+    assert (first < 0.1) if form else (first > 0.9)
 
 
 def commands(controller, references, lead=0):
@@ -64,6 +68,24 @@ def test_a_jump_that_was_not_seen_ahead_waits_one_preview():
     assert unseen[40 + 20] == pytest.approx(-0.01, rel=1e-3)
     assert unseen[40 + 20 + 30] == pytest.approx(-0.005, rel=0.05)
     assert seen[40 + 30] == pytest.approx(-0.005, rel=0.05)
+
+
+def test_standing_still_just_after_a_jump_counts_for_more_passes():
+    def learned(passes, settling_time_s):
+        settings = {**STILL, 'jump_time_s': 0.1, 'slew_pa_per_s': 1e9, 'credit_delay_s': 0.02,
+                    'feedforward_learning': 0.1, 'motion_learning': 0.0, 'guard_ratio': 0.0,
+                    'settling_passes': passes, 'settling_time_s': settling_time_s}
+        controller = sofc(settings)
+        for k in range(200):
+            wanted = 0.008 if k < 40 else 0.018
+            # The move is over after 40 ticks, preview included.
+            controller.step(wanted, wanted - 1e-4, 0.0, wanted, 0.0, k >= 100)
+        return float(np.abs(controller.rules.feedforward).sum())
+
+    usual = learned(1.0, 10.0)
+    assert usual > 0.0
+    assert learned(4.0, 10.0) == pytest.approx(4.0 * usual, rel=0.02)
+    assert learned(4.0, 0.01) == pytest.approx(usual, rel=0.02)
 
 
 def test_moving_takes_damping_mass_and_the_lag_of_the_valve():

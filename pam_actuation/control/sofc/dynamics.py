@@ -24,7 +24,9 @@ valve swallows::
 
 A jump of the reference has no acceleration to feed forward. It is turned into a
 move of fixed duration along ``s = 10 q^3 - 15 q^4 + 6 q^5``, which starts and ends
-at rest with no acceleration (minimum jerk, Flash and Hogan 1985).
+at rest with no acceleration (minimum jerk, Flash and Hogan 1985), or along
+``s = 35 q^4 - 84 q^5 + 70 q^6 - 20 q^7``, whose jerk is nothing there as well: the
+lag of a valve asks for the change of pressure, and that has the jerk in it.
 """
 
 from pam_actuation.control import inputs as place
@@ -53,13 +55,17 @@ def jumps(par, st, inp):
 
 
 @compiled
-def to_go(size_m, left_s, duration_s):
+def to_go(size_m, left_s, duration_s, form):
     """Return how much of a move is still to come [m] and the rate it has now [m/s]."""
     if not left_s > 0.0:
         return 0.0, 0.0
     q = max(1.0 - left_s / duration_s, 0.0)
-    done = q * q * q * (10.0 + q * (6.0 * q - 15.0))
-    rate = 30.0 * q * q * (1.0 - q) * (1.0 - q) / duration_s
+    if form > 0.5:
+        done = q * q * q * q * (35.0 + q * (q * (70.0 - 20.0 * q) - 84.0))
+        rate = 140.0 * q * q * q * (1.0 - q) * (1.0 - q) * (1.0 - q) / duration_s
+    else:
+        done = q * q * q * (10.0 + q * (6.0 * q - 15.0))
+        rate = 30.0 * q * q * (1.0 - q) * (1.0 - q) / duration_s
     return size_m * (1.0 - done), size_m * rate
 
 
@@ -74,10 +80,10 @@ def smooth_jump(par, st, jump_m, wait_s, s_size, s_left):
     if not duration > 0.0:
         return 0.0, 0.0
     if jump_m != 0.0:
-        rest, _ = to_go(st[s_size], st[s_left], duration)
+        rest, _ = to_go(st[s_size], st[s_left], duration, par[at.P_JUMP_FORM])
         st[s_size] = rest + jump_m
         st[s_left] = duration + wait_s
-    rest, rate = to_go(st[s_size], st[s_left], duration)
+    rest, rate = to_go(st[s_size], st[s_left], duration, par[at.P_JUMP_FORM])
     st[s_left] = max(0.0, st[s_left] - par[at.P_PERIOD])
     return rest, rate
 

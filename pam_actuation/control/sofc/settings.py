@@ -110,6 +110,11 @@ SETTINGS = (
     Setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
     Setting('valve_gap_pa', 'Pa', 4e4, 1e3, 1e6,
             'expected minus measured pressure that freezes learning and integral'),
+    Setting('jump_form', '-', 0.0, 0.0, 1.0,
+            'move made of a jump: 0 minimum jerk, 1 without jerk at its ends'),
+    Setting('settling_passes', '-', 1.0, 0.0, 20.0,
+            'passes that standing still for pass_time_s counts just after such a move'),
+    Setting('settling_time_s', 's', 0.25, 0.0, 10.0, 'how long that is, from the end of the move'),
 )
 
 NAMES = tuple(setting.name for setting in SETTINGS)

@@ -182,9 +182,15 @@ def _passes(par, st, knot_place, motion_place, rate_place):
     Return which part of a pass over the feed-forward and the motion rules this tick was.
 
     A pass is the way from one knot to the next; standing still for ``pass_time_s`` also
-    counts as one.
+    counts as one, just after a jump as ``settling_passes``: what is missing there is an
+    error of the rules, later it is creep.
     """
     still = par[at.P_PERIOD] / par[at.P_PASS_TIME]
+    if st[at.S_JUMP_LEFT] > 0.0:
+        st[at.S_SETTLING_LEFT] = par[at.P_SETTLING_TIME]
+    elif st[at.S_SETTLING_LEFT] > 0.0:
+        st[at.S_SETTLING_LEFT] -= par[at.P_PERIOD]
+        still *= par[at.P_SETTLING_PASSES]
     a_pass = still
     motion_pass = still
     if st[at.S_HISTORY] > 0.0:
