@@ -70,22 +70,32 @@ def test_a_jump_that_was_not_seen_ahead_waits_one_preview():
     assert seen[40 + 30] == pytest.approx(-0.005, rel=0.05)
 
 
-def test_standing_still_just_after_a_jump_counts_for_more_passes():
-    def learned(passes, settling_time_s):
-        settings = {**STILL, 'jump_time_s': 0.1, 'slew_pa_per_s': 1e9, 'credit_delay_s': 0.02,
-                    'feedforward_learning': 0.1, 'motion_learning': 0.0, 'guard_ratio': 0.0,
-                    'settling_passes': passes, 'settling_time_s': settling_time_s}
-        controller = sofc(settings)
-        for k in range(200):
-            wanted = 0.008 if k < 40 else 0.018
-            # The move is over after 40 ticks, preview included.
-            controller.step(wanted, wanted - 1e-4, 0.0, wanted, 0.0, k >= 100)
-        return float(np.abs(controller.rules.feedforward).sum())
+def learned_at_rest(**more):
+    """Return what feed-forward and motion rules learn at rest after a jump, in all [Pa]."""
+    controller = sofc({
+        **STILL, 'jump_time_s': 0.1, 'slew_pa_per_s': 1e9, 'credit_delay_s': 0.02,
+        'feedforward_learning': 0.1, 'motion_learning': 0.1, 'guard_ratio': 0.0, **more})
+    for k in range(200):
+        wanted = 0.008 if k < 40 else 0.018
+        # The move is over after 40 ticks, preview included.
+        controller.step(wanted, wanted - 1e-4, 0.0, wanted, 0.0, k >= 100)
+    return np.array([np.abs(controller.rules.feedforward).sum(),
+                     np.abs(controller.rules.motion).sum()])
 
-    usual = learned(1.0, 10.0)
-    assert usual > 0.0
-    assert learned(4.0, 10.0) == pytest.approx(4.0 * usual, rel=0.02)
-    assert learned(4.0, 0.01) == pytest.approx(usual, rel=0.02)
+
+def test_standing_still_just_after_a_jump_counts_for_more_passes():
+    usual = learned_at_rest()
+    assert np.all(usual > 0.0)
+    long, short = ({'settling_passes': 4.0, 'settling_time_s': time_s} for time_s in (10.0, 0.01))
+    assert learned_at_rest(**long) == pytest.approx(4.0 * usual, rel=0.02)
+    assert learned_at_rest(**short) == pytest.approx(usual, rel=0.02)
+
+
+@pytest.mark.parametrize('name', ['motion_at_rest', 'jump_motion_learning'])
+def test_motion_rules_learn_less_at_rest_after_a_jump(name):
+    feedforward, motion = learned_at_rest()
+    assert learned_at_rest(**{name: 0.25}) == pytest.approx([feedforward, 0.25 * motion], rel=0.02)
+    assert learned_at_rest(**{name: 0.0})[1] == 0.0
 
 
 def test_moving_takes_damping_mass_and_the_lag_of_the_valve():

@@ -89,6 +89,15 @@ def smooth_jump(par, st, jump_m, wait_s, s_size, s_left):
 
 
 @compiled
+def note_jump(st, rate_m_per_s):
+    """Remember a jump until the reference moves by itself."""
+    if st[at.S_JUMP_LEFT] > 0.0 or st[at.S_LEAD_JUMP_LEFT] > 0.0:
+        st[at.S_JUMPED] = 1.0
+    elif rate_m_per_s != 0.0:
+        st[at.S_JUMPED] = 0.0
+
+
+@compiled
 def slope_pa_per_m(table, contraction_m):
     """Return the slope of the static inverse, never below a part of its mean."""
     nodes = table.shape[0] - 2

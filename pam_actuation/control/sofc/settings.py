@@ -115,6 +115,10 @@ SETTINGS = (
     Setting('settling_passes', '-', 1.0, 0.0, 20.0,
             'passes that standing still for pass_time_s counts just after such a move'),
     Setting('settling_time_s', 's', 0.25, 0.0, 10.0, 'how long that is, from the end of the move'),
+    Setting('motion_at_rest', '-', 1.0, 0.0, 1.0,
+            'share of what standing still counts that goes to the motion rules as well'),
+    Setting('jump_motion_learning', '-', 1.0, 0.0, 2.0,
+            'factor of motion_learning from a jump until the reference moves by itself'),
 )
 
 NAMES = tuple(setting.name for setting in SETTINGS)

@@ -149,6 +149,8 @@ def _learn(par, values, initial, ring, st):
         wanted_pa * ring[row, credit.ENTRY_PASS] * par[at.P_FEEDFORWARD_LEARNING],
         leak * par[at.P_FEEDFORWARD_LEAK],
         par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+    if st[at.S_JUMPED] > 0.0:
+        wanted_pa *= par[at.P_JUMP_MOTION_LEARNING]
     motion_squares = learning.modify_motion(
         values[2], initial[2],
         int(ring[row, credit.ENTRY_MOTION_KNOT]), ring[row, credit.ENTRY_MOTION_KNOT_DEGREE],
@@ -183,7 +185,8 @@ def _passes(par, st, knot_place, motion_place, rate_place):
 
     A pass is the way from one knot to the next; standing still for ``pass_time_s`` also
     counts as one, just after a jump as ``settling_passes``: what is missing there is an
-    error of the rules, later it is creep.
+    error of the rules, later it is creep. Motion rules do not know from which side the
+    muscle came to rest, so less of that may count for them (``motion_at_rest``).
     """
     still = par[at.P_PERIOD] / par[at.P_PASS_TIME]
     if st[at.S_JUMP_LEFT] > 0.0:
@@ -192,7 +195,7 @@ def _passes(par, st, knot_place, motion_place, rate_place):
         st[at.S_SETTLING_LEFT] -= par[at.P_PERIOD]
         still *= par[at.P_SETTLING_PASSES]
     a_pass = still
-    motion_pass = still
+    motion_pass = still * par[at.P_MOTION_AT_REST]
     if st[at.S_HISTORY] > 0.0:
         by_position = motion_place - st[at.S_MOTION_PLACE]
         by_rate = rate_place - st[at.S_RATE_PLACE]
@@ -222,6 +225,7 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
         st[at.S_HISTORY] > 0.0)
     st[at.S_RATE] = change
     st[at.S_CONTRACTION] = inp[place.IN_CONTRACTION]
+    dynamics.note_jump(st, inp[place.IN_REFERENCE_RATE])
     lags = _valve_lags(par, ring, st, inp)
     if lags or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
