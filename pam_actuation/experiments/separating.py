@@ -16,10 +16,12 @@
 The experiment that tells rivals apart, when a recording could not.
 
 Every experiment of a small menu is simulated with the likeliest rival as the truth; the
-others are fitted to what it would record, numbers and all. The experiment that leaves
-the best of them farthest off is the one to run (T-optimality: Atkinson and Fedorov,
-1975, Biometrika 62(1)). A load cell is asked for where none was there and the rivals
-stay together without it.
+others are fitted to what it would record, numbers and all, and judged as `pam gap` will
+judge them. Of the experiments that decide beyond doubt, the one that leaves the nearest of
+them farthest off is the one to run (T-optimality: Atkinson and Fedorov, 1975, Biometrika
+62(1)). One edge may leave a rival far off and yet decide nothing: what time blocks agree
+on counts. A load cell is asked for where none was there and the rivals stay together
+without it.
 """
 
 from pathlib import Path
@@ -31,11 +33,11 @@ from pam_actuation.bags.load import load_run
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim.errors import InputError
-from pam_sim.gap.compare import gap
+from pam_sim.gap.choice import SAME_FORM
+from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
-from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.units import P_ATM_PA
 
@@ -45,6 +47,8 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
+SURE_T = 3.0 * CERTAIN_T     # of a test on simulated data; the rig's own forms take a part of it
+SURE_SHARE = 10.0 * SAME_FORM
 
 
 def menu(valve):
@@ -106,19 +110,19 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
                  'description': f'{why[0].upper()}{why[1:]}'}
         try:
             run = simulated(plain, truth)
-            apart = {False: separation(run, rig, rivals[1:], 'force' in recorded)}
+            apart = {False: separation(run, rig, rivals, 'force' in recorded)}
             if 'force' not in recorded:
-                apart[True] = separation(run, rig, rivals[1:], True)
+                apart[True] = separation(run, rig, rivals, True)
         except InputError:
             continue
-        for with_cell, sigma in apart.items():
+        for with_cell, (sigma, sure) in apart.items():
             # Without a further sensor, if that is clear enough.
-            rank = (not with_cell and sigma > CLEAR, sigma)
+            rank = (not with_cell and sure >= 1.0 and sigma > CLEAR, min(sure, 1.0), sigma)
             if best is None or rank > best[0]:
                 best = (rank, name, why, plain, with_cell)
     if best is None:
         return None
-    (_, sigma), name, why, plain, with_cell = best
+    (_, _, sigma), name, why, plain, with_cell = best
     needs = ['pressure', 'contraction', *(['force'] if with_cell else [])]
     names = [r[0] for r in rivals]
     text = (f'{why[0].upper()}{why[1:]}. Run with {names[0]} as the truth it leaves '
@@ -130,17 +134,47 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
 
 
 def separation(run, rig, rivals, with_force):
-    """Return how far the nearest rival stays off a run, in noise floors per sample (rms)."""
+    """
+    Return how far the nearest rival stays off a run of the first, and how sure that decides.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        What the first rival would record.
+    rig : pam_sim.Rig
+        The given model.
+    rivals : list
+        As of :func:`next_experiment`.
+    with_force : bool
+        Whether there is a load cell.
+
+    Returns
+    -------
+    tuple of float
+        Noise floors per sample (rms); the test between the two, and the share of the gap by
+        which they differ, as parts of what is beyond doubt, whichever is less: 1 decides.
+
+    """
     topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
                           rig.load != 'hanging_mass')
-    problem = Problem(rig, cuts_of(rig, [recording], own_proof=False), use=(FIT, SELECT))
-    nearest = np.inf
-    for _, _, hypothesis, theta in rivals:
-        found = problem.fit(hypothesis, theta)
-        nearest = min(nearest, np.sqrt(max(
-            sum(max(gap(c, found.errors[c.subsystem]), 0.0) for c in problem.cuts), 0.0)))
-    return float(nearest)
+    problem = Problem(rig, cuts_of(rig, [recording], own_proof=False))
+    first, *others = (problem.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
+    nearest = decided = np.inf
+    for other in others:
+        nearest = min(nearest, np.sqrt(sum(
+            max(gap(c, other.errors[c.subsystem]), 0.0) for c in problem.cuts)))
+        decided = min(decided, max(_decided(problem, c, first, other)
+                                   for c in problem.cuts))
+    return float(nearest), float(decided)
+
+
+def _decided(problem, cut, first, other):
+    s = cut.subsystem
+    base = problem.base.errors[s]
+    t = preference(cut, base, first.errors[s], other.errors[s])
+    apart = share(cut, base, first.errors[s]) - share(cut, base, other.errors[s])
+    return min(t / SURE_T, apart / SURE_SHARE)
 
 
 def identification_run(rig):

@@ -120,6 +120,24 @@ class Proof:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
         return moved(self.recording, self.after, self.run(found, whole), self.part)
 
+    def confirmed(self, found, whole):
+        """
+        Return by how much the squared errors fall from a fit's to the final model's.
+
+        In what the two are apart, squared; all signals in deviations of their sensors. 1 for a
+        true effect, -1 for one that is not there, whatever the noise: the errors of the true
+        model have nothing in common with either.
+        """
+        fell = apart = 0.0
+        before = self.run(found, whole)
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            first, last = (r[s][chosen] - self.recording.measured[s][chosen]
+                           for r in (before, self.after))
+            fell += float(np.mean(first ** 2 - last ** 2)) / variance
+            apart += float(np.mean((first - last) ** 2)) / variance
+        return fell / apart if apart > 0.0 else 1.0
+
     def unexplained(self):
         """Return the share of the squared gap left after calibration that is still there."""
         before = after = 0.0

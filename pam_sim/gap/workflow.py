@@ -38,6 +38,7 @@ SEEN_GAP = 0.05              # floors squared; smaller ones are within the error
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
+CONFIRMED = 0.3              # of what an effect moves; the truth takes all of it out of the errors
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -100,6 +101,9 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     problem.use = (FIT, SELECT)
     final, base = problem.polish(outcome.final), problem.fit_base()
     proof = Proof(witness, certify is not None, problem, base, final, seed)
+    if outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
+        outcome.named, final = [], base
+        proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
