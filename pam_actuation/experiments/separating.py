@@ -34,7 +34,7 @@ from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim.errors import InputError
 from pam_sim.gap.choice import SAME_FORM
-from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.compare import gap, preference, share
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
@@ -47,7 +47,7 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
-SURE_T = 3.0 * CERTAIN_T     # of a test on simulated data; the rig's own forms take a part of it
+SURE_T = 5.0                 # of a test on simulated data; the rig's own forms take a part of it
 SURE_SHARE = 10.0 * SAME_FORM
 
 

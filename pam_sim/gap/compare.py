@@ -28,6 +28,7 @@ from scipy.stats import norm, t as student
 
 ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks say nothing
 ACTIVE_SHARE = 0.05          # of the mean gap
+OF_MEAN = 0.5                # squared difference of two rivals that are alike everywhere
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
 MIN_BLOCKS = 4
 CERTAIN_T = 3.0
@@ -83,7 +84,7 @@ def preference(cut, base, better, worse, part=SELECT):
     """
     _, before = block_chi2(cut, base, part)
     _, apart = block_chi2(cut, better - worse, part)
-    active = _active(before - cut.level) & _active(apart)
+    active = _active(before - cut.level, 1.0) & _active(apart, OF_MEAN)
     if active.sum() < MIN_BLOCKS:
         return NO_TEST_T
     first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))
@@ -94,7 +95,7 @@ def preference(cut, base, better, worse, part=SELECT):
     return float(np.copysign(min(rare, LARGEST_T), t))
 
 
-def _active(values):
+def _active(values, of_mean):
     """Return in which blocks there is enough of something [floors squared] to count."""
     mean = max(float(np.mean(values)), 0.0)
-    return values > max(min(ACTIVE_GAP, mean), ACTIVE_SHARE * mean)
+    return values > max(min(ACTIVE_GAP, of_mean * mean), ACTIVE_SHARE * mean)

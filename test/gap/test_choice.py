@@ -1,0 +1,116 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which rivals the data tell apart, and which experiment would."""
+
+from gap_runs import nominal, recorded
+import numpy as np
+from pam_actuation.experiments.separating import separation
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Choice, Rival
+from pam_sim.gap.compare import CERTAIN_T, preference
+from pam_sim.gap.cuts import Cut
+from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.parts import SELECT
+from pam_sim.gap.prove import Proof
+import pytest
+
+SAMPLES = 100                # of a block
+
+
+class Blocks(Cut):
+    """Time blocks of one signal that judge; nothing is simulated."""
+
+    subsystem, signals, known = 'muscle', ('contraction',), []
+
+    def __init__(self, count):
+        self.block = np.repeat(np.arange(count), SAMPLES)
+        self.part = np.full(self.block.size, SELECT)
+        self.signal = np.zeros(self.block.size, dtype=int)
+        self.level = 1.0
+
+
+def errors(cut, seed, off):
+    """Return noise, the same for all rivals of a seed, plus what a rival is off by block."""
+    noise = np.random.default_rng(seed).standard_normal(cut.block.size)
+    return noise + np.asarray(off, dtype=float)[cut.block]
+
+
+@pytest.mark.parametrize('telling, says', [(8, True), (4, False), (3, False)])
+def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, says):
+    cut, rare = Blocks(80), np.arange(80) < telling
+    base = errors(cut, 0, np.full(80, 5.0))
+    better = errors(cut, 0, np.zeros(80))
+    # Where there are few blocks, they must agree the more: in these some say little.
+    worse = errors(cut, 0, np.where(rare, np.where(np.arange(80) % 4, 3.0, 0.8), 0.01))
+    found = preference(cut, base, better, worse)
+    assert (found > CERTAIN_T) == says
+    assert preference(cut, base, worse, better) == pytest.approx(-found)
+
+
+@pytest.mark.parametrize('off, tied', [(0.1, True), (1.0, False)])
+def test_no_rival_goes_for_less_than_a_formulation_may_be_off(off, tied):
+    cut = Blocks(60)
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
+
+    class Given:
+        cuts = [cut]
+
+    def found(name, left):
+        effects = (by_name[name],) if name else ()
+        return Found(Hypothesis(effects), np.ones(len(effects)), {'muscle': np.zeros(0)},
+                     {'muscle': errors(cut, 1, np.full(60, left))}, {})
+
+    base = found('', 5.0)
+    choice = Choice(Given(), base, 2.0)
+    rivals = [Rival(n, found(n, left)) for n, left in (
+        ('bladder_stiffness', 0.0), ('parallel_spring', off))]
+    for r in rivals:
+        r.share = choice.shares(r.found)
+    names = [r.name for r in choice.tied(rivals, base, cut)]
+    # Both differ in every block alike, beyond doubt.
+    assert rivals[1].t['muscle'] > CERTAIN_T
+    assert names == ['bladder_stiffness', 'parallel_spring'][:1 + tied]
+
+
+@pytest.mark.parametrize('real, share', [(1.0, 1.0), (0.0, -1.0)])
+def test_the_certify_run_confirms_what_is_real(real, share):
+    time_s = np.arange(4000) * 0.005
+    effect = 2e-5 * np.sin(time_s)
+    noise = 1e-5 * np.random.default_rng(2).standard_normal(time_s.size)
+    proof = Proof.__new__(Proof)
+
+    class Given:
+        signals, measured = ('contraction',), {'contraction': real * effect + noise}
+
+    proof.recording, proof.part = Given(), {'contraction': np.ones(time_s.size, dtype=bool)}
+    proof.noise, proof.after = {'contraction': 1e-5}, {'contraction': effect}
+    proof.run = lambda found, whole: {'contraction': np.zeros(time_s.size)}
+    assert proof.confirmed(None, True) == pytest.approx(share, abs=0.1)
+
+
+def test_an_experiment_must_decide_in_many_places():
+    names = ('valve_dead_time', 'tube_lag')
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    rivals = [(n, None, Hypothesis((by_name[n],)), [1.0]) for n in names]
+    truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.01})])
+    levels = np.random.default_rng(4).uniform(3.2, 5.6, 30)
+    many, few = np.repeat(levels, 400), np.repeat((3.2, 5.6, 3.2), (3000, 3000, 2000))
+    # One edge leaves the lag off, but decides nothing.
+    assert decided(truth, rivals, few) < 1.0 <= decided(truth, rivals, many)
+
+
+def decided(truth, rivals, voltage):
+    run = recorded(truth, voltage, topics=('pressure', 'contraction'))
+    return separation(run, nominal(), rivals, False)[1]
