@@ -47,7 +47,7 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
-SURE_T = 5.0                 # of a test on simulated data; the rig's own forms take a part of it
+SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
 SURE_SHARE = 10.0 * SAME_FORM
 
 

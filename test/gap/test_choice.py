@@ -105,7 +105,7 @@ def test_an_experiment_must_decide_in_many_places():
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
     rivals = [(n, None, Hypothesis((by_name[n],)), [1.0]) for n in names]
     truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.01})])
-    levels = np.random.default_rng(4).uniform(3.2, 5.6, 30)
+    levels = np.random.default_rng(4).uniform(3.2, 5.6, 40)
     many, few = np.repeat(levels, 400), np.repeat((3.2, 5.6, 3.2), (3000, 3000, 2000))
     # One edge leaves the lag off, but decides nothing.
     assert decided(truth, rivals, few) < 1.0 <= decided(truth, rivals, many)
