@@ -24,7 +24,7 @@ left out too, or what a second recording tells would drown in the first.
 
 import numpy as np
 from pam_sim.gap.parts import SELECT
-from scipy.stats import norm, t as student
+from scipy.stats import norm, t as student, wilcoxon
 
 ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks say nothing
 ACTIVE_SHARE = 0.05          # of the mean gap
@@ -64,8 +64,9 @@ def preference(cut, base, better, worse, part=SELECT):
     """
     Return by how many deviations the log ratio of squared errors says ``better``.
 
-    Student's t over the blocks, as the deviation of a normal distribution that is as rare:
-    few blocks must agree the more.
+    Student's t over the blocks, or Wilcoxon's signed ranks where they say it more clearly (all
+    blocks agree, but some differ by far more), each as the deviation of a normal distribution
+    that is as rare: few blocks must agree the more.
 
     Parameters
     ----------
@@ -91,8 +92,9 @@ def preference(cut, base, better, worse, part=SELECT):
     ratio = np.log(second / first)
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
     t = float(np.mean(ratio) / max(spread, 1e-9))
-    rare = norm.isf(student.sf(abs(t), ratio.size - 1))
-    return float(np.copysign(min(rare, LARGEST_T), t))
+    towards = np.sign(t) * ratio
+    rare = min(student.sf(abs(t), ratio.size - 1), wilcoxon(towards, alternative='greater').pvalue)
+    return float(np.copysign(min(norm.isf(rare), LARGEST_T), t))
 
 
 def _active(values, of_mean):
