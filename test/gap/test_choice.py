@@ -18,12 +18,14 @@ from gap_runs import nominal, recorded
 import numpy as np
 from pam_actuation.experiments.separating import separation
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, Rival
+from pam_sim.gap.choice import Choice, Named, Rival
 from pam_sim.gap.compare import CERTAIN_T, preference
-from pam_sim.gap.cuts import Cut
+from pam_sim.gap.cuts import Cut, Known
 from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.free_run import Recording
 from pam_sim.gap.parts import SELECT
-from pam_sim.gap.prove import Proof
+from pam_sim.gap.prove import Proof, start_error_sd
+from pam_sim.gap.search import Search
 import pytest
 
 SAMPLES = 100                # of a block
@@ -114,3 +116,55 @@ def test_an_experiment_must_decide_in_many_places():
 def decided(truth, rivals, voltage):
     run = recorded(truth, voltage, topics=('pressure', 'contraction'))
     return separation(run, nominal(), rivals, False)[1]
+
+
+def test_a_free_run_knows_how_uncertain_its_start_is():
+    quiet, loud = (Recording(recorded(nominal(), np.full(3000, 4.0), noise=n), 'ppr')
+                   for n in (1.0, 3.0))
+    # Ten samples in the first 50 ms, of 300 Pa.
+    assert start_error_sd(quiet) == pytest.approx(1.25 * 300.0 / np.sqrt(10.0), rel=0.2)
+    assert start_error_sd(loud) == pytest.approx(3.0 * start_error_sd(quiet), rel=0.1)
+
+
+@pytest.mark.parametrize('alone, goes', [(0.96, 'hysteresis'), (0.7, 'coulomb_friction')])
+def test_a_friction_is_not_replaced_by_the_loop_that_has_turned_into_it(alone, goes):
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction', 'force'))}
+    loop = by_name['hysteresis_lugre']
+    narrow = Found(Hypothesis((loop,)), np.array([1.0, 0.0, loop.free[2].coordinate(
+        loop.free[2].upper)]), {}, {}, {})
+    dry = Found(Hypothesis((by_name['coulomb_friction'],)), np.ones(1), {}, {}, {})
+    both = Found(Hypothesis((*dry.hypothesis.effects, loop)), np.ones(4), {}, {}, {})
+
+    class Given(Search):
+        class choice:
+            shares = staticmethod(lambda found: {'muscle': alone if found is dry else 1.0})
+
+        def __init__(self):
+            self._swapped = lambda current, out: dry if out == 'hysteresis' else narrow
+
+    named = [Named(n, 'muscle', [], (n,)) for n in ('coulomb_friction', 'hysteresis')]
+    gone, without = Given()._simpler(both, named[0], narrow, named)
+    assert gone.name == goes and without is (dry if goes == 'hysteresis' else narrow)
+
+
+@pytest.mark.parametrize('within, names_stand', [(0.99, True), (0.9, False)])
+def test_a_number_that_is_bent_without_need_costs_no_name(within, names_stand):
+    cut = Blocks(4)
+    cut.known = [Known('damping_n_s_per_m', 'N s/m', 25.0, 0.5, 0.0, 100.0)]
+    friction = next(c for c in candidates(nominal(), ('contraction',))
+                    if c.effect == 'coulomb_friction')
+    bent, held = (Found(Hypothesis((friction,)), np.ones(1), {'muscle': np.array([z])}, {}, {})
+                  for z in (-3.5, -1.0))
+
+    class Given(Search):
+        class problem:
+            cuts, unbent = [cut], staticmethod(lambda found, box: held)
+
+        class choice:
+            shares = staticmethod(lambda found: {'muscle': within})
+
+        def __init__(self):
+            pass
+
+    assert Given()._straightened(bent) is (held if names_stand else bent)
+    assert Given()._straightened(held) is held
