@@ -90,6 +90,8 @@ def preference(cut, base, better, worse, part=SELECT):
         return NO_TEST_T
     first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))
     ratio = np.log(second / first)
+    if not ratio.any():
+        return NO_TEST_T
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
     t = float(np.mean(ratio) / max(spread, 1e-9))
     towards = np.sign(t) * ratio
