@@ -96,6 +96,7 @@ class FaultRig:
         self.processes = {}
         self.bag = None
         self._bags = 0
+        self._recorded_before = None
         self._relay = subprocess.Popen(
             [sys.executable, __file__], env=self._environment, stdin=subprocess.PIPE, text=True,
             start_new_session=True)
@@ -127,6 +128,7 @@ class FaultRig:
     def wait_until_sound(self, timeout_s):
         """Wait until every node says that all is well and the bag grows; return whether."""
         begin_ns = time.time_ns()
+        self._recorded_before = None
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline and all(
                 process.running for process in self.processes.values()):
@@ -140,8 +142,12 @@ class FaultRig:
             said = self.witness.last.get(name)
             if said is None or said.stamp_ns < since_ns or not said.message.startswith(words):
                 return False
+        # Discovery takes its time on a busy machine: the bag must grow by what is sent now.
         counts = self.witness.last['experiment_recorder'].values
-        return int(counts.get(f'recorded.{NAMESPACE}/valve_signal', 0)) > 0
+        recorded = int(counts.get(f'recorded.{NAMESPACE}/valve_signal', 0))
+        if self._recorded_before is None:
+            self._recorded_before = recorded
+        return recorded > self._recorded_before
 
     def close(self):
         """End everything, the driver first, so that it vents; the recorder closes its bag."""

@@ -16,8 +16,12 @@
 
 import importlib.util
 import os
+from pathlib import Path
+import tempfile
+import time
 
 import pytest
+from stall_watch import STALL_S, StallWatch
 
 # Set before anything imports rclpy; children inherit it. Ids above 101 collide
 # with the ports that Linux hands out. Values given from outside are respected.
@@ -35,3 +39,55 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.get_closest_marker('ros'):
             item.add_marker(pytest.mark.skip(reason='rclpy is not installed'))
+
+
+# Exit code of a run in which tests failed, but only while the machine stood still.
+EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
+
+
+class StallPlugin:
+    """Tell failures of live tests on a machine that stood still from all others."""
+
+    def __init__(self):
+        self._folder = tempfile.TemporaryDirectory()
+        self._watch = StallWatch(Path(self._folder.name) / 'stalls.txt')
+        self._begin_s = {}
+        self.failed = []
+        self.unexcused = 0
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item):
+        # What a whole module shares may have been spoiled by an earlier moment of the module.
+        self._begin_s.setdefault(item.nodeid.split('::')[0], time.monotonic())
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_makereport(self, item, call):
+        report = (yield).get_result()
+        if not report.failed:
+            return
+        begin_s = self._begin_s[item.nodeid.split('::')[0]]
+        worst_s = self._watch.worst_s(begin_s, time.monotonic())
+        if item.get_closest_marker('ros') and worst_s > STALL_S:
+            text = f'the machine stood still for up to {worst_s * 1e3:.0f} ms'
+            report.sections.append(('stalls', text + ' since this file began'))
+            self.failed.append(f'{item.nodeid}: {text}')
+        else:
+            self.unexcused += 1
+
+    def pytest_terminal_summary(self, terminalreporter):
+        if self.failed:
+            terminalreporter.section('failed on a machine that stood still')
+            for line in self.failed:
+                terminalreporter.line(line)
+
+    def pytest_sessionfinish(self, session, exitstatus):
+        self._watch.end()
+        self._folder.cleanup()
+        if exitstatus == pytest.ExitCode.TESTS_FAILED and not self.unexcused:
+            session.exitstatus = EXIT_STOOD_STILL
+
+
+def pytest_configure(config):
+    """Watch the machine where live tests run one after the other."""
+    if HAS_ROS and config.getoption('markexpr') == 'ros':
+        config.pluginmanager.register(StallPlugin())

@@ -25,6 +25,8 @@ input                                          what the loop does
 no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
+contraction the same to the last bit for       vents for at least 2 s and until it changes
+0.2 s while the pressure changed by 80 kPa
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
@@ -39,6 +41,7 @@ the loop itself stood still over 0.25 s        starts bumplessly
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.frozen import FrozenMeasurement
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.tick import TickCore, TickInputs
@@ -55,6 +58,7 @@ _REASONS = {
                   codes.CONTRACTION_NOT_FINITE, codes.CONTRACTION_IMPLAUSIBLE),
     FORCE: (codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD, codes.FORCE_NOT_FINITE,
             codes.FORCE_IMPLAUSIBLE)}
+_FROZEN = {CONTRACTION: codes.CONTRACTION_FROZEN, FORCE: codes.FORCE_FROZEN}
 
 REFERENCE_REASONS = {
     reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
@@ -128,6 +132,7 @@ class ControllerLoop:
         self.rejected_references = 0
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
+        self._frozen = FrozenMeasurement()
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None
@@ -201,7 +206,15 @@ class ControllerLoop:
     def _measured_reason(self, now_ns):
         """Return the code for the newest measurement of what is tracked, OK if usable."""
         message, value = self._measured()
-        return measurement_reason(message, value, self._range, self._reasons, now_ns)
+        reason = measurement_reason(message, value, self._range, self._reasons, now_ns)
+        if reason == codes.OK and self._frozen.judge(
+                now_ns, message.stamp_ns, value, self._fresh_pressure_pa(now_ns)):
+            return _FROZEN[self.tracked]
+        return reason
+
+    def _fresh_pressure_pa(self, now_ns):
+        """Return the measured pressure [Pa], NaN where none is fresh."""
+        return self._pressure.pressure_pa if fresh(self._pressure, now_ns) else math.nan
 
     def _gather(self, now_ns, learning):
         """Return the ``TickInputs`` of now."""
@@ -230,8 +243,9 @@ class ControllerLoop:
                 self._contraction.contraction_m):
             inputs.contraction_m = self._contraction.contraction_m
             contraction_ns = self._contraction.stamp_ns
-        if fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
-            inputs.pressure_pa = self._pressure.pressure_pa
+        pressure_pa = self._fresh_pressure_pa(now_ns)
+        if math.isfinite(pressure_pa):
+            inputs.pressure_pa = pressure_pa
             pressure_ns = self._pressure.stamp_ns
         if fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
             inputs.force_n = self._force.force_n

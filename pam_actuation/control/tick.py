@@ -29,7 +29,8 @@ from pam_sim.units import P_ATM_PA
 (OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
- ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST) = range(20)
+ ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
+ FORCE_FROZEN) = range(22)
 REASONS = (
     'ok',
     'no contraction measured yet',
@@ -50,7 +51,9 @@ REASONS = (
     'joint angle is stamped more than 0.02 s ahead',
     'joint angle is not a finite number',
     'joint angle is outside what the joint can do',
-    'wanted torque lost, muscles vented')
+    'wanted torque lost, muscles vented',
+    'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
+    'force stands still although the pressure changed: sensor frozen')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')

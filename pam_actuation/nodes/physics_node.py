@@ -15,6 +15,7 @@
 """What the nodes of simulated physics share: they follow the clock and measure what is new."""
 
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.timing import Latency
 
 MAX_SEED = 2**31 - 1
 
@@ -24,15 +25,18 @@ class PhysicsNode(ManagedNode):
     Run ``plant``, a ``PlantClock``, up to the present at every tick.
 
     What arrives acts from its own stamp on if physics has not passed it yet, else at once.
+    How old it then is stands in the diagnostics, for the whole run (``input.latency``).
     Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
     """
 
     plant = None
+    _latency = None
 
     def start(self):
         """Begin with the clock at the present."""
         self.plant.advance_to(self.now_ns())
         self._sampled_steps = None
+        self._latency = Latency()
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def measured(self, now_ns, arrived):
@@ -55,6 +59,8 @@ class PhysicsNode(ManagedNode):
         for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
             self.plant.advance_to(min(plain.stamp_ns, now_ns))
             apply(plain)
+            if self.simulated_time is None:
+                self._latency.add(now_ns - plain.stamp_ns)
         self.plant.advance_to(now_ns)
         if self.plant.steps == self._sampled_steps:
             return {}
@@ -66,5 +72,7 @@ class PhysicsNode(ManagedNode):
         values = super().diagnostic_values()
         if self.plant is None:
             return values
+        if self._latency is not None:
+            values = (*values, *self._latency.values('input.latency'))
         return (*values, ('physics.steps', self.plant.steps),
                 ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))

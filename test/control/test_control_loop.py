@@ -179,3 +179,37 @@ def test_a_loop_that_stood_still_starts_bumplessly():
     command, state = loop.tick(later)
     assert by_name(state)['restarted'] == 1.0
     assert abs(command.pressure_pa - 3e5) < 2e4
+
+
+def swing(loop, start_ns, duration_s, contraction, pressure_pa):
+    """Tick for a while; return (time since the start [s], reason, command) of every tick."""
+    seen = []
+    for k in range(round(duration_s / 0.005)):
+        now = start_ns + k * 5 * MS
+        loop.on_contraction(Contraction(now, contraction(k * 0.005)))
+        loop.on_pressure(Pressure(now, pressure_pa(k * 0.005)))
+        loop.on_reference(Reference(now, 0.01, 0.0))
+        command, _ = loop.tick(now)
+        seen.append((k * 0.005, loop.reason, command.pressure_pa))
+    return seen
+
+
+def test_a_frozen_contraction_vents_until_it_moves_again():
+    loop = ready()
+    seen = swing(loop, START, 1.0, lambda t: 0.01, lambda t: 3e5 + 2e5 * t)
+    at_s, reason, command_pa = next(one for one in seen if one[1] != 'ok')
+    assert at_s == pytest.approx(0.405) and 'contraction stands still' in reason
+    assert command_pa == P_ATM_PA
+    assert all(command_pa == P_ATM_PA for t, _, command_pa in seen if t >= at_s)
+    # It moves at once when vented; what is only blocked is not filled again for 2 s.
+    seen = swing(loop, START + 1000 * MS, 3.0, lambda t: 0.01 + 1e-5 * t, lambda t: P_ATM_PA)
+    assert next(t for t, reason, _ in seen if reason == 'ok') == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.mark.parametrize('contraction, pressure_pa', [
+    (lambda t: 0.01, lambda t: 3e5 + 2e4 * math.sin(20.0 * t)),       # held by friction
+    (lambda t: 0.0, lambda t: P_ATM_PA + 1.4e5 * t),                  # slack, on its stop
+    (lambda t: 0.01 + 1e-5 * math.floor(t / 0.15), lambda t: 3e5 + 2e5 * t)])     # steps of 10 um
+def test_what_a_muscle_may_do_is_not_taken_for_a_frozen_sensor(contraction, pressure_pa):
+    assert {reason for _, reason, _ in swing(ready(), START, 1.0, contraction, pressure_pa)} == {
+        'ok'}

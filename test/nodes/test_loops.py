@@ -15,7 +15,8 @@
 """Test the loops of a node and their statistics, without ROS."""
 
 from pam_actuation.nodes.loops import Loop, LoopSet, SteadyTime
-from pam_actuation.nodes.timing import LoopTiming
+from pam_actuation.nodes.timing import Latency, LoopTiming
+import pytest
 
 MS = 1_000_000
 
@@ -92,6 +93,7 @@ def test_timing_counts_period_jitter_and_overruns():
     assert values['loop.period_mean_ms'] == '10.0000'
     assert values['loop.jitter_max_ms'] == '6.000'
     assert values['loop.overruns'] == '1'
+    assert values['loop.missed'] == '0'         # it was late, but it ran
     assert values['loop.busy_mean_ms'] == '2.000'
 
 
@@ -105,3 +107,24 @@ def test_a_pause_is_no_overrun():
     timing.begin(510 * MS)
     assert timing.overruns == 0
     assert dict(timing.values())['loop.period_mean_ms'] == '10.0000'
+
+
+def test_ticks_that_did_not_run_are_missed():
+    timing = LoopTiming(0.01)
+    for start_ms in (0, 10, 35, 40, 50, 84, 90):
+        timing.begin(start_ms * MS)
+    assert timing.missed == 3                   # those at 20, 60 and 70 ms
+    assert timing.overruns == 2
+
+
+def test_quantiles_of_the_latency_are_right_to_two_percent():
+    latency = Latency()
+    assert latency.values('input') == ()
+    for k in range(1, 1001):
+        latency.add(k * 10_000)                 # 0.01 to 10 ms
+    assert latency.quantile_ns(0.5) == pytest.approx(5e6, rel=0.02)
+    assert latency.quantile_ns(0.99) == pytest.approx(9.9e6, rel=0.02)
+    latency.add(-5)
+    latency.add(60 * 10 ** 9)                   # beyond the last bin
+    assert dict(latency.values('input'))['input.max_ms'] == '60000.000'
+    assert latency.quantile_ns(0.0) <= 1020.0

@@ -1,0 +1,180 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Do the loops of a live rig keep their periods, and how late is a command?
+
+    python benchmarks/loop_timing.py --seconds 600
+
+Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live. Beside them, in the same
+run and with the real-time priority of the plant, a bare echo: one rclpy node with a timer,
+another one with a callback, the message and the rate of the valve signal (the driver
+passes every command on). Prints for each loop the ticks that did not run and how irregular the
+others were, and the age of a valve signal when the plant applies it beside that of a message
+in the callback of the echo. Exit code 1 if more than 0.1 % of the ticks of plant or controller
+did not run, or the 99th percentile of the plant is more than twice that of the echo.
+"""
+
+import argparse
+import json
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from pam_actuation.nodes.realtime import ask_for_realtime
+from pam_actuation.nodes.timing import Latency
+from pam_actuation.rigging import session
+from pam_actuation.rigging.plan import make_plan, PLANT
+from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
+
+ALLOWED_MISSED = 0.001
+ALLOWED_RATIO = 2.0
+ECHO_PRIORITY = 3           # of the plant: 1 asked for, and its rank of 2
+LOOPS = ('plant_simulator', 'sofc_controller')
+
+
+def echo(role):
+    """Be one node of the bare echo until SIGTERM; the listener prints what it found."""
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from sensor_msgs.msg import JointState
+    stopped = []
+    signal.signal(signal.SIGTERM, lambda *_: stopped.append(True))
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(f'echo_{role}')
+    latency = Latency()
+    if role == 'talker':
+        publisher = node.create_publisher(JointState, '/echo', 10)
+        message = JointState(name=['ppr_voltage'], effort=[0.0])
+
+        def talk():
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(
+                time.time_ns(), 10 ** 9)
+            publisher.publish(message)
+
+        node.create_timer(1.0 / CONTROLLER_HZ, talk)
+    else:
+        def hear(message):
+            stamp = message.header.stamp
+            latency.add(time.time_ns() - stamp.sec * 10 ** 9 - stamp.nanosec)
+
+        node.create_subscription(JointState, '/echo', hear, 10)
+    refused = ask_for_realtime(ECHO_PRIORITY)
+    executor = rclpy.executors.SingleThreadedExecutor()
+    executor.add_node(node)
+    while not stopped:
+        executor.spin_once(timeout_sec=0.1)
+    print(json.dumps({'count': latency.count, 'refused': refused,
+                      **dict(latency.values('echo'))}))
+
+
+class Echo:
+    """Both nodes of the echo as processes."""
+
+    def __init__(self, environment):
+        self._processes = [
+            subprocess.Popen([sys.executable, __file__, '--echo', role], env=environment,
+                             stdout=subprocess.PIPE, text=True, start_new_session=True)
+            for role in ('listener', 'talker')]
+
+    def end(self):
+        """End both and return what the listener found."""
+        for process in reversed(self._processes):
+            process.terminate()
+        said = [process.communicate(timeout=20.0)[0] for process in self._processes]
+        return json.loads(said[0])
+
+
+def measure(seconds, folder):
+    """
+    Run the rig and the echo for some seconds.
+
+    Returns
+    -------
+    dict
+        ``nodes``: the last status of each loop by node; ``echo``; ``failure``.
+
+    """
+    controller = Path(folder) / 'controller.yaml'
+    controller.write_text(fast_controller(CONTROLLER_HZ))
+    plan = make_plan(experiment_text(seconds), 'dmsp_5_300_realistic', str(controller), 'ppr',
+                     str(Path(folder) / 'bag'))
+    plan.parameters[PLANT]['publish_rate_hz'] = PLANT_HZ
+    result, last = session.Result(''), {}
+    try:
+        with session.RigSession(plan) as rig:
+            beside = Echo(session.node_environment(rig.domain_id, plan.folder))
+
+            def note(done_s, total_s):
+                for name in LOOPS:
+                    status = rig.client.statuses.get(f'{rig.namespace}/{name}')
+                    if status is not None and 'loop.ticks' in status[2]:
+                        last[name] = status[2]
+
+            session.run_guarded(rig, result, note)
+            found = beside.end()
+    finally:
+        plan.remove()
+    if not last:
+        raise SystemExit(result.failure or 'the nodes did not report')
+    return {'nodes': last, 'echo': found, 'failure': result.failure,
+            'cpu_share': result.cpu_share}
+
+
+def judge(found):
+    """Print the tables; return whether the bars are met."""
+    print('| loop | wanted | ticks | did not run | later than 1.5 periods | longest jitter '
+          '| longest tick |')
+    print('|---|---|---|---|---|---|---|')
+    good = not found['failure']
+    for name, values in found['nodes'].items():
+        ticks, missed = int(values['loop.ticks']), int(values['loop.missed'])
+        share = missed / (ticks + missed)
+        good &= share <= ALLOWED_MISSED
+        print(f'| {name} | {float(values["loop.period_wanted_ms"]):g} ms | {ticks} '
+              f'| {missed} ({share:.3%}) | {int(values["loop.overruns"]) / ticks:.3%} '
+              f'| {values["loop.jitter_max_ms"]} ms | {values["loop.busy_max_ms"]} ms |')
+    plant, beside = found['nodes']['plant_simulator'], found['echo']
+    ratio = float(plant['input.latency.p99_ms']) / float(beside['echo.p99_ms'])
+    good &= ratio <= ALLOWED_RATIO
+    print('\n| age of a message | median | 99th percentile | longest |\n|---|---|---|---|')
+    for title, values, key in (('valve signal, when the plant applies it', plant, 'input.latency'),
+                               ('bare echo, in the callback', beside, 'echo')):
+        print(f'| {title} | {values[key + ".p50_ms"]} ms | {values[key + ".p99_ms"]} ms '
+              f'| {values[key + ".max_ms"]} ms |')
+    print(f'\nratio of the 99th percentiles {ratio:.2f}; processor (share of one core): '
+          + ', '.join(f'{name} {share:.2f}' for name, share in found['cpu_share'].items()))
+    for problem in filter(None, (found['failure'], beside['refused'])):
+        print(problem)
+    return good
+
+
+def main():
+    """Measure and judge."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--seconds', type=float, default=60.0)
+    parser.add_argument('--echo', choices=('talker', 'listener'), help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.echo:
+        return echo(args.echo)
+    with tempfile.TemporaryDirectory() as folder:
+        found = measure(args.seconds, folder)
+    return 0 if judge(found) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,75 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Notices a measured motion that stands still although the pressure moved the muscle.
+
+A frozen sensor goes on sending its last value with new stamps. It is told from a muscle at
+rest by the pressure: a value that stays the same to the last bit while the measured pressure
+changes by far more than friction can hold is not what the muscle does. Below some pressure a
+muscle is slack and its stop carries the load; what the pressure does there counts for nothing.
+"""
+
+import math
+
+from pam_sim.units import P_ATM_PA
+
+AFTER_NS = 200_000_000
+SWING_PA = 80_000.0                     # friction holds the muscle over some 20 kPa
+CARRYING_PA = P_ATM_PA + 150_000.0      # from here on it carries a load
+RESUME_NS = 2_000_000_000
+
+
+class FrozenMeasurement:
+    """
+    Compares the newest value of what is tracked with the range of the pressure.
+
+    ``frozen`` stays for at least 2 s and until the value has changed: a muscle that is blocked
+    looks the same, and must not be filled against the obstacle again at once.
+    """
+
+    def __init__(self):
+        self.frozen = False
+        self._value = math.nan
+        self._since_ns = 0
+        self._noticed_ns = 0
+        self._lowest_pa, self._highest_pa = math.inf, -math.inf
+
+    def judge(self, now_ns, stamp_ns, value, pressure_pa):
+        """
+        Take the newest readings; return whether the value is frozen.
+
+        Parameters
+        ----------
+        now_ns, stamp_ns : int
+            Time of the tick, and stamp of the value.
+        value : float
+            Measured contraction [m] or force [N], finite.
+        pressure_pa : float
+            Measured absolute pressure, NaN where none is fresh: then nothing is noticed.
+
+        """
+        if value != self._value or stamp_ns < self._since_ns:
+            self._value, self._since_ns = value, stamp_ns
+            self._lowest_pa, self._highest_pa = math.inf, -math.inf
+            if self.frozen and now_ns - self._noticed_ns >= RESUME_NS:
+                self.frozen = False
+        if pressure_pa > CARRYING_PA:
+            self._lowest_pa = min(self._lowest_pa, pressure_pa)
+            self._highest_pa = max(self._highest_pa, pressure_pa)
+        if (self._highest_pa - self._lowest_pa > SWING_PA
+                and stamp_ns - self._since_ns >= AFTER_NS):
+            self.frozen = True
+            self._noticed_ns = now_ns
+        return self.frozen
