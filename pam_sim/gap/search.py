@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 from pam_sim.gap.candidates import candidates, LIMITS
 from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.cuts import LATENCY_SD_S
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
@@ -43,6 +44,7 @@ UNBENT = 0.98                # share of the gap
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
+TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
 RIVALS = 4                   # that are ranked again when further effects are in
 
 
@@ -71,6 +73,17 @@ class Outcome:
     share: dict
     complete: bool = True
     screened: list = field(default_factory=list)
+
+
+def within_the_chain(found, place):
+    """
+    Return whether an effect is a time so short that any sensor's filter may be its cause.
+
+    A latency stands for the filters that all sensors share; that leaves a part of them.
+    """
+    candidate = found.hypothesis.effects[place]
+    return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
+            and found.values()[place][candidate.free[0].name] < LATENCY_SD_S)
 
 
 class Search:
@@ -353,11 +366,11 @@ class Search:
         return w, without
 
     def _established(self, current, named):
-        """Drop effects whose size does not clearly differ from none."""
+        """Drop effects whose size does not clearly differ from none, or is the measurement's."""
         for w in list(named):
             names = [c.name for c in current.hypothesis.effects]
-            if w.name in names and self.problem.certainty(
-                    current, names.index(w.name)) < CERTAIN_SIZE:
+            if w.name in names and (within_the_chain(current, names.index(w.name)) or (
+                    self.problem.certainty(current, names.index(w.name)) < CERTAIN_SIZE)):
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return current, named

@@ -25,7 +25,7 @@ from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.prove import Proof, start_error_sd
-from pam_sim.gap.search import Search
+from pam_sim.gap.search import Search, within_the_chain
 import pytest
 
 SAMPLES = 100                # of a block
@@ -168,3 +168,13 @@ def test_a_number_that_is_bent_without_need_costs_no_name(within, names_stand):
 
     assert Given()._straightened(bent) is (held if names_stand else bent)
     assert Given()._straightened(held) is held
+
+
+@pytest.mark.parametrize('name, size, is_so', [
+    ('pressure_lag', 4e-4, True), ('pressure_lag', 4e-3, False), ('valve_dead_time', 8e-4, True),
+    ('creep', None, False), ('contraction_bias', 1e-5, False)])
+def test_a_lag_that_any_filter_may_have_is_no_effect(name, size, is_so):
+    effect = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
+                  if c.effect == name)
+    theta = [f.coordinate(size or f.scale) for f in effect.free]
+    assert within_the_chain(Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == is_so
