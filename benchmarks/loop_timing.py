@@ -55,7 +55,8 @@ def echo(role):
     stopped = []
     signal.signal(signal.SIGTERM, lambda *_: stopped.append(True))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node(f'echo_{role}')
+    node = rclpy.create_node(
+        f'echo_{role}', start_parameter_services=False, enable_rosout=False)
     latency = Latency()
     if role == 'talker':
         publisher = node.create_publisher(JointState, '/echo', 10)

@@ -17,7 +17,6 @@
 from pam_actuation.control.tick import REASONS
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
@@ -114,7 +113,7 @@ class ControllerNode(ManagedNode):
             # In lockstep the reference is that of the tick before.
             old = self.participants and topic not in MEASURED
             for message, _ in subscription.take_before(now_ns) if old else subscription.take():
-                handler(from_ros(topic, message))
+                handler(message)
         command, state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', state)

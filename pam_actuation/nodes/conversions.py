@@ -199,7 +199,7 @@ def from_ros(topic, message):
 
 class RosWriter:
     """
-    Fill one preallocated ROS message per topic; ``fill`` returns it ready to publish.
+    Fill one preallocated ROS ``message`` per topic; ``fill`` returns it ready to publish.
 
     Parameters
     ----------
@@ -213,9 +213,9 @@ class RosWriter:
     """
 
     def __init__(self, topic, muscle='muscle', frame_id=''):
-        self._message = type_of(topic)()
+        self.message = type_of(topic)()
         topic = _kind(topic)
-        self._message.header.frame_id = frame_id
+        self.message.header.frame_id = frame_id
         self._names = ()
         self._points = []
         self._fill = getattr(self, '_fill_' + {
@@ -223,15 +223,19 @@ class RosWriter:
             'co_contraction': 'pressure', 'external_force': 'force',
             'valve_command': 'valve_signal', 'joint_effort': 'valve_signal'}.get(topic, topic))
         if topic in ('reference', 'contraction', 'joint_state', 'joint_reference'):
-            self._message.name = [muscle]
+            self.message.name = [muscle]
         elif topic in ('reference_trajectory', 'joint_trajectory'):
-            self._message.joint_names = [muscle]
+            self.message.joint_names = [muscle]
 
     def fill(self, plain):
         """Return the ROS message of a plain one; it is overwritten by the next call."""
-        set_stamp(self._message.header.stamp, plain.stamp_ns)
-        self._fill(self._message, plain)
-        return self._message
+        set_stamp(self.message.header.stamp, plain.stamp_ns)
+        self._fill(self.message, plain)
+        return self.message
+
+    def fill_into(self, message, plain):
+        """Write a plain message, but not its stamp, into something like the ROS message."""
+        self._fill(message, plain)
 
     def _fill_pressure(self, message, plain):
         message.fluid_pressure = plain.pressure_pa

@@ -23,7 +23,6 @@ arrived when the loop asks, each with the time it was received.
 import time
 
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import stamp_ns
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -104,11 +103,13 @@ class PolledSubscription:
     topic : str
     profile : rclpy.qos.QoSProfile, optional
     raw : bool
-        Return serialized bytes instead of message objects.
+        Take serialized bytes instead of message objects.
+    read : callable, optional
+        Turns what was taken into what ``take`` returns, such as a ``WireReader``.
 
     """
 
-    def __init__(self, node, message_type, topic, profile=None, raw=False):
+    def __init__(self, node, message_type, topic, profile=None, raw=False, read=None):
         self._node = node
         self._subscription = node.create_subscription(
             message_type, topic, _unused, profile or qos.CONSUMER,
@@ -116,6 +117,7 @@ class PolledSubscription:
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
         self._type = message_type
         self._raw = raw
+        self._read = read
         self._waiting = []
         self._wait_set = None
         self.topic = self._subscription.topic_name
@@ -134,10 +136,10 @@ class PolledSubscription:
         return taken
 
     def take_before(self, time_ns):
-        """Return what ``take`` would as far as it is stamped before a time; keep the rest."""
+        """Return the plain messages stamped before a time, as ``take``; keep the others."""
         taken = self.take()
-        self._waiting = [item for item in taken if stamp_ns(item[0]) >= time_ns]
-        return [item for item in taken if stamp_ns(item[0]) < time_ns]
+        self._waiting = [item for item in taken if item[0].stamp_ns >= time_ns]
+        return [item for item in taken if item[0].stamp_ns < time_ns]
 
     def collect(self, limit=2000):
         """Fetch what has arrived, up to ``limit`` waiting messages, and keep it for ``take``."""
@@ -148,6 +150,8 @@ class PolledSubscription:
                 item = handle.take_message(self._type, self._raw)
                 if item is None:
                     return
+                if self._read is not None:
+                    item = self._read(item[0]), item[1]
                 waiting.append(item)
                 self.newest = item[0]
                 self.received += 1

@@ -106,7 +106,7 @@ class ExperimentRecorder(ManagedNode):
                     self, DiagnosticArray, '/diagnostics', qos.RECORDER, raw=True)
                 self.subscriptions_polled.append(source)
             else:
-                source = self.add_subscription(topic, profile=qos.RECORDER, raw=True)
+                source = self.add_subscription(topic, qos.RECORDER, plain=False)
             self.sources[topic] = source
         self.types = dict(TOPIC_TYPES)
         for name, (type_name, message_type) in self.extra.items():

@@ -20,7 +20,6 @@ from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.controller_node import FOLLOWING
 from pam_actuation.nodes.controller_node import report_reason
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -103,10 +102,10 @@ class JointNode(LearningSwitch, ManagedNode):
         """Take the newest inputs, compute, send both commands and internals."""
         for topic, subscription, handler in self._inputs:
             for message, _ in subscription.take():
-                handler(from_ros(topic, message))
+                handler(message)
         for topic, side, subscription, handler in self._sides:
             for message, _ in subscription.take():
-                handler(side, from_ros(topic, message))
+                handler(side, message)
         commands, state = self.loop.tick(self.now_ns(), self.learning)
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)

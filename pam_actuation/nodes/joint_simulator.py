@@ -16,7 +16,6 @@
 
 import sys
 
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
@@ -63,7 +62,7 @@ class JointSimulator(PhysicsNode):
         """Apply what arrived, run physics to the present, measure."""
         now_ns = self.now_ns()
         arrived = [
-            (from_ros('valve_signal', message), self.plant.signals[side].take)
+            (message, self.plant.signals[side].take)
             for side in SIDES for message, _ in self.signals[side].take()]
         for topic, plain in self.measured(now_ns, arrived).items():
             self.send(topic, plain)

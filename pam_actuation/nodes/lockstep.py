@@ -25,7 +25,6 @@ while, so that time goes on and its loss has the consequences it has in life.
 
 import time
 
-from pam_actuation.nodes.conversions import stamp_ns
 from pam_actuation.nodes.endpoints import full_name
 from pam_sim.errors import InputError
 
@@ -112,7 +111,7 @@ class Stamped:
 
     def follows(self, before_ns):
         """Return whether the newest message is of a certain tick or later."""
-        return any(one.newest is not None and stamp_ns(one.newest) >= before_ns
+        return any(one.newest is not None and one.newest.stamp_ns >= before_ns
                    for one in self.subscriptions)
 
 

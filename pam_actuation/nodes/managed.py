@@ -29,7 +29,6 @@ import time
 import traceback
 
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.conversions import RosWriter
 from pam_actuation.nodes.conversions import type_of
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
 from pam_actuation.nodes.diagnostics import ERROR
@@ -46,6 +45,8 @@ from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.simulated_time import FollowedTime
 from pam_actuation.nodes.simulated_time import leave_clock_to_node
 from pam_actuation.nodes.timing import LoopTiming
+from pam_actuation.nodes.wire import WireReader
+from pam_actuation.nodes.wire import WireWriter
 from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -190,16 +191,22 @@ class ManagedNode(LifecycleNode):
         """Create the publisher of a topic of the rig; ``send`` publishes on it."""
         publisher = CountedPublisher(self, type_of(topic), topic)
         self.publishers_counted.append(publisher)
-        self._writers[topic] = (publisher, RosWriter(topic, self.value('muscle')))
+        self._writers[topic] = (publisher, WireWriter(topic, self.value('muscle')))
 
     def send(self, topic, plain):
         """Publish a plain message."""
         publisher, writer = self._writers[topic]
         publisher.publish(writer.fill(plain))
 
-    def add_subscription(self, topic, **options):
-        """Create and return a polled subscription of a topic of the rig."""
-        subscription = PolledSubscription(self, type_of(topic), topic, **options)
+    def add_subscription(self, topic, profile=None, plain=True):
+        """
+        Create and return a polled subscription of a topic of the rig.
+
+        It gives plain messages; without ``plain`` the bytes, as they came.
+        """
+        subscription = PolledSubscription(
+            self, type_of(topic), topic, profile, raw=True,
+            read=WireReader(topic) if plain else None)
         self.subscriptions_polled.append(subscription)
         return subscription
 

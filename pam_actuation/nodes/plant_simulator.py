@@ -17,7 +17,6 @@
 import sys
 
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
@@ -124,10 +123,9 @@ class PlantSimulator(PhysicsNode):
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
         now_ns = self.now_ns()
-        arrived = [(from_ros('external_force', message), self.plant.set_external_force)
+        arrived = [(message, self.plant.set_external_force)
                    for message, _ in self.disturbances.take()]
-        arrived += [(from_ros('valve_signal', message), self.plant.set_signal)
-                    for message, _ in self.signals.take()]
+        arrived += [(message, self.plant.set_signal) for message, _ in self.signals.take()]
         messages = self.measured(now_ns, arrived)
         if not messages:
             return

@@ -24,7 +24,6 @@ from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
@@ -153,11 +152,10 @@ class ValveDriver(ManagedNode):
         return self._commanded or since_last_s >= EARLY_SHARE * self.loop.period_s
 
     def _take_commands(self):
-        taken = [(from_ros('pressure_command', message), info['publication_sequence_number'])
+        taken = [(message, info['publication_sequence_number'])
                  for message, info in self.commands.take()]
         if self.raw_commands is not None:
-            raw = [(from_ros('valve_command', message), None)
-                   for message, _ in self.raw_commands.take()]
+            raw = [(message, None) for message, _ in self.raw_commands.take()]
             # One sender takes turns on the two topics: they are one sequence by stamp.
             taken = sorted(taken + raw, key=lambda item: item[0].stamp_ns) if raw else taken
         for plain, sequence in taken:
@@ -171,9 +169,9 @@ class ValveDriver(ManagedNode):
         """Take what arrived, decide, send."""
         self._take_commands()
         for message, _ in self.pressures.take():
-            self.loop.on_pressure(from_ros('pressure', message))
+            self.loop.on_pressure(message)
         for message, _ in self.supplies.take():
-            self.loop.on_supply(from_ros('supply_pressure', message))
+            self.loop.on_supply(message)
         now_ns = self.now_ns()
         signal, status = self.loop.tick(now_ns)
         problem = self.output.send(signal.efforts)

@@ -17,7 +17,6 @@
 import sys
 
 from pam_actuation.drivers.watchdog import SignalWatchdog, VENTS
-from pam_actuation.nodes.conversions import from_ros
 from pam_actuation.nodes.diagnostics import ERROR, OK
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -58,7 +57,7 @@ class ValveWatchdog(ManagedNode):
         """Take what was said; if the driver is silent, vent."""
         now_ns = self.now_ns()
         for message, _ in self.signals.take():
-            self.watchdog.on_signal(from_ros('valve_signal', message), now_ns)
+            self.watchdog.on_signal(message, now_ns)
         signal = self.watchdog.tick(now_ns)
         if signal is not None:
             self.send('valve_signal', signal)

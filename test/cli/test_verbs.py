@@ -21,7 +21,7 @@ import re
 import subprocess
 import sys
 
-from pam_actuation.cli.main import VERBS
+from pam_actuation.cli.main import main, VERBS
 import pytest
 
 
@@ -168,13 +168,23 @@ def _mistakes(folder, bags):
     }
 
 
-def test_mistakes_get_one_sentence_and_exit_code_2(bags, tmp_path):
+def test_mistakes_get_one_sentence_and_exit_code_2(bags, tmp_path, capsys):
     for what, (arguments, words) in _mistakes(tmp_path, bags).items():
-        done = pam(*arguments)
-        assert done.returncode == 2, (what, done.stdout, done.stderr)
-        assert done.stderr.count('\n') == 1 and 'Traceback' not in done.stderr, (what, done.stderr)
-        assert all(word in done.stderr for word in words), (what, done.stderr)
+        code = main([str(argument) for argument in arguments])
+        said = capsys.readouterr().err
+        assert code == 2, (what, said)
+        assert said.count('\n') == 1 and 'Traceback' not in said, (what, said)
+        assert all(word in said for word in words), (what, said)
         assert not (tmp_path / 'out').exists(), what
+
+
+@pytest.mark.parametrize('what', ['controller', 'truncated bag'])
+def test_a_mistake_ends_the_process_with_exit_code_2(what, bags, tmp_path):
+    arguments, words = _mistakes(tmp_path, bags)[what]
+    done = pam(*arguments)
+    assert done.returncode == 2, (done.stdout, done.stderr)
+    assert done.stderr.count('\n') == 1 and 'Traceback' not in done.stderr, done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
 
 
 def test_a_broken_off_recording_can_still_be_read(bags, tmp_path):

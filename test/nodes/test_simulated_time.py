@@ -27,12 +27,11 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
 from lifecycle_msgs.srv import ChangeState                                  # noqa: E402
 from live_rig import LiveRig, wait_for                                      # noqa: E402
-from pam_actuation.messages import START_NS                                 # noqa: E402
+from pam_actuation.messages import Pressure, START_NS                       # noqa: E402
 from pam_actuation.nodes.lockstep import EachTick, OneTickOld               # noqa: E402
 from pam_actuation.nodes.lockstep import participants_of, Stamped           # noqa: E402
 from pam_actuation.nodes.lockstep import TickInputs                         # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
-from sensor_msgs.msg import FluidPressure                                   # noqa: E402
 from std_srvs.srv import SetBool, Trigger                                   # noqa: E402
 
 FOLDER = Path(__file__).resolve().parents[2] / 'benchmarks'
@@ -50,9 +49,7 @@ class Messages:
         self.newest = None
 
     def put(self, stamp_ns):
-        self.newest = FluidPressure()
-        stamp = self.newest.header.stamp
-        stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+        self.newest = Pressure(stamp_ns, 2e5)
         self.received += 1
 
     def collect(self):
