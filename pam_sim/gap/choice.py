@@ -29,6 +29,7 @@ FIRST_STEP = 0.25            # least share of the gap a first effect explains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
+SAME_FORM = 0.002            # of the gap an effect explains; no formulation is that true
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
 UNPOLISHED = 0.5             # of the rest a fit may still be better than it seems
 EDGE = 0.02                  # of a shape to the end of its range, in its logarithm
@@ -137,13 +138,16 @@ class Choice:
         best = ranked[0].found.errors[s]
         for r in ranked:
             r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
-        half = RIVAL * ranked[0].share[s]
-        tied = [r for r in ranked if r is ranked[0]
-                or (r.t[s] < CERTAIN_T and r.share[s] > half)]
+        top = ranked[0].share[s]
+        before = share(cut, self.base.errors[s], current.errors[s])
+        alike = top - SAME_FORM * max(top - before, 0.0)
+        same = {id(r) for r in ranked if r.share[s] >= alike}
+        tied = [r for r in ranked if id(r) in same
+                or (r.t[s] < CERTAIN_T and r.share[s] > RIVAL * top)]
         strain = min(self._strain(r.found) for r in tied)
         tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
         names = {r.name for r in tied}
-        as_good = {r.name for r in tied if r.t[s] < BETTER_T}
+        as_good = {r.name for r in tied if r.t[s] < BETTER_T or id(r) in same}
         return [r for r in tied
                 if not any((simple, r.name) in LIMITS for simple in as_good)
                 and SAME_AS.get(r.name) not in names]

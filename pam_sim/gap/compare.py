@@ -18,18 +18,22 @@ Which of two fitted hypotheses the held-out data prefer, and how much each expla
 A share of the gap is taken inside one cut, so that a badly fitting subsystem cannot
 drown another. Rivals are compared block by block on the logarithm of their squared
 errors, in blocks where there is something to explain: a mean over everything would
-let the few blocks with the largest error decide.
+let the few blocks with the largest error decide. Blocks in which both say the same are
+left out too, or what a second recording tells would drown in the first.
 """
 
 import numpy as np
 from pam_sim.gap.parts import SELECT
+from scipy.stats import norm, t as student, wilcoxon
 
 ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks say nothing
 ACTIVE_SHARE = 0.05          # of the mean gap
+OF_MEAN = 0.5                # squared difference of two rivals that are alike everywhere
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
 MIN_BLOCKS = 4
 CERTAIN_T = 3.0
 NO_TEST_T = 0.0
+LARGEST_T = 37.0             # beyond it the probability is below what a float holds
 
 
 def gap(cut, errors, part=SELECT):
@@ -58,7 +62,11 @@ def block_chi2(cut, errors, part=SELECT):
 
 def preference(cut, base, better, worse, part=SELECT):
     """
-    Return t of the paired log ratio of squared errors, positive where ``better`` is.
+    Return by how many deviations the log ratio of squared errors says ``better``.
+
+    Student's t over the blocks, or Wilcoxon's signed ranks where they say it more clearly (all
+    blocks agree, but some differ by far more), each as the deviation of a normal distribution
+    that is as rare: few blocks must agree the more.
 
     Parameters
     ----------
@@ -76,12 +84,22 @@ def preference(cut, base, better, worse, part=SELECT):
 
     """
     _, before = block_chi2(cut, base, part)
-    mean = max(float(np.mean(before)) - cut.level, 0.0)
-    least = max(min(ACTIVE_GAP, mean), ACTIVE_SHARE * mean)
-    active = before - cut.level > least
+    _, apart = block_chi2(cut, better - worse, part)
+    active = _active(before - cut.level, 1.0) & _active(apart, OF_MEAN)
     if active.sum() < MIN_BLOCKS:
         return NO_TEST_T
     first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))
     ratio = np.log(second / first)
+    if not ratio.any():
+        return NO_TEST_T
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
-    return float(np.mean(ratio) / max(spread, 1e-9))
+    t = float(np.mean(ratio) / max(spread, 1e-9))
+    towards = np.sign(t) * ratio
+    rare = min(student.sf(abs(t), ratio.size - 1), wilcoxon(towards, alternative='greater').pvalue)
+    return float(np.copysign(min(norm.isf(rare), LARGEST_T), t))
+
+
+def _active(values, of_mean):
+    """Return in which blocks there is enough of something [floors squared] to count."""
+    mean = max(float(np.mean(values)), 0.0)
+    return values > max(min(ACTIVE_GAP, of_mean * mean), ACTIVE_SHARE * mean)

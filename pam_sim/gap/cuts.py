@@ -153,7 +153,7 @@ class Cut:
             with self._lock:                 # several threads count at once
                 self.simulations += 1
             for name in instants:
-                late = numbers.get('force_skew', 0.0) if name == 'force' else 0.0
+                late = numbers.get(of_run('force_skew', index), 0.0) if name == 'force' else 0.0
                 place = np.clip((instants[name] - late) / GRID_S, 0.0, len(response) - 1.001)
                 row = place.astype(int)
                 value = getattr(response, FIELD[name])
@@ -213,13 +213,14 @@ class ValveCut(Cut):
 
     @staticmethod
     def _nuisances(recordings):
-        recording = recordings[0]
-        found = [Known('latency', 's', LATENCY_PRIOR_S, LATENCY_SD_S, 0.0, LATENCY_MAX_S, False,
-                       GRID_S / LATENCY_SD_S)]
-        if recording.valve == 'hsv':        # a closed volume keeps the error of its start
-            sd = max(noise_sd(recording.measured['pressure']), SMALLEST['pressure'])
-            found.append(Known('start_error', 'Pa', 0.0, sd, -START_MAX_SD * sd,
-                               START_MAX_SD * sd, False))
+        found = []
+        for index, recording in enumerate(recordings):
+            found.append(Known(of_run('latency', index), 's', LATENCY_PRIOR_S, LATENCY_SD_S, 0.0,
+                               LATENCY_MAX_S, False, GRID_S / LATENCY_SD_S))
+            if recording.valve == 'hsv':    # a closed volume keeps the error of its start
+                sd = max(noise_sd(recording.measured['pressure']), SMALLEST['pressure'])
+                found.append(Known(of_run('start_error', index), 'Pa', 0.0, sd,
+                                   -START_MAX_SD * sd, START_MAX_SD * sd, False))
         return found
 
     def _disturb(self, random):
@@ -231,10 +232,10 @@ class ValveCut(Cut):
         shift = None if self._shift_s is None else self._shift_s[index]
         x = _true('contraction', rig, *self._motion[index])
         kept = [e for e in rig.effects if acts_on(e.name, 'valve')]
-        p = self._start[index]['pressure'] + numbers.get('start_error', 0.0)
+        p = self._start[index]['pressure'] + numbers.get(of_run('start_error', index), 0.0)
         return simulate_driven(
             rig.with_(effects=kept), recording, x,
-            recording.valve_signal(numbers['latency'], shift),
+            recording.valve_signal(numbers[of_run('latency', index)], shift),
             _true('pressure', rig, p, 0.0))
 
 
@@ -263,8 +264,9 @@ class MechanicsCut(Cut):
 
     @staticmethod
     def _nuisances(recordings):
-        cell = any('force' in r.signals for r in recordings)
-        late = ('pressure_skew', 'force_skew') if cell else ('pressure_skew',)
+        late = [of_run(name, index) for index, r in enumerate(recordings)
+                for name in ('pressure_skew', 'force_skew')
+                if name == 'pressure_skew' or 'force' in r.signals]
         return [Known(n, 's', 0.0, SKEW_SD_S, -SKEW_MAX_S, SKEW_MAX_S, False) for n in late]
 
     def _coarse(self, rig):
@@ -283,7 +285,7 @@ class MechanicsCut(Cut):
     def _simulate(self, rig, index, numbers):
         recording = self.recordings[index]
         rig = pressure_driven(rig)
-        command = self._command(rig, index, numbers['pressure_skew'])
+        command = self._command(rig, index, numbers[of_run('pressure_skew', index)])
         start = max(_true('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
         if recording.driven:
             x = np.interp(recording.grid_s, recording.time_s['contraction'],
@@ -322,6 +324,11 @@ def known_numbers(rig):
             for p in rig.parameter_list
             if rig.tolerance[p.name] > 0.0 and rig.parameters[p.name] != 0.0
             and p.name not in other]
+
+
+def of_run(name, index):
+    """Return what a number of the measurement is called in a recording: each has its own."""
+    return name if index == 0 else f'{name}_{index + 1}'
 
 
 def acts_on(effect, subsystem):

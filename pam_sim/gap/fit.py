@@ -156,7 +156,7 @@ class Problem:
     """
 
     def __init__(self, rig, cuts, use=(FIT,)):
-        self.rig, self.cuts, self.use = rig, cuts, use
+        self.rig, self.cuts, self.use, self.box = rig, cuts, use, BOX
         self.slopes = {}
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in cuts})
         self.base = self.fit_base()
@@ -231,6 +231,13 @@ class Problem:
                 break
         self.slopes = kept
         return found
+
+    def unbent(self, found, box):
+        """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""
+        kept, self.box = self.box, box
+        held = self.polish(self.fit(found.hypothesis, found.theta, found))
+        self.box = kept
+        return held
 
     def cost(self, found):
         """Return the mean squared error over the fitted parts, in floors squared, all cuts."""
@@ -315,7 +322,7 @@ class _Search:
             lowest, highest = cut.bounds()
             for k, at_least, at_most in zip(cut.known, lowest, highest):
                 freed = k.name in hypothesis.freed
-                box = FREE_BOX if freed or not k.of_rig else BOX
+                box = FREE_BOX if freed or not k.of_rig else problem.box
                 if hold and k.unit == 's' and not k.of_rig:
                     box = HELD_BOX
                 low.append(max(at_least, -box))

@@ -20,12 +20,13 @@ recorded valve signal alone.
 """
 
 import numpy as np
-from pam_sim.gap.free_run import free_run
+from pam_sim.gap.free_run import free_run, START_S
 from pam_sim.gap.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT
 
-INPUT_DRAWS = 3
+INPUT_DRAWS = 8
+MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
 
 def numbers_of(problem, found):
@@ -67,6 +68,15 @@ def moved(recording, first, second, chosen=None):
     return found
 
 
+def start_error_sd(recording):
+    """Return the standard deviation [Pa] of the pressure that a free run starts from."""
+    time_s = recording.time_s['pressure']
+    noise = noise_of(time_s, recording.measured['pressure'])
+    white = MEDIAN_SD * noise.white_sd / np.sqrt(max(np.sum(time_s <= START_S), 1))
+    return float(np.hypot(white, noise.slow_sd * min(1.0, np.sqrt(
+        2.0 * noise.memory_s / START_S))))
+
+
 class Proof:
     """
     Free runs of a model before and after on one recording.
@@ -82,7 +92,8 @@ class Proof:
     base, final : Found
         Numbers calibrated alone, and the final model.
     seed : int
-        Of the draws that carry stamp errors of the valve signal into the floor.
+        Of the draws that carry stamp errors of the valve signal, and the error of the pressure
+        that a run of its own starts from, into the floor.
 
     """
 
@@ -94,14 +105,17 @@ class Proof:
         self.before = free_run(problem.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
-        self.noise = {s: noise_of(recording.time_s[s], recording.measured[s]).sd
-                      for s in recording.signals}
-        self.floor = self._floors(final, whole, seed)
+        self._slow = {s: self._slow_noise(s) for s in recording.signals}
+        self.noise = {s: float(np.hypot(
+            noise_of(recording.time_s[s], recording.measured[s]).sd, self._slow[s]))
+            for s in recording.signals}
+        # A valve that adds up its errors drifts: one run may be off by far more than the mean.
+        self.floor, self.highest_floor = self._floors(final, whole, seed)
 
-    def run(self, found, whole, stamp_shift_s=None):
+    def run(self, found, whole, stamp_shift_s=None, start_error_pa=0.0):
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.problem, found)
-        start = 0.0 if whole else measurement.get('start_error', 0.0)
+        start = start_error_pa if whole else measurement.get('start_error', 0.0)
         return free_run_of(self.problem, found, self.recording, start, stamp_shift_s)
 
     def signals(self):
@@ -120,6 +134,24 @@ class Proof:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
         return moved(self.recording, self.after, self.run(found, whole), self.part)
 
+    def confirmed(self, found, whole):
+        """
+        Return by how much the squared errors fall from a fit's to the final model's.
+
+        In what the two are apart, squared; all signals in deviations of their sensors. 1 for a
+        true effect, -1 for one that is not there, whatever the noise: the errors of the true
+        model have nothing in common with either.
+        """
+        fell = apart = 0.0
+        before = self.run(found, whole)
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            first, last = (r[s][chosen] - self.recording.measured[s][chosen]
+                           for r in (before, self.after))
+            fell += float(np.mean(first ** 2 - last ** 2)) / variance
+            apart += float(np.mean((first - last) ** 2)) / variance
+        return fell / apart if apart > 0.0 else 1.0
+
     def unexplained(self):
         """Return the share of the squared gap left after calibration that is still there."""
         before = after = 0.0
@@ -134,12 +166,25 @@ class Proof:
 
     def _floors(self, final, whole, seed):
         random, r = np.random.default_rng(seed), self.recording
-        squares = dict.fromkeys(r.signals, 0.0)
+        squares, start_sd = {s: [] for s in r.signals}, start_error_sd(r)
         for _ in range(INPUT_DRAWS):
             shift = STAMP_SD_S * random.standard_normal(r.messages)
-            moved = self.run(final, whole, shift)
+            moved = self.run(final, whole, shift, start_sd * random.standard_normal())
             self.simulations += 1
             for s in r.signals:
-                squares[s] += float(np.mean((moved[s] - self.after[s]) ** 2)) / INPUT_DRAWS
-        return {s: sensor_floor(r.time_s[s], r.measured[s], s, np.sqrt(squares[s]))
-                for s in r.signals}
+                squares[s].append(float(np.mean((moved[s] - self.after[s]) ** 2)))
+        return [{s: sensor_floor(r.time_s[s], r.measured[s], s,
+                                 float(np.sqrt(of(squares[s]) + self._slow[s] ** 2)))
+                 for s in r.signals} for of in (np.mean, np.max)]
+
+    def _slow_noise(self, signal):
+        """
+        Return the slow noise that the other recordings show at rest, 0 where this one shows it.
+
+        It is the same sensor, and a recording without rest hides its slow noise.
+        """
+        r = self.recording
+        if noise_of(r.time_s[signal], r.measured[signal]).slow_sd > 0.0:
+            return 0.0
+        return max((noise_of(o.time_s[signal], o.measured[signal]).slow_sd
+                    for o in self.problem.cuts[0].recordings if signal in o.signals), default=0.0)

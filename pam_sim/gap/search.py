@@ -24,9 +24,10 @@ missed when it is left out.
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
+from pam_sim.gap.candidates import candidates, LIMITS
+from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.cuts import LATENCY_SD_S
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
@@ -38,9 +39,12 @@ MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
 BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
+STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
+UNBENT = 0.98                # share of the gap
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 DONE = 0.01                  # rest of the gap that formulations may leave
+TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
 RIVALS = 4                   # that are ranked again when further effects are in
 
 
@@ -69,6 +73,17 @@ class Outcome:
     share: dict
     complete: bool = True
     screened: list = field(default_factory=list)
+
+
+def within_the_chain(found, place):
+    """
+    Return whether an effect is a time so short that any sensor's filter may be its cause.
+
+    A latency stands for the filters that all sensors share; that leaves a part of them.
+    """
+    candidate = found.hypothesis.effects[place]
+    return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
+            and found.values()[place][candidate.free[0].name] < LATENCY_SD_S)
 
 
 class Search:
@@ -129,6 +144,7 @@ class Search:
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named = self._eliminate(current, named)
         current, named = self._established(*self._resolve(current, named))
+        current = self._straightened(current)
         explained = self._explained(current)
         poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
         for w in [w for w in named if w.subsystem in poor]:
@@ -173,9 +189,26 @@ class Search:
         """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
         s = cut.subsystem
         least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
-        bent = any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
-                   for known, z in zip(cut.known, current.known_z[s]))
-        return bent or explained.get(s, 0.0) < least
+        return self._is_bent(cut, current) or explained.get(s, 0.0) < least
+
+    @staticmethod
+    def _is_bent(cut, current):
+        return any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
+                   for known, z in zip(cut.known, current.known_z[cut.subsystem]))
+
+    def _straightened(self, current):
+        """
+        Return the fit with its numbers near their priors, where it does not need them bent.
+
+        A small misfit of the form can pull a number far, and a fit can stop beside its best.
+        """
+        bent = [c.subsystem for c in self.problem.cuts if current.hypothesis.touches(c)
+                and self._is_bent(c, current)]
+        if not bent:
+            return current
+        held = self.problem.unbent(current, STRAIGHT)
+        shares = self.choice.shares(held)
+        return held if all(shares[s] > UNBENT for s in bent) else current
 
     def _explained(self, current):
         return {s: explained for s, explained in self.choice.shares(current).items()
@@ -305,6 +338,8 @@ class Search:
         for w in list(named):
             if len(named) < 2:
                 break
+            if w not in named:
+                continue
             without = self._swapped(current, w.name)
             s, cut = w.subsystem, self._cut(w.subsystem)
             rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
@@ -312,15 +347,30 @@ class Search:
             sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
             if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
                     current, without):
+                w, without = self._simpler(current, w, without, named)
                 current, named = without, [o for o in named if o is not w]
         return current, named
 
+    def _simpler(self, current, w, without, named):
+        """
+        Return (which effect goes, the fit without it) where ``w`` is not missed.
+
+        The other one goes where, without ``w``, it turns into that, its limit, and ``w`` alone
+        explains almost as much as both.
+        """
+        for other in named:
+            if (w.name, other.name) in LIMITS and Rival(other.name, without).at_edge:
+                alone, s = self._swapped(current, other.name), w.subsystem
+                if self.choice.shares(alone)[s] > ALMOST * self.choice.shares(current)[s]:
+                    return other, alone
+        return w, without
+
     def _established(self, current, named):
-        """Drop effects whose size does not clearly differ from none."""
+        """Drop effects whose size does not clearly differ from none, or is the measurement's."""
         for w in list(named):
             names = [c.name for c in current.hypothesis.effects]
-            if w.name in names and self.problem.certainty(
-                    current, names.index(w.name)) < CERTAIN_SIZE:
+            if w.name in names and (within_the_chain(current, names.index(w.name)) or (
+                    self.problem.certainty(current, names.index(w.name)) < CERTAIN_SIZE)):
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return current, named

@@ -31,13 +31,14 @@ from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
 from pam_sim.gap.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
-from pam_sim.gap.words import explain
+from pam_sim.gap.words import explain, join
 from scipy.stats import norm
 
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
+CONFIRMED = 0.3              # of what an effect moves; the truth takes all of it out of the errors
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -101,6 +102,12 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     final, base = problem.polish(outcome.final), problem.fit_base()
     proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
+    if outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
+        names = join(w.name for w in outcome.named)
+        result.remarks.append(f'What {names} would explain of the recordings is not found '
+                              'again in the certify data, so nothing is named.')
+        outcome.named, final = [], base
+        proof = Proof(witness, certify is not None, problem, base, final, seed)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     _fill(result, problem, outcome, final, proof)
@@ -157,8 +164,8 @@ def _judge(result, outcome, problem, proof, base, materiality, whole):
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.pull) > BOX]
-    left = max((beyond(s.rmse_refit, FLOOR_ERROR * s.noise_floor) / max(proof.noise[name], 1e-12)
-                for name, s in result.signals.items()), default=0.0)
+    left = max((beyond(s.rmse_refit, FLOOR_ERROR * proof.highest_floor[name]) / max(
+        proof.noise[name], 1e-12) for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (
             named or left <= UNNAMED * materiality)):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []

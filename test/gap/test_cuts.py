@@ -76,6 +76,15 @@ def test_a_force_recorded_in_one_of_two_runs_is_used():
     assert cut.signals == ('contraction', 'force')
     # At 200 Hz: 8 s of contraction in both, of force in one.
     assert [int((cut.signal == s).sum() // 800) for s in range(2)] == [3, 1]
+    # Another day, another skew: each recording has its own.
+    assert [k.name for k in cut.known if not k.of_rig] == [
+        'pressure_skew', 'pressure_skew_2', 'force_skew_2']
+    late, z = cut.known[[k.name for k in cut.known].index('pressure_skew_2')], np.zeros(
+        len(cut.known))
+    still = cut.values(nominal(), z)
+    z[cut.known.index(late)] = 1.0
+    moved = cut.values(nominal(), z) != still
+    assert moved[cut.run == 1].any() and not moved[cut.run == 0].any()
 
 
 def test_noise_with_a_memory_is_measured_where_the_signal_rests():

@@ -227,8 +227,11 @@ def test_an_overlay_of_the_true_model_stays_near():
     assert np.sqrt(np.mean((contraction.recorded - contraction.simulated) ** 2)) < 1e-4
 
 
-def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path):
-    from pam_actuation.experiments import load_experiment
+def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypatch):
+    from pam_actuation.experiments import load_experiment, separating
+    pieces = separating.menu('ppr')
+    monkeypatch.setattr(separating, 'menu', lambda valve: {
+        n: pieces[n] for n in ('speeds', 'holds')})
     rig = nominal().with_(effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
     run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
@@ -239,3 +242,5 @@ def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path):
     assert 'force' in result.next_experiment['needs']
     found = load_experiment(str(tmp_path / 'next_experiment.yaml'))
     assert found.domain == 'pressure' and 'force' in found.needs
+    # The better piece, then the other one.
+    assert found.name in ('tell_apart_speeds_holds', 'tell_apart_holds_speeds')

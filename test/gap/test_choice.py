@@ -1,0 +1,180 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which rivals the data tell apart, and which experiment would."""
+
+from gap_runs import nominal, recorded
+import numpy as np
+from pam_actuation.experiments.separating import separation
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Choice, Named, Rival
+from pam_sim.gap.compare import CERTAIN_T, preference
+from pam_sim.gap.cuts import Cut, Known
+from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.parts import SELECT
+from pam_sim.gap.prove import Proof, start_error_sd
+from pam_sim.gap.search import Search, within_the_chain
+import pytest
+
+SAMPLES = 100                # of a block
+
+
+class Blocks(Cut):
+    """Time blocks of one signal that judge; nothing is simulated."""
+
+    subsystem, signals, known = 'muscle', ('contraction',), []
+
+    def __init__(self, count):
+        self.block = np.repeat(np.arange(count), SAMPLES)
+        self.part = np.full(self.block.size, SELECT)
+        self.signal = np.zeros(self.block.size, dtype=int)
+        self.level = 1.0
+
+
+def errors(cut, seed, off):
+    """Return noise, the same for all rivals of a seed, plus what a rival is off by block."""
+    noise = np.random.default_rng(seed).standard_normal(cut.block.size)
+    return noise + np.asarray(off, dtype=float)[cut.block]
+
+
+@pytest.mark.parametrize('telling, says', [(8, True), (4, False), (3, False)])
+def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, says):
+    cut, rare = Blocks(80), np.arange(80) < telling
+    base = errors(cut, 0, np.full(80, 5.0))
+    better = errors(cut, 0, np.zeros(80))
+    # Where there are few blocks, they must agree the more: in these some say little.
+    worse = errors(cut, 0, np.where(rare, np.where(np.arange(80) % 4, 3.0, 0.8), 0.01))
+    found = preference(cut, base, better, worse)
+    assert (found > CERTAIN_T) == says
+    assert preference(cut, base, worse, better) == pytest.approx(-found)
+
+
+@pytest.mark.parametrize('off, tied', [(0.1, True), (1.0, False)])
+def test_no_rival_goes_for_less_than_a_formulation_may_be_off(off, tied):
+    cut = Blocks(60)
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
+
+    class Given:
+        cuts = [cut]
+
+    def found(name, left):
+        effects = (by_name[name],) if name else ()
+        return Found(Hypothesis(effects), np.ones(len(effects)), {'muscle': np.zeros(0)},
+                     {'muscle': errors(cut, 1, np.full(60, left))}, {})
+
+    base = found('', 5.0)
+    choice = Choice(Given(), base, 2.0)
+    rivals = [Rival(n, found(n, left)) for n, left in (
+        ('bladder_stiffness', 0.0), ('parallel_spring', off))]
+    for r in rivals:
+        r.share = choice.shares(r.found)
+    names = [r.name for r in choice.tied(rivals, base, cut)]
+    # Both differ in every block alike, beyond doubt.
+    assert rivals[1].t['muscle'] > CERTAIN_T
+    assert names == ['bladder_stiffness', 'parallel_spring'][:1 + tied]
+
+
+@pytest.mark.parametrize('real, share', [(1.0, 1.0), (0.0, -1.0)])
+def test_the_certify_run_confirms_what_is_real(real, share):
+    time_s = np.arange(4000) * 0.005
+    effect = 2e-5 * np.sin(time_s)
+    noise = 1e-5 * np.random.default_rng(2).standard_normal(time_s.size)
+    proof = Proof.__new__(Proof)
+
+    class Given:
+        signals, measured = ('contraction',), {'contraction': real * effect + noise}
+
+    proof.recording, proof.part = Given(), {'contraction': np.ones(time_s.size, dtype=bool)}
+    proof.noise, proof.after = {'contraction': 1e-5}, {'contraction': effect}
+    proof.run = lambda found, whole: {'contraction': np.zeros(time_s.size)}
+    assert proof.confirmed(None, True) == pytest.approx(share, abs=0.1)
+
+
+def test_an_experiment_must_decide_in_many_places():
+    names = ('valve_dead_time', 'tube_lag')
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    rivals = [(n, None, Hypothesis((by_name[n],)), [1.0]) for n in names]
+    truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.01})])
+    levels = np.random.default_rng(4).uniform(3.2, 5.6, 40)
+    many, few = np.repeat(levels, 400), np.repeat((3.2, 5.6, 3.2), (3000, 3000, 2000))
+    # One edge leaves the lag off, but decides nothing.
+    assert decided(truth, rivals, few) < 1.0 <= decided(truth, rivals, many)
+
+
+def decided(truth, rivals, voltage):
+    run = recorded(truth, voltage, topics=('pressure', 'contraction'))
+    return separation(run, nominal(), rivals, False)[1]
+
+
+def test_a_free_run_knows_how_uncertain_its_start_is():
+    quiet, loud = (Recording(recorded(nominal(), np.full(3000, 4.0), noise=n), 'ppr')
+                   for n in (1.0, 3.0))
+    # Ten samples in the first 50 ms, of 300 Pa.
+    assert start_error_sd(quiet) == pytest.approx(1.25 * 300.0 / np.sqrt(10.0), rel=0.2)
+    assert start_error_sd(loud) == pytest.approx(3.0 * start_error_sd(quiet), rel=0.1)
+
+
+@pytest.mark.parametrize('alone, goes', [(0.96, 'hysteresis'), (0.7, 'coulomb_friction')])
+def test_a_friction_is_not_replaced_by_the_loop_that_has_turned_into_it(alone, goes):
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction', 'force'))}
+    loop = by_name['hysteresis_lugre']
+    narrow = Found(Hypothesis((loop,)), np.array([1.0, 0.0, loop.free[2].coordinate(
+        loop.free[2].upper)]), {}, {}, {})
+    dry = Found(Hypothesis((by_name['coulomb_friction'],)), np.ones(1), {}, {}, {})
+    both = Found(Hypothesis((*dry.hypothesis.effects, loop)), np.ones(4), {}, {}, {})
+
+    class Given(Search):
+        class choice:
+            shares = staticmethod(lambda found: {'muscle': alone if found is dry else 1.0})
+
+        def __init__(self):
+            self._swapped = lambda current, out: dry if out == 'hysteresis' else narrow
+
+    named = [Named(n, 'muscle', [], (n,)) for n in ('coulomb_friction', 'hysteresis')]
+    gone, without = Given()._simpler(both, named[0], narrow, named)
+    assert gone.name == goes and without is (dry if goes == 'hysteresis' else narrow)
+
+
+@pytest.mark.parametrize('within, names_stand', [(0.99, True), (0.9, False)])
+def test_a_number_that_is_bent_without_need_costs_no_name(within, names_stand):
+    cut = Blocks(4)
+    cut.known = [Known('damping_n_s_per_m', 'N s/m', 25.0, 0.5, 0.0, 100.0)]
+    friction = next(c for c in candidates(nominal(), ('contraction',))
+                    if c.effect == 'coulomb_friction')
+    bent, held = (Found(Hypothesis((friction,)), np.ones(1), {'muscle': np.array([z])}, {}, {})
+                  for z in (-3.5, -1.0))
+
+    class Given(Search):
+        class problem:
+            cuts, unbent = [cut], staticmethod(lambda found, box: held)
+
+        class choice:
+            shares = staticmethod(lambda found: {'muscle': within})
+
+        def __init__(self):
+            pass
+
+    assert Given()._straightened(bent) is (held if names_stand else bent)
+    assert Given()._straightened(held) is held
+
+
+@pytest.mark.parametrize('name, size, is_so', [
+    ('pressure_lag', 4e-4, True), ('pressure_lag', 4e-3, False), ('valve_dead_time', 8e-4, True),
+    ('creep', None, False), ('contraction_bias', 1e-5, False)])
+def test_a_lag_that_any_filter_may_have_is_no_effect(name, size, is_so):
+    effect = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
+                  if c.effect == name)
+    theta = [f.coordinate(size or f.scale) for f in effect.free]
+    assert within_the_chain(Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == is_so
