@@ -17,17 +17,15 @@ Notices a measured motion that stands still although the pressure moved the musc
 
 A frozen sensor goes on sending its last value with new stamps. It is told from a muscle at
 rest by the pressure: a value that stays the same to the last bit while the measured pressure
-changes by far more than friction can hold is not what the muscle does. Below some pressure a
-muscle is slack and its stop carries the load; what the pressure does there counts for nothing.
+changes by far more than friction can hold is not what the muscle does. At its resting length,
+or without a force, a muscle may lie on a stop, and pressure moves nothing until it lifts its
+load; a sensor that is frozen there is not noticed.
 """
 
 import math
 
-from pam_sim.units import P_ATM_PA
-
 AFTER_NS = 200_000_000
-SWING_PA = 80_000.0                     # friction holds the muscle over some 20 kPa
-CARRYING_PA = P_ATM_PA + 150_000.0      # from here on it carries a load
+SWING_PA = 150_000.0         # twice the dry friction of a bad rig holds it over 110 kPa
 RESUME_NS = 2_000_000_000
 
 
@@ -37,9 +35,16 @@ class FrozenMeasurement:
 
     ``frozen`` stays for at least 2 s and until the value has changed: a muscle that is blocked
     looks the same, and must not be filled against the obstacle again at once.
+
+    Parameters
+    ----------
+    resting : float
+        Contraction [m] or force [N] up to which the muscle may lie on a stop.
+
     """
 
-    def __init__(self):
+    def __init__(self, resting):
+        self.resting = resting
         self.frozen = False
         self._value = math.nan
         self._since_ns = 0
@@ -65,7 +70,7 @@ class FrozenMeasurement:
             self._lowest_pa, self._highest_pa = math.inf, -math.inf
             if self.frozen and now_ns - self._noticed_ns >= RESUME_NS:
                 self.frozen = False
-        if pressure_pa > CARRYING_PA:
+        if value > self.resting and math.isfinite(pressure_pa):
             self._lowest_pa = min(self._lowest_pa, pressure_pa)
             self._highest_pa = max(self._highest_pa, pressure_pa)
         if (self._highest_pa - self._lowest_pa > SWING_PA

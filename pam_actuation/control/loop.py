@@ -26,7 +26,7 @@ no contraction yet; older than 0.1 s; more     vents (command = atmosphere), say
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
 contraction the same to the last bit for       vents for at least 2 s and until it changes
-0.2 s while the pressure changed by 80 kPa
+0.2 s while the pressure changed by 150 kPa
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
@@ -59,6 +59,7 @@ _REASONS = {
     FORCE: (codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD, codes.FORCE_NOT_FINITE,
             codes.FORCE_IMPLAUSIBLE)}
 _FROZEN = {CONTRACTION: codes.CONTRACTION_FROZEN, FORCE: codes.FORCE_FROZEN}
+_RESTING = {CONTRACTION: 0.002, FORCE: 5.0}     # m, N: up to there it may lie on a stop
 
 REFERENCE_REASONS = {
     reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
@@ -132,7 +133,7 @@ class ControllerLoop:
         self.rejected_references = 0
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
-        self._frozen = FrozenMeasurement()
+        self._frozen = FrozenMeasurement(_RESTING[self.tracked])
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None
