@@ -105,7 +105,8 @@ class PolledSubscription:
     raw : bool
         Take serialized bytes instead of message objects.
     read : callable, optional
-        Turns what was taken into what ``take`` returns, such as a ``WireReader``.
+        Turns what was taken into what ``take`` returns, such as a ``WireReader``; what it
+        turns into None is dropped.
 
     """
 
@@ -152,6 +153,8 @@ class PolledSubscription:
                     return
                 if self._read is not None:
                     item = self._read(item[0]), item[1]
+                if item[0] is None:         # dropped, as the middleware does with message objects
+                    continue
                 waiting.append(item)
                 self.newest = item[0]
                 self.received += 1

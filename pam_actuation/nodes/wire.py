@@ -28,10 +28,12 @@ from types import SimpleNamespace
 from geometry_msgs.msg import WrenchStamped
 from pam_actuation.bags import cdr
 from pam_actuation.nodes.conversions import from_ros, RosWriter, type_of
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import JointState
 
+RMWError = rclpy_implementation.RMWError
 _STAMP = struct.Struct('<iI')
 _STAMP_OFFSET = len(cdr.ENCAPSULATION)
 _DOUBLE = struct.Struct('<d')
@@ -151,9 +153,12 @@ class WireReader:
         self._fixed = ()
 
     def __call__(self, raw):
-        """Return the plain message of CDR bytes."""
+        """Return the plain message of CDR bytes, None for bytes that are no such message."""
         if self._kind is None or not (self._known(raw) or self._learned(raw)):
-            return from_ros(self._topic, deserialize_message(raw, self._type))
+            try:
+                return from_ros(self._topic, deserialize_message(raw, self._type))
+            except RMWError:
+                return None
         stamp = self._view.header.stamp
         stamp.sec, stamp.nanosec = _STAMP.unpack_from(raw, _STAMP_OFFSET)
         self._kind.read(raw, self._view)

@@ -21,10 +21,15 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation import messages                                          # noqa: E402, I100
+from live_rig import wait_for                                               # noqa: E402, I100
+from pam_actuation import messages                                          # noqa: E402
 from pam_actuation.bags.codecs import TOPIC_TYPES                           # noqa: E402
 from pam_actuation.nodes.conversions import RosWriter, type_of              # noqa: E402
+from pam_actuation.nodes.endpoints import CountedPublisher                  # noqa: E402
+from pam_actuation.nodes.endpoints import PolledSubscription                # noqa: E402
 from pam_actuation.nodes.wire import WireReader, WireWriter                 # noqa: E402
+from pam_actuation.rigging.client import RigClient                          # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message      # noqa: E402
 from rosbags.typesys import get_typestore, Stores                           # noqa: E402
 from test_conversions import JOINT_SAMPLES, SAMPLES, STAMP_NS               # noqa: E402
@@ -95,3 +100,34 @@ def test_bytes_of_a_big_endian_machine_are_read_too():
     reader = WireReader('pressure')
     assert reader(raw) == messages.Pressure(3_000_000_007, 2.5e5)
     assert reader(WireWriter('pressure').fill(messages.Pressure(9, 1e5))).pressure_pa == 1e5
+
+
+@pytest.mark.parametrize('topic', ['pressure', 'contraction', 'force', 'reference_trajectory'])
+@pytest.mark.parametrize('raw', [
+    b'', b'\x00\x01\x00\x00', b'\x00\x01\x00\x00' + b'\xff' * 40,
+    b'\x00\x01\x00\x00' + bytes(8) + b'\x00\x00\x10\x00' + b'a' * 60])
+def test_bytes_that_are_no_message_are_dropped_and_the_next_one_is_read(topic, raw):
+    reader, plain = WireReader(topic), SAMPLES[topic]
+    good = bytes(serialize_message(RosWriter(topic).fill(plain)))
+    assert [reader(one) for one in (good, raw, good)] == [plain, None, plain]
+
+
+@pytest.mark.ros
+def test_a_node_drops_bytes_that_are_no_message():
+    lock = DomainLock()
+    client = RigClient(lock.domain_id)
+    try:
+        kind, topic = type_of('pressure'), '/muscle/pressure'
+        publisher = CountedPublisher(client.node, kind, topic)
+        subscription = PolledSubscription(
+            client.node, kind, topic, raw=True, read=WireReader(topic))
+        wait_for(lambda: subscription.publishers, 10.0, 'the publisher')
+        publisher.publish(b'\x00\x01\x00\x00' + b'\xff' * 40)
+        publisher.publish(WireWriter(topic).fill(SAMPLES['pressure']))
+        taken = []
+        wait_for(lambda: taken.extend(subscription.take()) or taken, 10.0, 'the message')
+        assert [message for message, _ in taken] == [SAMPLES['pressure']]
+        assert subscription.received == 1
+    finally:
+        client.close()
+        lock.release()
