@@ -44,11 +44,12 @@ from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLAN
 ALLOWED_MISSED = 0.001
 ALLOWED_RATIO = 2.0
 ECHO_PRIORITY = 3           # of the plant: 1 asked for, and its rank of 2
-LOOPS = ('plant_simulator', 'sofc_controller')
+LOOPS = (PLANT, 'sofc_controller')
 
 
 def echo(role):
     """Be one node of the bare echo until SIGTERM; the listener prints what it found."""
+    from pam_actuation.nodes.conversions import set_stamp, stamp_ns
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from sensor_msgs.msg import JointState
@@ -63,15 +64,13 @@ def echo(role):
         message = JointState(name=['ppr_voltage'], effort=[0.0])
 
         def talk():
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(
-                time.time_ns(), 10 ** 9)
+            set_stamp(message.header.stamp, time.time_ns())
             publisher.publish(message)
 
         node.create_timer(1.0 / CONTROLLER_HZ, talk)
     else:
         def hear(message):
-            stamp = message.header.stamp
-            latency.add(time.time_ns() - stamp.sec * 10 ** 9 - stamp.nanosec)
+            latency.add(time.time_ns() - stamp_ns(message))
 
         node.create_subscription(JointState, '/echo', hear, 10)
     refused = ask_for_realtime(ECHO_PRIORITY)
@@ -149,7 +148,7 @@ def judge(found):
         print(f'| {name} | {float(values["loop.period_wanted_ms"]):g} ms | {ticks} '
               f'| {missed} ({share:.3%}) | {int(values["loop.overruns"]) / ticks:.3%} '
               f'| {values["loop.jitter_max_ms"]} ms | {values["loop.busy_max_ms"]} ms |')
-    plant, beside = found['nodes']['plant_simulator'], found['echo']
+    plant, beside = found['nodes'][PLANT], found['echo']
     ratio = float(plant['input.latency.p99_ms']) / float(beside['echo.p99_ms'])
     good &= ratio <= ALLOWED_RATIO
     print('\n| age of a message | median | 99th percentile | longest |\n|---|---|---|---|')

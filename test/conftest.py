@@ -46,7 +46,7 @@ EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
 
 
 class StallPlugin:
-    """Tell failures of live tests on a machine that stood still from all others."""
+    """Tell failures on a machine that stood still from others; only live tests are run then."""
 
     def __init__(self):
         self._folder = tempfile.TemporaryDirectory()
@@ -58,16 +58,15 @@ class StallPlugin:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_setup(self, item):
         # What a whole module shares may have been spoiled by an earlier moment of the module.
-        self._begin_s.setdefault(item.nodeid.split('::')[0], time.monotonic())
+        self._begin_s.setdefault(item.path, time.monotonic())
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_makereport(self, item, call):
         report = (yield).get_result()
         if not report.failed:
             return
-        begin_s = self._begin_s[item.nodeid.split('::')[0]]
-        worst_s = self._watch.worst_s(begin_s, time.monotonic())
-        if item.get_closest_marker('ros') and worst_s > STALL_S:
+        worst_s = self._watch.worst_s(self._begin_s[item.path])
+        if worst_s > STALL_S:
             text = f'the machine stood still for up to {worst_s * 1e3:.0f} ms'
             report.sections.append(('stalls', text + ' since this file began'))
             self.failed.append(f'{item.nodeid}: {text}')

@@ -48,12 +48,12 @@ class StallWatch:
         self._process = subprocess.Popen([
             sys.executable, __file__, str(self.path), str(os.getpid())])
 
-    def worst_s(self, since_s, until_s):
-        """Return the longest stall [s] between two times of `time.monotonic`, 0.0 for none."""
+    def worst_s(self, since_s):
+        """Return the longest stall [s] since a time of `time.monotonic`, 0.0 for none."""
         worst = 0.0
         for line in self.path.read_text().splitlines():
             begin_s, end_s = (float(word) for word in line.split())
-            if end_s >= since_s and begin_s <= until_s:
+            if end_s >= since_s:
                 worst = max(worst, end_s - begin_s)
         return worst
 

@@ -33,8 +33,8 @@ class FrozenMeasurement:
     """
     Compares the newest value of what is tracked with the range of the pressure.
 
-    ``frozen`` stays for at least 2 s and until the value has changed: a muscle that is blocked
-    looks the same, and must not be filled against the obstacle again at once.
+    ``frozen`` stays until the value has changed and is still changing 2 s later: a muscle that
+    is blocked looks the same, and must not be filled against the obstacle again at once.
 
     Parameters
     ----------

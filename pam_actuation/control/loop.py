@@ -25,7 +25,7 @@ input                                          what the loop does
 no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
-contraction the same to the last bit for       vents for at least 2 s and until it changes
+contraction the same to the last bit for       vents until 2 s after it has changed
 0.2 s while the pressure changed by 150 kPa
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents

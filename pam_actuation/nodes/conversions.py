@@ -230,7 +230,7 @@ class RosWriter:
     def fill(self, plain):
         """Return the ROS message of a plain one; it is overwritten by the next call."""
         set_stamp(self.message.header.stamp, plain.stamp_ns)
-        self._fill(self.message, plain)
+        self.fill_into(self.message, plain)
         return self.message
 
     def fill_into(self, message, plain):

@@ -34,8 +34,6 @@ from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import JointState
 
 RMWError = rclpy_implementation.RMWError
-_STAMP = struct.Struct('<iI')
-_STAMP_OFFSET = len(cdr.ENCAPSULATION)
 _DOUBLE = struct.Struct('<d')
 
 
@@ -160,7 +158,7 @@ class WireReader:
             except RMWError:
                 return None
         stamp = self._view.header.stamp
-        stamp.sec, stamp.nanosec = _STAMP.unpack_from(raw, _STAMP_OFFSET)
+        stamp.sec, stamp.nanosec = cdr.split_stamp(cdr.stamp_of(raw))
         self._kind.read(raw, self._view)
         return from_ros(self._topic, self._view)
 

@@ -105,10 +105,10 @@ class Proof:
         self.before = free_run(problem.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
-        self._slow = {s: self._slow_noise(s) for s in recording.signals}
-        self.noise = {s: float(np.hypot(
-            noise_of(recording.time_s[s], recording.measured[s]).sd, self._slow[s]))
-            for s in recording.signals}
+        seen = {s: noise_of(recording.time_s[s], recording.measured[s]) for s in recording.signals}
+        # It is the same sensor, and a recording without rest hides its slow noise.
+        self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
+        self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
         self.floor, self.highest_floor = self._floors(final, whole, seed)
 
@@ -177,14 +177,7 @@ class Proof:
                                  float(np.sqrt(of(squares[s]) + self._slow[s] ** 2)))
                  for s in r.signals} for of in (np.mean, np.max)]
 
-    def _slow_noise(self, signal):
-        """
-        Return the slow noise that the other recordings show at rest, 0 where this one shows it.
-
-        It is the same sensor, and a recording without rest hides its slow noise.
-        """
-        r = self.recording
-        if noise_of(r.time_s[signal], r.measured[signal]).slow_sd > 0.0:
-            return 0.0
+    def _slow_elsewhere(self, signal):
+        """Return the slow noise that the fitted recordings show at rest, 0.0 if none does."""
         return max((noise_of(o.time_s[signal], o.measured[signal]).slow_sd
                     for o in self.problem.cuts[0].recordings if signal in o.signals), default=0.0)

@@ -168,13 +168,17 @@ def _mistakes(folder, bags):
     }
 
 
+def complained(code, said, words, what):
+    """Check that a mistake was told in one sentence and ended with exit code 2."""
+    assert code == 2, (what, said)
+    assert said.count('\n') == 1 and 'Traceback' not in said, (what, said)
+    assert all(word in said for word in words), (what, said)
+
+
 def test_mistakes_get_one_sentence_and_exit_code_2(bags, tmp_path, capsys):
     for what, (arguments, words) in _mistakes(tmp_path, bags).items():
         code = main([str(argument) for argument in arguments])
-        said = capsys.readouterr().err
-        assert code == 2, (what, said)
-        assert said.count('\n') == 1 and 'Traceback' not in said, (what, said)
-        assert all(word in said for word in words), (what, said)
+        complained(code, capsys.readouterr().err, words, what)
         assert not (tmp_path / 'out').exists(), what
 
 
@@ -182,9 +186,8 @@ def test_mistakes_get_one_sentence_and_exit_code_2(bags, tmp_path, capsys):
 def test_a_mistake_ends_the_process_with_exit_code_2(what, bags, tmp_path):
     arguments, words = _mistakes(tmp_path, bags)[what]
     done = pam(*arguments)
-    assert done.returncode == 2, (done.stdout, done.stderr)
-    assert done.stderr.count('\n') == 1 and 'Traceback' not in done.stderr, done.stderr
-    assert all(word in done.stderr for word in words), done.stderr
+    complained(done.returncode, done.stderr, words, what)
+    assert not (tmp_path / 'out').exists(), what
 
 
 def test_a_broken_off_recording_can_still_be_read(bags, tmp_path):
