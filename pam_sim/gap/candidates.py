@@ -153,6 +153,22 @@ _PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}
 
+NARROW_M = 1e-4              # bending of bristles; a loop below it is dry friction
+AT_PA = 4e5                  # at this pressure
+
+
+def is_narrow(candidate, values):
+    """
+    Return whether bristles slip after so short a way that they are dry friction.
+
+    Their stiffness alone does not tell: a small force bends stiff ones as little as a large
+    one bends stiffer ones.
+    """
+    if candidate.effect != 'hysteresis_lugre':
+        return False
+    force_n = values['force_n'] + AT_PA * values['force_per_pa']
+    return force_n < NARROW_M * values['stiffness_n_per_m']
+
 
 def candidates(rig, outputs, only=None):
     """

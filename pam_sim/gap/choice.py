@@ -21,7 +21,7 @@ numbers of the model bent is dropped, and the simpler one stands for the one it 
 
 from dataclasses import dataclass, field
 
-from pam_sim.gap.candidates import LIMITS
+from pam_sim.gap.candidates import is_narrow, LIMITS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import Found, Hypothesis
 
@@ -57,8 +57,9 @@ class Rival:
         """
         for place, c in enumerate(self.found.hypothesis.effects):
             if c.name == self.name:
-                return any(f.shape and min(abs(x - f.coordinate(end)) for end in (
-                    f.lower, f.upper)) < EDGE
+                return is_narrow(c, self.found.values()[place]) or any(
+                    f.shape and min(abs(x - f.coordinate(end)) for end in (
+                        f.lower, f.upper)) < EDGE
                     for f, x in zip(c.free, self.found.theta_of(place)))
         return False
 

@@ -19,7 +19,11 @@ The given model, the same with its numbers calibrated, and the final one run on 
 recorded valve signal alone.
 """
 
+from dataclasses import replace
+import math
+
 import numpy as np
+from pam_sim.gap.fit import Hypothesis
 from pam_sim.gap.free_run import free_run, START_S
 from pam_sim.gap.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
@@ -42,6 +46,12 @@ def model_of(problem, found):
     """Return the rig of a fit: numbers calibrated, effects added."""
     numbers, _ = numbers_of(problem, found)
     return problem.with_effects(found.settings()).with_(parameters=numbers)
+
+
+def without_effects(found):
+    """Return a fit less its effects, all numbers as they are."""
+    hypothesis = Hypothesis(freed=found.hypothesis.freed)
+    return replace(found, hypothesis=hypothesis, theta=np.zeros(0))
 
 
 def late_by(measurement):
@@ -142,15 +152,18 @@ class Proof:
         true effect, -1 for one that is not there, whatever the noise: the errors of the true
         model have nothing in common with either.
         """
+        return self.fall(self.run(found, whole), self.after)[0]
+
+    def fall(self, worse, better):
+        """Return (what ``confirmed`` tells of two free runs, how far they are apart, rms)."""
         fell = apart = 0.0
-        before = self.run(found, whole)
         for s in self.recording.signals:
             chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
             first, last = (r[s][chosen] - self.recording.measured[s][chosen]
-                           for r in (before, self.after))
+                           for r in (worse, better))
             fell += float(np.mean(first ** 2 - last ** 2)) / variance
             apart += float(np.mean((first - last) ** 2)) / variance
-        return fell / apart if apart > 0.0 else 1.0
+        return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
 
     def unexplained(self):
         """Return the share of the squared gap left after calibration that is still there."""

@@ -26,7 +26,9 @@ from pam_sim.gap.free_run import Recording
 from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
-from pam_sim.gap.prove import free_run_of, model_of, moved, numbers_of, Proof
+from pam_sim.gap.prove import (
+    free_run_of, model_of, moved, numbers_of, Proof, without_effects)
+from pam_sim.gap.refute import APART, refute
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
@@ -101,6 +103,11 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     problem.use = (FIT, SELECT)
     final, base = problem.polish(outcome.final), problem.fit_base()
     proof = Proof(witness, certify is not None, problem, base, final, seed)
+    first = final
+    outcome.named, final = refute(
+        outcome.named, problem, base, final, proof, certify is not None)
+    if final is not first:
+        proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
     if outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
         names = join(w.name for w in outcome.named)
@@ -111,7 +118,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     _fill(result, problem, outcome, final, proof)
-    _judge(result, outcome, problem, proof, base, materiality, certify is not None)
+    _judge(result, outcome, problem, proof, base, final, materiality, certify is not None)
     result.where = locate(rig, proof.recording, proof.before, proof.floor)
     result.traces = proof.traces()
     result.fingerprint = fingerprint(problem, base, final)
@@ -149,11 +156,13 @@ def _fill(result, problem, outcome, final, proof):
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
 
-def _judge(result, outcome, problem, proof, base, materiality, whole):
+def _judge(result, outcome, problem, proof, base, final, materiality, whole):
     """Set verdict, ambiguity set and the unexplained fraction of a result."""
     named = outcome.named
     result.moved = proof.moved(base, whole) if named else {}
-    material = max(result.moved.values(), default=0.0) > materiality
+    own = proof.moved(without_effects(final), whole) if named else {}
+    material = (max(own.values(), default=0.0) > materiality
+                and max(result.moved.values(), default=0.0) > min(materiality, APART))
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:

@@ -1,0 +1,87 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which names of a set the certify data contradict.
+
+Where two of a set differ on the certify data, the errors of the true one are the noise alone,
+and those of the other are larger by just what the two are apart. As a name needs to explain
+90 % of a gap and no more, for no formulation is the muscle's own, a smaller difference says
+nothing.
+"""
+
+from dataclasses import replace
+import math
+
+from pam_sim.gap.search import NAMED
+
+REFUTED = 0.5                # of what two are apart, squared; 1 if the better one is true
+APART = 0.3                  # standard deviations of a sensor; less says nothing
+
+
+def refute(named, problem, base, final, proof, whole):
+    """
+    Drop from sets of names those that the certify data contradict.
+
+    Parameters
+    ----------
+    named : list of Named
+        What was taken in.
+    problem : Problem
+    base, final : Found
+        Numbers calibrated alone, and the final model, with the first name of every set.
+    proof : Proof
+        Of the final model.
+    whole : bool
+        As of the Proof.
+
+    Returns
+    -------
+    named : list of Named
+        With shorter sets, the likeliest name first.
+    final : Found
+        The final model with these.
+
+    """
+    kept = []
+    for w in named:
+        fits = _comparable(w, problem, final)
+        runs = {name: proof.run(found, whole) for name, found in fits.items()}
+        before = proof.run(base, whole)
+        best = max(runs, key=lambda name: _squares_saved(proof, before, runs[name]), default=None)
+        gone = {name for name in runs if name != best and _contradicted(
+            *proof.fall(runs[name], runs[best]), proof.fall(before, runs[best])[1])}
+        names = tuple(n for n in w.names if n not in gone)
+        if w.name in gone:
+            final = fits[names[0]]
+        kept.append(replace(w, name=names[0], names=names))
+    return kept, final
+
+
+def _contradicted(fell, apart, moved):
+    return fell > REFUTED and apart > max(APART, math.sqrt(1.0 - NAMED) * moved)
+
+
+def _squares_saved(proof, before, run):
+    fell, apart = proof.fall(before, run)
+    return fell * apart ** 2
+
+
+def _comparable(w, problem, final):
+    """Return by name the fits that differ from the final one in this name alone."""
+    if len(w.names) < 2:
+        return {}
+    beside = set(final.hypothesis.names) - {w.name}
+    return {r.name: final if r.name == w.name else problem.polish(r.found) for r in w.rivals
+            if r.name in w.names and set(r.found.hypothesis.names) - {r.name} == beside}
