@@ -30,6 +30,7 @@ from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT
 
 INPUT_DRAWS = 8
+VISIBLE = 0.3                # standard deviations of a sensor; less cannot be told from none
 MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
 
@@ -48,10 +49,30 @@ def model_of(problem, found):
     return problem.with_effects(found.settings()).with_(parameters=numbers)
 
 
-def without_effects(found):
-    """Return a fit less its effects, all numbers as they are."""
-    hypothesis = Hypothesis(freed=found.hypothesis.freed)
-    return replace(found, hypothesis=hypothesis, theta=np.zeros(0))
+def held_without(found, kept=()):
+    """Return a fit less its effects but those of the names ``kept``; all numbers as they are."""
+    h = found.hypothesis
+    places = [i for i, c in enumerate(h.effects) if c.name in kept]
+    return replace(found, hypothesis=Hypothesis(tuple(h.effects[i] for i in places), h.freed),
+                   theta=np.concatenate([np.zeros(0), *(found.theta_of(i) for i in places)]))
+
+
+def is_material(own, refitted, materiality):
+    """
+    Return whether effects are worth a name.
+
+    That is, whether they move a signal by more than ``materiality`` while the numbers of the
+    model stay, and still by ``VISIBLE`` where these do what they can to replace them.
+
+    Parameters
+    ----------
+    own, refitted : dict of str -> float
+        How far each signal moves, in standard deviations of its sensor.
+    materiality : float
+
+    """
+    return (max(own.values(), default=0.0) > materiality
+            and max(refitted.values(), default=0.0) > min(materiality, VISIBLE))
 
 
 def late_by(measurement):

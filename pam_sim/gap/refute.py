@@ -24,10 +24,11 @@ nothing.
 from dataclasses import replace
 import math
 
+from pam_sim.gap.fit import Hypothesis
+from pam_sim.gap.prove import held_without, VISIBLE
 from pam_sim.gap.search import NAMED
 
 REFUTED = 0.5                # of what two are apart, squared; 1 if the better one is true
-APART = 0.3                  # standard deviations of a sensor; less says nothing
 
 
 def refute(named, problem, base, final, proof, whole):
@@ -58,19 +59,21 @@ def refute(named, problem, base, final, proof, whole):
     for w in named:
         fits = _comparable(w, problem, final)
         runs = {name: proof.run(found, whole) for name, found in fits.items()}
-        before = proof.run(base, whole)
+        before = proof.run(_less(w.name, problem, base, final), whole) if runs else {}
         best = max(runs, key=lambda name: _squares_saved(proof, before, runs[name]), default=None)
         gone = {name for name in runs if name != best and _contradicted(
             *proof.fall(runs[name], runs[best]), proof.fall(before, runs[best])[1])}
         names = tuple(n for n in w.names if n not in gone)
         if w.name in gone:
             final = fits[names[0]]
-        kept.append(replace(w, name=names[0], names=names))
+            w = replace(w, name=names[0],
+                        formulations=[r for r in w.rivals if r.name == names[0]])
+        kept.append(replace(w, names=names))
     return kept, final
 
 
 def _contradicted(fell, apart, moved):
-    return fell > REFUTED and apart > max(APART, math.sqrt(1.0 - NAMED) * moved)
+    return fell > REFUTED and apart > max(VISIBLE, math.sqrt(1.0 - NAMED) * moved)
 
 
 def _squares_saved(proof, before, run):
@@ -85,3 +88,11 @@ def _comparable(w, problem, final):
     beside = set(final.hypothesis.names) - {w.name}
     return {r.name: final if r.name == w.name else problem.polish(r.found) for r in w.rivals
             if r.name in w.names and set(r.found.hypothesis.names) - {r.name} == beside}
+
+
+def _less(name, problem, base, final):
+    """Return the fit without one name, its numbers refitted."""
+    h = final.hypothesis
+    bare = held_without(final, set(h.names) - {name})
+    left = Hypothesis(bare.hypothesis.effects, tuple(f for f in h.freed if f != name))
+    return problem.fit(left, bare.theta, final) if left.names else base

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pam_sim.gap.candidates import candidates, LIMITS
 from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
-from pam_sim.gap.cuts import LATENCY_SD_S
+from pam_sim.gap.cuts import acts_on, LATENCY_SD_S
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
@@ -341,15 +341,26 @@ class Search:
             if w not in named:
                 continue
             without = self._swapped(current, w.name)
-            s, cut = w.subsystem, self._cut(w.subsystem)
-            rest = 1.0 - share(cut, self.base.errors[s], without.errors[s])
-            gained = rest - (1.0 - share(cut, self.base.errors[s], current.errors[s]))
-            sure = preference(cut, self.base.errors[s], current.errors[s], without.errors[s])
-            if gained < LATER_STEP * rest or sure < CERTAIN_T or not self.matters(
-                    current, without):
+            missed = any(self._is_missed(cut, current, without) for cut in self.problem.cuts)
+            if not missed or not self.matters(current, without):
                 w, without = self._simpler(current, w, without, named)
                 current, named = without, [o for o in named if o is not w]
         return current, named
+
+    def _is_missed(self, cut, current, without):
+        """
+        Return whether a cut is explained clearly worse without an effect.
+
+        That may be another cut than its own: what takes its place there may do harm here.
+        """
+        s = cut.subsystem
+        if self.first_gap[s] <= self.least_gap:
+            return False
+        base = self.base.errors[s]
+        rest = 1.0 - share(cut, base, without.errors[s])
+        gained = rest - (1.0 - share(cut, base, current.errors[s]))
+        return (gained > 0.0 and gained >= LATER_STEP * rest and preference(
+            cut, base, current.errors[s], without.errors[s]) >= CERTAIN_T)
 
     def _simpler(self, current, w, without, named):
         """
@@ -380,13 +391,10 @@ class Search:
         found = []
         for w in named:
             others = {o.name for o in named if o is not w}
-            beside = [o for o in named if o is not w and o.subsystem == w.subsystem]
-            if not beside:
+            near = self._to_rank_again(w, named, others)
+            if not near:
                 found.append(w)
                 continue
-            # What the effect took in later replaced may have been ranked before it.
-            near = [r for r in w.rivals if r.name != w.name and r.name not in others
-                    and r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS]
             swapped = [Rival(w.name, current)] + [
                 Rival(r.name, self._swapped(current, w.name, r)) for r in near]
             for r in swapped:
@@ -398,3 +406,19 @@ class Search:
                 found.append(Named(tied[0].name, w.subsystem, swapped,
                                    tuple(r.name for r in tied), w.formulations))
         return current, found
+
+    def _to_rank_again(self, w, named, others):
+        """
+        Return the rivals of an effect that may do better beside the others.
+
+        Where one is in the same cut, the best few. Where one is in another cut, those that
+        act there too: they had to explain it alone.
+        """
+        rivals = [r for r in w.rivals if r.name != w.name and r.name not in others]
+        beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS] if any(
+            o is not w and o.subsystem == w.subsystem for o in named) else []
+        elsewhere = {o.subsystem for o in named if o.subsystem != w.subsystem}
+        return beside + [r for r in rivals if r not in beside and any(
+            c.name == r.name and acts_on(c.effect, w.subsystem)
+            and any(acts_on(c.effect, s) for s in elsewhere)
+            for c in r.found.hypothesis.effects)]

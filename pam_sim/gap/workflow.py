@@ -27,8 +27,8 @@ from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
-    free_run_of, model_of, moved, numbers_of, Proof, without_effects)
-from pam_sim.gap.refute import APART, refute
+    free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
+from pam_sim.gap.refute import refute
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
@@ -62,7 +62,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
         Time budget of the search.
     materiality : float
         An effect is named when it moves some signal of the certify data by more than
-        so many standard deviations of its sensor noise.
+        so many standard deviations of its sensor noise, the numbers of the model held.
     seed : int
         Of the draws behind the noise floors.
     progress : callable, optional
@@ -94,8 +94,11 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     witness = Recording(certify, rig.valve, driven) if certify else recordings[0]
 
     def matters(found, without):
-        runs = (free_run_of(problem, f, witness) for f in (found, without))
-        return max(moved(witness, *runs).values()) > materiality
+        bare = held_without(found, without.hypothesis.names)
+        run, *others = (free_run_of(problem, f, witness) for f in (found, bare, without))
+        own, refitted = (moved(witness, run, o) for o in others)
+        is_number = len(bare.theta) == len(found.theta)
+        return is_material(refitted if is_number else own, refitted, materiality)
 
     outcome = Search(problem, SEEN_GAP, LEAST_GAP * min(materiality, 1.0), effects,
                      lambda: time.perf_counter() > deadline, matters).run()
@@ -160,9 +163,8 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
     """Set verdict, ambiguity set and the unexplained fraction of a result."""
     named = outcome.named
     result.moved = proof.moved(base, whole) if named else {}
-    own = proof.moved(without_effects(final), whole) if named else {}
-    material = (max(own.values(), default=0.0) > materiality
-                and max(result.moved.values(), default=0.0) > min(materiality, APART))
+    own = proof.moved(held_without(final), whole) if named else {}
+    material = is_material(own, result.moved, materiality)
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:

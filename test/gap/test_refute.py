@@ -1,0 +1,119 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the certify data refuse, and what is too small for a name."""
+
+from gap_runs import nominal
+import numpy as np
+from pam_sim.gap.candidates import candidates, is_narrow
+from pam_sim.gap.choice import Named, Rival
+from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.parts import SELECT
+from pam_sim.gap.prove import held_without, is_material, Proof
+from pam_sim.gap.refute import refute
+from pam_sim.gap.search import Search
+import pytest
+
+SIGNALS = ('pressure', 'contraction', 'force')
+BY_NAME = {c.effect: c for c in candidates(nominal(), SIGNALS)}
+SAMPLES = 4000
+NAMES = ('pressure_bias', 'threshold_pressure')
+
+
+def found_of(*names):
+    effects = tuple(BY_NAME[n] for n in names)
+    theta = np.concatenate([np.zeros(0), *(np.ones(len(c.free)) for c in effects)])
+    return Found(Hypothesis(effects), theta, {}, {}, {})
+
+
+@pytest.mark.parametrize('moved, apart, left', [
+    (2.0, 1.5, NAMES[1:]),            # another course altogether
+    (20.0, 1.5, NAMES),               # no formulation is that true
+    (0.5, 0.2, NAMES)])               # nothing can be seen
+def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart, left):
+    time_s = np.arange(SAMPLES) * 0.005
+    truth = moved * np.sin(time_s)
+    noise = np.random.default_rng(3).standard_normal(SAMPLES)
+    fits = {n: found_of(n) for n in NAMES}
+    runs = {(): 0.0 * truth, (NAMES[1],): truth, (NAMES[0],): truth + apart * np.cos(time_s)}
+    proof = Proof.__new__(Proof)
+
+    class Given:
+        signals, measured = ('contraction',), {'contraction': truth + noise}
+
+    class Unchanged:
+        polish = staticmethod(lambda found: found)
+
+    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    # Sine and cosine have half of the square.
+    proof.noise = {'contraction': 1.0 / np.sqrt(2.0)}
+    proof.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
+    named = [Named(NAMES[0], 'muscle', [Rival(n, f) for n, f in fits.items()], NAMES)]
+    kept, final = refute(named, Unchanged(), found_of(), fits[NAMES[0]], proof, True)
+    assert kept[0].names == left and kept[0].name == left[0]
+    assert final is fits[left[0]]
+
+
+@pytest.mark.parametrize('own, refitted, is_so', [
+    (4.0, 2.0, True),
+    (4.0, 0.5, True),                 # the numbers could hide most of it, but not all
+    (4.0, 0.1, False),
+    (0.5, 0.5, False)])
+def test_what_an_effect_moves_itself_decides_whether_it_matters(own, refitted, is_so):
+    assert is_material({'pressure': own}, {'force': refitted}, 1.0) == is_so
+
+
+def test_effects_are_taken_out_while_the_numbers_stay():
+    both = found_of('coulomb_friction', 'creep')
+    left = held_without(both, ('creep',))
+    assert left.hypothesis.names == ('creep',) and left.theta.size == len(BY_NAME['creep'].free)
+    assert left.known_z is both.known_z
+    assert held_without(both).hypothesis.names == () and held_without(both).theta.size == 0
+
+
+@pytest.mark.parametrize('force_n, is_so', [(0.05, True), (1.0, False)])
+def test_stiff_bristles_under_a_small_force_are_dry_friction(force_n, is_so):
+    values = {'force_n': force_n, 'force_per_pa': 0.0, 'stiffness_n_per_m': 3e3}
+    assert is_narrow(BY_NAME['hysteresis_lugre'], values) == is_so
+    assert not is_narrow(BY_NAME['coulomb_friction'], {'force_n': force_n})
+
+
+@pytest.mark.parametrize('harm', ['muscle', 'valve', None])
+def test_an_effect_is_missed_in_whichever_cut_gets_worse_without_it(harm):
+    class Judged:
+        block = np.repeat(np.arange(40), 50)
+        part, signal = np.full(2000, SELECT), np.zeros(2000, dtype=int)
+        signals, level = ('contraction',), 1.0
+
+        def __init__(self, subsystem):
+            self.subsystem = subsystem
+
+        def chi2(self, errors, part):
+            return float(np.mean(errors ** 2))
+
+    noise = np.random.default_rng(5).standard_normal(2000)
+    cuts = [Judged('valve'), Judged('muscle')]
+
+    def errors(off):
+        return Found(Hypothesis(), np.zeros(0), {}, {
+            c.subsystem: noise + off * (off == 5.0 or c.subsystem == harm) for c in cuts}, {})
+
+    class Given(Search):
+        first_gap, least_gap, base = {'valve': 25.0, 'muscle': 25.0}, 0.01, errors(5.0)
+
+        def __init__(self):
+            pass
+
+    missed = [c.subsystem for c in cuts if Given()._is_missed(c, errors(0.0), errors(3.0))]
+    assert missed == [harm] * (harm is not None)
