@@ -102,7 +102,7 @@ class Choice:
                 for c in self.problem.cuts}
 
     def _admissible(self, rivals, current, cut):
-        """Return the rivals that act in a cut and leave no other cut worse."""
+        """Return the rivals that act in a cut and leave no other worse in which they act."""
         found = []
         for r in rivals:
             if not self._touches(r, current, cut):
@@ -110,7 +110,7 @@ class Choice:
             worse = any(
                 gap(c, r.found.errors[c.subsystem]) - gap(c, current.errors[c.subsystem])
                 > max(self.seen_gap, CLOSE * max(gap(c, current.errors[c.subsystem]), 0.0))
-                for c in self.problem.cuts if c is not cut)
+                for c in self.problem.cuts if c is not cut and self._touches(r, current, c))
             if not worse:
                 found.append(r)
         return found

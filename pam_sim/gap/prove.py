@@ -30,6 +30,7 @@ from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT
 
 INPUT_DRAWS = 8
+FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 VISIBLE = 0.3                # standard deviations of a sensor; less cannot be told from none
 MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
@@ -187,11 +188,16 @@ class Proof:
         return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
 
     def unexplained(self):
-        """Return the share of the squared gap left after calibration that is still there."""
+        """
+        Return the share of the squared gap left after calibration that is still there.
+
+        Of signals that show one: where both are within the error of the floor, nothing is said.
+        """
         before = after = 0.0
         for s in self.signals().values():
-            before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
-            after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+            if max(s.rmse_refit, s.rmse_after) > FLOOR_ERROR * s.noise_floor:
+                before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+                after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
         return min(after / before, 1.0) if before > 0.0 else 0.0
 
     def _rms(self, simulated, signal):

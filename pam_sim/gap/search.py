@@ -390,8 +390,12 @@ class Search:
         """Rank again the rivals of each effect now that the others are in the model."""
         found = []
         for w in named:
-            others = {o.name for o in named if o is not w}
-            near = self._to_rank_again(w, named, others)
+            others = set(current.hypothesis.names) - {w.name}
+            rivals = [r for r in w.rivals if r.name != w.name and r.name not in others]
+            # What the effect took in later replaced may have been ranked before it.
+            beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS] if any(
+                o is not w and o.subsystem == w.subsystem for o in named) else []
+            near = beside or self._across(rivals, w, named)
             if not near:
                 found.append(w)
                 continue
@@ -401,24 +405,23 @@ class Search:
                 r.share = self.choice.shares(r.found)
             tied = self.choice.tied(
                 swapped, self._swapped(current, w.name), self._cut(w.subsystem))
-            if tied:
+            if not beside and w.name not in [r.name for r in tied]:
+                found.append(w)
+            elif tied:
                 current = tied[0].found
                 found.append(Named(tied[0].name, w.subsystem, swapped,
                                    tuple(r.name for r in tied), w.formulations))
         return current, found
 
-    def _to_rank_again(self, w, named, others):
+    @staticmethod
+    def _across(rivals, w, named):
         """
-        Return the rivals of an effect that may do better beside the others.
+        Return the rivals that had to explain alone what two effects of two cuts do.
 
-        Where one is in the same cut, the best few. Where one is in another cut, those that
-        act there too: they had to explain it alone.
+        They act in both and explain the other; beside it they may do as well as this one.
         """
-        rivals = [r for r in w.rivals if r.name != w.name and r.name not in others]
-        beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS] if any(
-            o is not w and o.subsystem == w.subsystem for o in named) else []
         elsewhere = {o.subsystem for o in named if o.subsystem != w.subsystem}
-        return beside + [r for r in rivals if r not in beside and any(
+        return [r for r in rivals if any(r.share.get(s, 0.0) > RIVAL for s in elsewhere) and any(
             c.name == r.name and acts_on(c.effect, w.subsystem)
             and any(acts_on(c.effect, s) for s in elsewhere)
             for c in r.found.hypothesis.effects)]

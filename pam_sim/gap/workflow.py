@@ -27,7 +27,7 @@ from pam_sim.gap.health import check_health
 from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
-    free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
+    FLOOR_ERROR, free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
 from pam_sim.gap.refute import refute
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
@@ -39,7 +39,6 @@ from scipy.stats import norm
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
-FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 CONFIRMED = 0.3              # of what an effect moves; the truth takes all of it out of the errors
 
 
