@@ -54,9 +54,10 @@ class JointPlantLoop(PlantClock):
                         for k, (side, rig) in enumerate(zip(SIDES, rigs))}
         self._noise = np.random.default_rng((seed, len(SIDES)))
 
-    def step_once(self):
-        """Advance the joint by one step with the signals held."""
-        self.plant.step(self.signals['flexor'].efforts, self.signals['extensor'].efforts)
+    def step(self, count):
+        """Advance the joint by some steps with the signals held."""
+        for _ in range(count):
+            self.plant.step(self.signals['flexor'].efforts, self.signals['extensor'].efforts)
 
     def sample(self, now_ns):
         """

@@ -80,7 +80,7 @@ class PlantClock:
     """
     Physics in fixed steps that follows a clock in integer nanoseconds.
 
-    Derived classes have ``step_once``.
+    Derived classes have ``step``, which does a number of steps.
 
     Parameters
     ----------
@@ -132,8 +132,8 @@ class PlantClock:
             self.skipped_s += skipped_ns / _NS
             behind_ns -= skipped_ns
         count = max(behind_ns // self.dt_ns, 0)
-        for _ in range(count):
-            self.step_once()
+        if count:
+            self.step(count)
         self.steps += count
         return count
 
@@ -184,9 +184,9 @@ class PlantLoop(PlantClock):
         if math.isfinite(message.force_n):
             self._external_n = float(message.force_n)
 
-    def step_once(self):
-        """Advance the plant by one step with the signal held."""
-        self.plant.step(self._held.efforts, self._external_n)
+    def step(self, count):
+        """Advance the plant by some steps with the signal held."""
+        self.plant.step(self._held.efforts, self._external_n, steps=count)
 
     def sample(self, now_ns):
         """

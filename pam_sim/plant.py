@@ -51,9 +51,9 @@ class Plant:
         self._inp[layout.INP_CONTRACTION] = self.state[layout.S_CONTRACTION]
         kernel.look(self.state, self.par, self._inp, self._out)
 
-    def step(self, signal, external_force_n=0.0, contraction_m=None):
+    def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
         """
-        Advance by ``dt_s`` with the valve signal held.
+        Advance by ``steps`` times ``dt_s`` with the valve signal held.
 
         Parameters
         ----------
@@ -63,6 +63,8 @@ class Plant:
             Force on the load, N, against contraction positive.
         contraction_m : float, optional
             Contraction at the end of the step for a driven load, m; held if not given.
+        steps : int
+            How many, 1 or more; faster than as many calls, with the same numbers.
 
         Raises
         ------
@@ -83,7 +85,8 @@ class Plant:
             inp[layout.INP_CONTRACTION] = contraction_m
         if not np.isfinite(inp).all():
             raise InputError('is not finite', 'valve signal, force or contraction')
-        kernel.step(self.state, self.par, inp, self._out)
+        for _ in range(steps):
+            kernel.step(self.state, self.par, inp, self._out)
         if not np.isfinite(self._out).all():
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no rig that can be stepped',

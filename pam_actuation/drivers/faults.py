@@ -125,7 +125,8 @@ FAULT_TABLE = (
     Fault('driver_killed', 'Driver killed, stopped or its computer lost',
           'not detectable by the driver: the valve holds its last signal', HOLD, False,
           'valve_watchdog, a process of its own, sends the safe valve_signal after 0.05 s of '
-          'silence; behind a hardware back end only hardware can'),
+          'silence; behind a hardware back end another one vents the device after 0.1 s; with '
+          'the computer lost only hardware can'),
     Fault('reference_lost', 'Reference lost',
           'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,
           'the driver follows the controller'),

@@ -14,6 +14,7 @@
 
 """All back ends by name, and how one is opened."""
 
+from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.dummy import DummySensors, DummyValve
 from pam_actuation.hardware.iio_adc import IioAdc
 from pam_actuation.hardware.iio_dac import IioDac
@@ -34,7 +35,7 @@ def parameters_of(back_ends):
                   for parameter in back_end.PARAMETERS}.values())
 
 
-def open_valve(name, valve_type, values, config, safe_efforts):
+def open_valve(name, valve_type, values, config, safe_efforts, watchdog_s=0.0):
     """
     Open the output a valve hangs on; it vents from then on.
 
@@ -50,6 +51,8 @@ def open_valve(name, valve_type, values, config, safe_efforts):
         What the driver knows of the valve.
     safe_efforts : tuple of float
         The signal that vents.
+    watchdog_s : float
+        Silence of this process [s] from which another one vents the device; 0: none does.
 
     Raises
     ------
@@ -65,7 +68,10 @@ def open_valve(name, valve_type, values, config, safe_efforts):
             f'{" or ".join(fitting)}', 'parameter backend')
     device = back_end(values, config)
     _tell(device.open)
-    return GuardedOutput(device, safe_efforts)
+    watchdog = None
+    if watchdog_s and device.safe_writes():
+        watchdog = _tell(lambda: DeviceWatchdog(device.safe_writes(), watchdog_s))
+    return GuardedOutput(device, safe_efforts, watchdog)
 
 
 def open_sensors(name, values):

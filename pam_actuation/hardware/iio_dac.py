@@ -69,6 +69,6 @@ class IioDac(ValveOutput):
         """Send the volts."""
         sysfs.write(self._voltage.raw_path, self._raw(efforts[0]))
 
-    def vent(self):
+    def safe_writes(self):
         """Send 0 V."""
-        self.write((0.0,))
+        return ((self._voltage.raw_path, self._raw(0.0)),)

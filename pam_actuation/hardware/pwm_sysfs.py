@@ -78,9 +78,13 @@ class PwmChannel:
 
     def set(self, opening):
         """Set the mean opening of the valve, 0..1, from the next period on."""
+        sysfs.write(*self.write_of(opening))
+
+    def write_of(self, opening):
+        """Return the attribute and the value that give a mean opening of the valve of 0..1."""
         share = min(max(opening, 0.0), 1.0)
         share = 1.0 - share if self._inverted else share
-        sysfs.write(self.folder / 'duty_cycle', round(share * self._period_ns))
+        return self.folder / 'duty_cycle', round(share * self._period_ns)
 
 
 class PwmPair(ValveOutput):
@@ -122,9 +126,6 @@ class PwmPair(ValveOutput):
         for channel, opening in order if vent > 0.0 else reversed(order):
             channel.set(opening)
 
-    def vent(self):
-        """Shut the filling valve and open the venting one, the second even if the first fails."""
-        try:
-            self._fill.set(0.0)
-        finally:
-            self._vent.set(1.0)
+    def safe_writes(self):
+        """Shut the filling valve and open the venting one."""
+        return self._fill.write_of(0.0), self._vent.write_of(1.0)

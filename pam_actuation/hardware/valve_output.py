@@ -23,6 +23,7 @@ import time
 import weakref
 
 from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
+from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
 
 TRIES = 3              # to vent, on the way out
@@ -34,7 +35,7 @@ class ValveOutput:
     One device, or pair of channels, that a valve hangs on.
 
     Derived classes set ``VALVE_TYPES``, which they can drive, and ``PARAMETERS``, and
-    override ``open``, ``write`` and ``vent``.
+    override ``open``, ``write`` and ``safe_writes``.
 
     Parameters
     ----------
@@ -66,8 +67,20 @@ class ValveOutput:
 
         """
 
+    def safe_writes(self):
+        """Return (attribute, value) of all that is written to vent, in order; () for nothing."""
+        return ()
+
     def vent(self):
         """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
+        failures = []
+        for path, value in self.safe_writes():
+            try:
+                sysfs.write(path, value)
+            except DeviceError as error:
+                failures.append(error)
+        if failures:
+            raise failures[0]
 
 
 def check_pair(fill_duty, vent_duty):
@@ -96,11 +109,14 @@ class GuardedOutput:
         An open output.
     safe_efforts : tuple of float
         The signal that vents.
+    watchdog : DeviceWatchdog, optional
+        The process that vents the device when this one can not.
 
     """
 
-    def __init__(self, device, safe_efforts):
+    def __init__(self, device, safe_efforts, watchdog=None):
         self._device = device
+        self._watchdog = watchdog
         self._safe_efforts = tuple(safe_efforts)
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
         self.failures = 0
@@ -117,26 +133,44 @@ class GuardedOutput:
         """
         if tuple(efforts) == self._safe_efforts:
             return self.vent()
-        problem = self._try(lambda: self._device.write(efforts))
+        problem = self._try(lambda: self._write(efforts))
         if problem:
             self.vent()
         return problem
 
+    def _write(self, efforts):
+        if self._watchdog is not None:
+            self._watchdog.tell(True)       # first: killed in between, the device is vented
+        self._device.write(efforts)
+
     def vent(self, tries=1):
         """Send the safe signal, up to ``tries`` times; return what is wrong, '' if nothing."""
-        problem = self._try(self._device.vent)
+        problem = self._try(self._vent)
         for _ in range(tries - 1):
             if not problem:
                 break
             time.sleep(BETWEEN_TRIES_S)
-            problem = self._try(self._device.vent)
+            problem = self._try(self._vent)
         return problem
+
+    def _vent(self):
+        self._device.vent()
+        if self._watchdog is not None:
+            self._watchdog.tell(False)
+
+    @property
+    def watchdog_vents(self):
+        """Return how often the watchdog of the device has vented, None without one."""
+        return None if self._watchdog is None else self._watchdog.vents
 
     def close(self):
         """Vent and let go of the device; return what is wrong, '' if nothing."""
         problem = self.vent(TRIES)
         if not problem:
             self._last_resort.detach()
+        if self._watchdog is not None:
+            self._watchdog.close()
+            self._watchdog = None
         return problem
 
     def _try(self, action):

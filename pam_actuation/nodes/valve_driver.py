@@ -35,6 +35,7 @@ from std_srvs.srv import Trigger
 COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
 EARLY_SHARE = 0.9           # of a period: a tick by the clock is left out this soon after another
 GRAPH_PERIOD_S = 0.5
+SHORTEST_SILENCE_S = 0.03   # three signals
 
 
 class ValveDriver(ManagedNode):
@@ -62,6 +63,9 @@ class ValveDriver(ManagedNode):
         NodeParameter(
             'backend', 'sim', 'What the valve hangs on: the plant that listens to valve_signal, '
             'nothing, an analog output, two PWM channels.', choices=tuple(VALVE_OUTPUTS)),
+        NodeParameter(
+            'device_watchdog_s', 0.1, 'Silence of the driver, killed or stopped, from which a '
+            'process of its own vents the device of the back end [s]; 0: none does.', 0.0, 1.0),
         *node_parameters((*DRIVER_PARAMETERS, *parameters_of(VALVE_OUTPUTS))),
     )
 
@@ -70,9 +74,13 @@ class ValveDriver(ManagedNode):
     _safety_services = ()
 
     def check(self):
-        """Refuse to drive a device on a time that may stand still."""
+        """Refuse to drive a device on a time that may stand still, or to vent between signals."""
         if self.uses_simulated_time and self.value('backend') not in ('sim', 'dummy'):
             raise InputError('a real valve is not driven in simulated time', 'use_sim_time')
+        if 0.0 < self.value('device_watchdog_s') < SHORTEST_SILENCE_S:
+            raise InputError(
+                f'{self.value("device_watchdog_s"):g} s is shorter than a few signals take, '
+                f'allowed are 0 and {SHORTEST_SILENCE_S:g} to 1', 'parameter device_watchdog_s')
 
     def inputs_of_a_tick(self):
         """Return the measurements and the command."""
@@ -92,7 +100,7 @@ class ValveDriver(ManagedNode):
         self.output = open_valve(
             self.value('backend'), self.value('valve_type'),
             {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
-            loop.safe_signal(0).efforts)
+            loop.safe_signal(0).efforts, self.value('device_watchdog_s'))
         self.loop = loop
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
@@ -132,11 +140,13 @@ class ValveDriver(ManagedNode):
         self.loop = self.output = None
 
     def diagnostic_values(self):
-        """Add what the valve hangs on and how often it refused its signal."""
+        """Add what the valve hangs on, how often it refused, how often others vented it."""
         values = (*super().diagnostic_values(), ('backend', self.value('backend')))
         if self.output is None:
             return values
-        return (*values, ('device_failures', self.output.failures))
+        values = (*values, ('device_failures', self.output.failures))
+        vents = self.output.watchdog_vents
+        return values if vents is None else (*values, ('device_watchdog_vents', vents))
 
     def start(self):
         """Tick by the clock, and for the PPR also by the command."""

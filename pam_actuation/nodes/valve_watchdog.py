@@ -30,7 +30,7 @@ class ValveWatchdog(ManagedNode):
     Send the safe valve signal while the driver, a process of its own, is silent.
 
     It covers a driver that was killed or stopped, for whatever listens to ``valve_signal``. What
-    hangs on a device of the driver's computer needs a watchdog in hardware.
+    hangs on a device of the driver's computer is vented by a process of the driver.
     """
 
     NAME = 'valve_watchdog'

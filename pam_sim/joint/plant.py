@@ -24,7 +24,7 @@ from pam_sim.plant import Plant
 class JointMuscle(Plant):
     """One muscle of a live joint: read as any plant, stepped by the joint only."""
 
-    def step(self, signal, external_force_n=0.0, contraction_m=None):
+    def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
         """Refuse: the joint prescribes the contraction."""
         raise InputError('is stepped by its joint', self.rig.name)
 

@@ -78,8 +78,9 @@ def export(chip, number):
 
 def number_in(path):
     """Return the number an attribute holds, None between the two halves of a write."""
-    text = Path(path).read_text().strip()
-    return int(text) if text else None
+    words = Path(path).read_text().split()
+    # Of two writers at once a file, unlike an attribute, keeps the tail of the longer value.
+    return int(words[0]) if words else None
 
 
 def duties(chip):

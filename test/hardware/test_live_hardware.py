@@ -156,6 +156,13 @@ def test_a_signal_ends_the_driver_with_a_vented_device(rig, root, number):
     assert number_in(rig.raw) == 0
 
 
+def test_a_killed_driver_leaves_a_vented_device(rig, root):
+    start_driver(rig, root)
+    follows(rig)
+    rig.processes['valve_driver'].send_signal(signal.SIGKILL)
+    wait_for(lambda: number_in(rig.raw) == 0, 5.0, 'the safe voltage')
+
+
 def test_a_pair_of_valves_on_pwm_is_driven_and_vented(rig, root):
     assert duties(rig.chip) == (700, 700)       # nobody was there before
     rig.health['valve_driver'].clear()

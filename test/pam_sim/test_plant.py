@@ -41,8 +41,14 @@ def test_plant_steps_are_those_of_simulate_to_the_bit(name, valve, fidelity):
             assert ours == theirs[i] or i == 0
         plant.step(np.atleast_1d(signal[i]), external_force_n=pull[i])
     assert np.array_equal(plant.outputs, response.outputs[-1])
+    several = rig.plant()
     plant.reset()
     assert plant.time_s == 0.0
+    for i in range(0, 40, 8):
+        several.step(np.atleast_1d(signal[i]), external_force_n=pull[i], steps=8)
+        for _ in range(8):
+            plant.step(np.atleast_1d(signal[i]), external_force_n=pull[i])
+        assert np.array_equal(several.outputs, plant.outputs)
 
 
 def test_plant_refuses_what_does_not_fit():

@@ -1,0 +1,220 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The last word at a device: a small process that vents when the valve driver can not.
+
+A device holds its last signal when the process that drives it is killed or stopped. The driver
+therefore starts this module as a process of its own, tells it once what venting means, as
+attributes to write, and with every signal whether the muscle may be under pressure. The process
+knows nothing else, needs neither ROS nor a network, and ends when the driver has ended.
+
+What it can not cover is a computer that stands still or loses its power: see docs/safety.md.
+"""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+
+from pam_actuation.hardware import sysfs
+from pam_actuation.hardware.sysfs import DeviceError
+
+AT_REST, IN_USE, READY, VENTED = b'0', b'1', b'r', b'v'
+START_TIMEOUT_S = 10.0
+END_TIMEOUT_S = 1.0
+TRY_AGAIN_S = 0.01
+LONGEST_TRY_S = 60.0
+WHERE = 'watchdog of the device'
+# What ends the driver must not end this: it goes when the driver has gone.
+OUTLIVED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class DeviceWatchdog:
+    """
+    The driver's end: starts the process and speaks to it.
+
+    Parameters
+    ----------
+    writes : sequence of (path, value)
+        Attributes and values that vent, in this order.
+    timeout_s : float
+        Silence of the driver [s] from which the process vents.
+
+    Raises
+    ------
+    DeviceError
+        The process does not start.
+
+    """
+
+    def __init__(self, writes, timeout_s):
+        self._order = json.dumps({
+            'timeout_s': timeout_s, 'writes': [(str(path), value) for path, value in writes]})
+        self._vents = 0
+        self._start()
+        self._wait_until_ready()
+
+    def _start(self):
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                bufsize=0, start_new_session=True)
+            self._process.stdin.write(self._order.encode() + b'\n')
+        except OSError as error:
+            raise DeviceError(f'cannot be started ({error.strerror})', WHERE) from None
+        for pipe in (self._process.stdin, self._process.stdout):
+            os.set_blocking(pipe.fileno(), False)       # the driver never waits for it
+
+    def _wait_until_ready(self):
+        readable, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
+        if not readable or self._process.stdout.read(1) != READY:
+            self._leave()
+            raise DeviceError('did not start', WHERE)
+
+    def tell(self, in_use):
+        """
+        Tell that the driver is alive, and whether the muscle may be under pressure from now on.
+
+        Raises
+        ------
+        DeviceError
+            The process ended, and was started again, or does not read.
+
+        """
+        try:
+            taken = self._process.stdin.write(IN_USE if in_use else AT_REST)
+        except BrokenPipeError:
+            self._leave()
+            self._start()
+            raise DeviceError('ended and was started again', WHERE) from None
+        if not taken:
+            raise DeviceError('does not read what it is told', WHERE)
+
+    @property
+    def pid(self):
+        """Return the id of the process."""
+        return self._process.pid
+
+    @property
+    def vents(self):
+        """Return how often the process has vented while the driver was silent."""
+        said = self._process.stdout.read(4096) or b''
+        self._vents += said.count(VENTED)
+        return self._vents
+
+    def close(self):
+        """End the process; it vents first if the muscle may be under pressure."""
+        self._process.stdin.close()
+        try:
+            self._process.wait(END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            pass                # it is still trying to vent a device that refuses: so did we
+        self._leave()
+
+    def _leave(self):
+        self._process.kill()
+        self._process.stdin.close()
+        self._process.stdout.close()
+        self._process.wait()
+
+
+class _LastWord:
+    """The process: listens to the driver and vents when that falls silent or is gone."""
+
+    def __init__(self, inlet, outlet, timeout_s, writes):
+        self._inlet, self._outlet = inlet, outlet
+        self._timeout_s = timeout_s
+        self._writes = writes
+        self._in_use = False
+
+    def run(self):
+        """Listen until the driver is gone."""
+        gone = told = False
+        while not gone:
+            heard = self._listen(self._timeout_s if self._in_use else None)
+            gone = heard == b''
+            if heard:
+                self._in_use = heard.endswith(IN_USE)
+                told = False
+            elif self._in_use:
+                # Again and again: a driver may have been stopped in the middle of a write.
+                self._vent(gone, told)
+                told = not gone
+
+    def _listen(self, patience_s):
+        """Return what the driver said, b'' if it is gone, None if it was silent for so long."""
+        readable, _, _ = select.select([self._inlet], [], [], patience_s)
+        return os.read(self._inlet, 4096) if readable else None
+
+    def _vent(self, gone, told):
+        """Vent; if the device refuses try again, until the driver speaks or for a minute."""
+        give_up_s = time.monotonic() + LONGEST_TRY_S
+        why = 'is gone' if gone else 'is silent'
+        while problem := self._write_all():
+            if time.monotonic() > give_up_s:
+                _report(f'the valve driver {why}, and the device is NOT vented: {problem}')
+                return
+            time.sleep(TRY_AGAIN_S)
+            if not gone and select.select([self._inlet], [], [], 0.0)[0]:
+                return
+        if not told:
+            _report(f'the valve driver {why}: vented')
+            self._say(VENTED)
+
+    def _write_all(self):
+        """Write everything that vents, also after a failure; return the failure, '' if none."""
+        problem = ''
+        for path, value in self._writes:
+            try:
+                sysfs.write(path, value)
+            except DeviceError as error:
+                problem = problem or str(error)
+        return problem
+
+    def _say(self, what):
+        try:
+            os.write(self._outlet, what)
+        except OSError:
+            pass                # nobody is left to hear it
+
+
+def _report(what):
+    try:
+        print(f'{WHERE}: {what}', file=sys.stderr, flush=True)
+    except OSError:
+        pass                    # the terminal is gone as well
+
+
+def main():
+    """Be the process: the order on the first line of standard input, then a byte per signal."""
+    for number in OUTLIVED:
+        signal.signal(number, signal.SIG_IGN)
+    inlet, outlet = sys.stdin.fileno(), sys.stdout.fileno()
+    line = b''
+    while not line.endswith(b'\n'):
+        byte = os.read(inlet, 1)
+        if not byte:
+            return
+        line += byte
+    order = json.loads(line)
+    os.write(outlet, READY)
+    _LastWord(inlet, outlet, order['timeout_s'], order['writes']).run()
+
+
+if __name__ == '__main__':
+    main()
