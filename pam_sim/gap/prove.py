@@ -70,6 +70,7 @@ def is_material(own, refitted, materiality):
     own, refitted : dict of str -> float
         How far each signal moves, in standard deviations of its sensor.
     materiality : float
+        Of a sensor, in its standard deviations.
 
     """
     return (max(own.values(), default=0.0) > materiality

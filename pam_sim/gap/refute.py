@@ -40,6 +40,7 @@ def refute(named, problem, base, final, proof, whole):
     named : list of Named
         What was taken in.
     problem : Problem
+        That they were fitted to.
     base, final : Found
         Numbers calibrated alone, and the final model, with the first name of every set.
     proof : Proof
