@@ -28,7 +28,7 @@ from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-PUBLISHER_DEPTH = 100     # half a second of a 200 Hz topic survives a busy receiver
+PUBLISHER_DEPTH = 1000    # a second of a 1 kHz topic is sent again to a receiver that was busy
 CONSUMER_DEPTH = 10       # consumers use the newest message; old ones are stale anyway
 RECORDER_DEPTH = 5000     # five seconds of a 1 kHz topic may wait for the recorder
 
