@@ -42,6 +42,7 @@ RIG = 'dmsp_5_300_realistic'
 NOMINAL = 'dmsp_5_300_hanging_mass'
 SEED = 1
 GAP_SEARCH_S = 30.0         # longest; several effects of the realistic rig are missing
+QUICK_GAP_SEARCH_S = 5.0
 TUNING_ROLLOUTS = 150
 TITLES = {'ppr_learning': 'PPR, learning', 'ppr_frozen': 'PPR, rules frozen',
           'hsv_learning': 'HSV, learning'}
@@ -98,7 +99,8 @@ class Demo:
     progress : callable
         Called with (share done 0..1, what is going on).
     quick : bool
-        Two short cycles per live run in place of ten: to see that everything works.
+        Two short cycles per live run in place of ten, and a short search of the gap: to see
+        that everything works.
 
     """
 
@@ -107,6 +109,7 @@ class Demo:
         self._progress = progress
         self._long, self._short = ('short_sine', 'short_sine') if quick else (
             'sine_quarter_hz', 'sine_quarter_hz_short')
+        self._gap_search_s = QUICK_GAP_SEARCH_S if quick else GAP_SEARCH_S
         self._runs, self._replays, self._checks = {}, {}, []
         self._tuning = self._gap = None
 
@@ -193,7 +196,7 @@ class Demo:
         """Hold the recording against the nominal model."""
         self._gap = write_gap(
             [self._runs['ppr_learning']], NOMINAL, os.path.join(self.result.folder, 'gap'),
-            seconds=GAP_SEARCH_S, progress=progress)
+            seconds=self._gap_search_s, progress=progress)
 
     def _write_page(self, progress):
         """Put everything on one page."""

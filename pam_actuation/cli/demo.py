@@ -29,7 +29,8 @@ def add_arguments(parser):
     parser.add_argument('--out', default=None, metavar='DIR',
                         help='folder for bags and page (default: runs/demo-TIME)')
     parser.add_argument('--quick', action='store_true',
-                        help='two short cycles per run: only to see that everything works')
+                        help='two short cycles per run and a short gap search: only to see that '
+                             'everything works')
 
 
 def run(args):
