@@ -23,6 +23,7 @@ from dataclasses import replace
 import math
 
 import numpy as np
+from pam_sim.gap.cuts import SKEW_MAX_S
 from pam_sim.gap.fit import Hypothesis
 from pam_sim.gap.free_run import free_run, START_S
 from pam_sim.gap.noise import noise_of, sensor_floor, STAMP_SD_S
@@ -149,7 +150,29 @@ class Proof:
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.problem, found)
         start = start_error_pa if whole else measurement.get('start_error', 0.0)
-        return free_run_of(self.problem, found, self.recording, start, stamp_shift_s)
+        run = free_run_of(self.problem, found, self.recording, start, stamp_shift_s)
+        return self._aligned(run, late_by(measurement)) if whole else run
+
+    def _aligned(self, run, late_s):
+        """
+        Return a run with the skew that this recording, which was not fitted, has itself.
+
+        It is no part of the model, and in a fast motion a fraction of a millisecond is more than
+        what an effect moves; the bounds are those of the fit.
+        """
+        aligned = dict(run)
+        for s, late in late_s.items():
+            if s not in run:
+                continue
+            chosen = self.part[s]
+            slope = np.gradient(run[s], self.recording.time_s[s])
+            wrong = run[s][chosen] - self.recording.measured[s][chosen]
+            square = float(np.sum(slope[chosen] ** 2))
+            shift_s = float(np.sum(slope[chosen] * wrong)) / square if square > 0.0 else 0.0
+            most_s = SKEW_MAX_S * (2.0 if s == 'force' else 1.0)
+            shift_s = min(max(late + shift_s, -most_s), most_s) - late
+            aligned[s] = run[s] - shift_s * slope
+        return aligned
 
     def signals(self):
         """Return the SignalGap of every signal."""

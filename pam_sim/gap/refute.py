@@ -73,6 +73,28 @@ def refute(named, problem, base, final, proof, whole):
     return kept, final
 
 
+def least_confirmed(named, problem, base, final, proof, whole):
+    """
+    Return the name that the certify data confirm least, and the fit without it.
+
+    Parameters
+    ----------
+    named, problem, base, final, proof, whole
+        As of ``refute``.
+
+    Returns
+    -------
+    name : str
+    without : Found
+        The other names, everything refitted.
+
+    """
+    fits = {w.name: _less(w.name, problem, base, final) for w in named}
+    after = proof.run(final, whole)
+    name = min(fits, key=lambda name: proof.fall(proof.run(fits[name], whole), after)[0])
+    return name, fits[name]
+
+
 def _contradicted(fell, apart, moved):
     return fell > REFUTED and apart > max(VISIBLE, math.sqrt(1.0 - NAMED) * moved)
 

@@ -28,12 +28,12 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
     FLOOR_ERROR, free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
-from pam_sim.gap.refute import refute
+from pam_sim.gap.refute import least_confirmed, refute
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
 from pam_sim.gap.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
-from pam_sim.gap.words import explain, join
+from pam_sim.gap.words import explain
 from scipy.stats import norm
 
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
@@ -111,11 +111,12 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     if final is not first:
         proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
-    if outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
-        names = join(w.name for w in outcome.named)
-        result.remarks.append(f'What {names} would explain of the recordings is not found '
-                              'again in the certify data, so nothing is named.')
-        outcome.named, final = [], base
+    while outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
+        name, final = least_confirmed(
+            outcome.named, problem, base, final, proof, certify is not None)
+        result.remarks.append(f'What {name} would explain of the recordings is not found '
+                              'again in the certify data, so it is not named.')
+        outcome.named = [w for w in outcome.named if w.name != name]
         proof = Proof(witness, certify is not None, problem, base, final, seed)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
