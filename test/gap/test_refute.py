@@ -18,10 +18,11 @@ from gap_runs import nominal
 import numpy as np
 from pam_sim.gap.candidates import candidates, is_narrow
 from pam_sim.gap.choice import Named, Rival
+from pam_sim.gap.cuts import SKEW_MAX_S
 from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.prove import held_without, is_material, Proof
-from pam_sim.gap.refute import refute
+from pam_sim.gap.refute import least_confirmed, refute
 from pam_sim.gap.search import Search
 import pytest
 
@@ -63,6 +64,49 @@ def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart,
     kept, final = refute(named, Unchanged(), found_of(), fits[NAMES[0]], proof, True)
     assert kept[0].names == left and kept[0].name == left[0]
     assert final is fits[left[0]]
+
+
+@pytest.mark.parametrize('spurious', NAMES)
+def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
+    time_s = np.arange(SAMPLES) * 0.005
+    truth, drift = 5.0 * np.sin(time_s), 8.0 * np.cos(time_s)
+    noise = np.random.default_rng(4).standard_normal(SAMPLES)
+    moves = {name: drift if name == spurious else truth for name in NAMES}
+    proof = Proof.__new__(Proof)
+
+    class Given:
+        signals, measured = ('contraction',), {'contraction': truth + noise}
+
+    class Refitted:
+        fit = staticmethod(lambda left, theta, near: found_of(*left.names))
+
+    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    proof.noise = {'contraction': 1.0}
+    proof.run = lambda found, whole: {
+        'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
+    named = [Named(n, 'muscle', [], (n,)) for n in NAMES]
+    name, left = least_confirmed(named, Refitted(), found_of(), found_of(*NAMES), proof, True)
+    assert name == spurious
+    assert left.hypothesis.names == tuple(n for n in NAMES if n != spurious)
+
+
+@pytest.mark.parametrize('skew_s, left_s', [
+    (1e-3, 0.0), (-1e-3, 0.0), (4e-3, 4e-3 - SKEW_MAX_S)])
+def test_a_run_gets_the_skew_of_the_certify_recording_within_bounds(skew_s, left_s):
+    time_s = np.arange(SAMPLES) * 0.005
+    proof = Proof.__new__(Proof)
+
+    class Given:
+        measured = {'contraction': np.sin(3.0 * (time_s - skew_s))}
+
+    Given.time_s = {'contraction': time_s}
+    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    run = {'contraction': np.sin(3.0 * time_s), 'pressure': time_s}
+    aligned = proof._aligned(run, {'contraction': 0.0, 'force': 0.0})
+    assert aligned['pressure'] is time_s
+    error = aligned['contraction'] - Given.measured['contraction']
+    slope = np.cos(3.0 * time_s) * 3.0
+    assert float(np.sum(error * slope) / np.sum(slope ** 2)) == pytest.approx(left_s, abs=2e-5)
 
 
 @pytest.mark.parametrize('own, refitted, is_so', [
