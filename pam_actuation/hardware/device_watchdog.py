@@ -83,7 +83,7 @@ class DeviceWatchdog:
     def _wait_until_ready(self):
         readable, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
         if not readable or self._process.stdout.read(1) != READY:
-            self._leave()
+            _end(self._process)
             raise DeviceError('did not start', WHERE)
 
     def tell(self, in_use):
@@ -99,8 +99,9 @@ class DeviceWatchdog:
         try:
             taken = self._process.stdin.write(IN_USE if in_use else AT_REST)
         except BrokenPipeError:
-            self._leave()
+            ended = self._process       # kept where no other starts: it is tried again
             self._start()
+            _end(ended)
             raise DeviceError('ended and was started again', WHERE) from None
         if not taken:
             raise DeviceError('does not read what it is told', WHERE)
@@ -124,13 +125,14 @@ class DeviceWatchdog:
             self._process.wait(END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             pass                # it is still trying to vent a device that refuses: so did we
-        self._leave()
+        _end(self._process)
 
-    def _leave(self):
-        self._process.kill()
-        self._process.stdin.close()
-        self._process.stdout.close()
-        self._process.wait()
+
+def _end(process):
+    process.kill()
+    process.stdin.close()
+    process.stdout.close()
+    process.wait()
 
 
 class _LastWord:
@@ -177,14 +179,12 @@ class _LastWord:
             self._say(VENTED)
 
     def _write_all(self):
-        """Write everything that vents, also after a failure; return the failure, '' if none."""
-        problem = ''
-        for path, value in self._writes:
-            try:
-                sysfs.write(path, value)
-            except DeviceError as error:
-                problem = problem or str(error)
-        return problem
+        """Write everything that vents; return what is wrong, '' if nothing."""
+        try:
+            sysfs.write_all(self._writes)
+        except DeviceError as error:
+            return str(error)
+        return ''
 
     def _say(self, what):
         try:

@@ -63,6 +63,31 @@ def write(path, value):
         raise DeviceError(f'only {written} of {len(text)} bytes of {value} were taken', path)
 
 
+def write_all(writes):
+    """
+    Write several attributes in order, the others also where one refuses.
+
+    Parameters
+    ----------
+    writes : iterable of (path, value)
+        Attributes and what goes into them.
+
+    Raises
+    ------
+    DeviceError
+        The first that was not taken.
+
+    """
+    failures = []
+    for path, value in writes:
+        try:
+            write(path, value)
+        except DeviceError as error:
+            failures.append(error)
+    if failures:
+        raise failures[0]
+
+
 def read_text(path):
     """Return the text of an attribute without the white space around it; DeviceError."""
     try:

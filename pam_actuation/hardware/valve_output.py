@@ -73,14 +73,7 @@ class ValveOutput:
 
     def vent(self):
         """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
-        failures = []
-        for path, value in self.safe_writes():
-            try:
-                sysfs.write(path, value)
-            except DeviceError as error:
-                failures.append(error)
-        if failures:
-            raise failures[0]
+        sysfs.write_all(self.safe_writes())
 
 
 def check_pair(fill_duty, vent_duty):

@@ -190,15 +190,15 @@ class Proof:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
         return moved(self.recording, self.after, self.run(found, whole), self.part)
 
-    def confirmed(self, found, whole):
+    def confirmed(self):
         """
-        Return by how much the squared errors fall from a fit's to the final model's.
+        Return by how much the squared errors fall from the calibrated to the final model.
 
         In what the two are apart, squared; all signals in deviations of their sensors. 1 for a
         true effect, -1 for one that is not there, whatever the noise: the errors of the true
         model have nothing in common with either.
         """
-        return self.fall(self.run(found, whole), self.after)[0]
+        return self.fall(self.refit, self.after)[0]
 
     def fall(self, worse, better):
         """Return (what ``confirmed`` tells of two free runs, how far they are apart, rms)."""

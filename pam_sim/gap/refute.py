@@ -90,8 +90,7 @@ def least_confirmed(named, problem, base, final, proof, whole):
 
     """
     fits = {w.name: _less(w.name, problem, base, final) for w in named}
-    after = proof.run(final, whole)
-    name = min(fits, key=lambda name: proof.fall(proof.run(fits[name], whole), after)[0])
+    name = min(fits, key=lambda name: proof.fall(proof.run(fits[name], whole), proof.after)[0])
     return name, fits[name]
 
 

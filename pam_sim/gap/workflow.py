@@ -111,7 +111,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     if final is not first:
         proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
-    while outcome.named and proof.confirmed(base, certify is not None) < CONFIRMED:
+    while outcome.named and proof.confirmed() < CONFIRMED:
         name, final = least_confirmed(
             outcome.named, problem, base, final, proof, certify is not None)
         result.remarks.append(f'What {name} would explain of the recordings is not found '

@@ -84,6 +84,7 @@ def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
     proof.noise = {'contraction': 1.0}
     proof.run = lambda found, whole: {
         'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
+    proof.after = proof.run(found_of(*NAMES), True)
     named = [Named(n, 'muscle', [], (n,)) for n in NAMES]
     name, left = least_confirmed(named, Refitted(), found_of(), found_of(*NAMES), proof, True)
     assert name == spurious
