@@ -144,7 +144,10 @@ _TABLE = {
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }
-_SWITCHING = (Free('open_time_s', 1e-3, 0.0, 9e-3), Free('close_time_s', 1e-3, 0.0, 9e-3))
+# Their difference is added up by the valve, pulse by pulse; their sum is hardly seen.
+_TRIED = (1e-3, 1e-4, 0.0)
+_SWITCHING = (Free('open_time_s', 1e-3, 0.0, 9e-3, starts=_TRIED),
+              Free('close_time_s', 1e-3, 0.0, 9e-3, starts=_TRIED))
 _HSV = {'valve_dead_zone': _SWITCHING,
         'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3))}
 _OVERLAP = (Free('half_width_pa', 2e3, 0.0, 5e4),)

@@ -168,7 +168,8 @@ class Choice:
         before = share(cut, self.base.errors[s], current.errors[s])
         gained = tied[0].share[s] - before
         least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
-        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s])
+        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s],
+                          quiet=True)
         if gained < least or sure < CERTAIN_T:
             return None
         return Named(tied[0].name, s, sorted(

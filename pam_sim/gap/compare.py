@@ -30,7 +30,7 @@ ACTIVE_GAP = 0.3             # of the baseline, floors squared; quieter blocks s
 ACTIVE_SHARE = 0.05          # of the mean gap
 OF_MEAN = 0.5                # squared difference of two rivals that are alike everywhere
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
-MIN_BLOCKS = 4
+MIN_BLOCKS, FEW_BLOCKS = 4, 12
 CERTAIN_T = 3.0
 NO_TEST_T = 0.0
 LARGEST_T = 37.0             # beyond it the probability is below what a float holds
@@ -60,7 +60,7 @@ def block_chi2(cut, errors, part=SELECT):
     return blocks, total / len(cut.signals)
 
 
-def preference(cut, base, better, worse, part=SELECT):
+def preference(cut, base, better, worse, part=SELECT, quiet=False):
     """
     Return by how many deviations the log ratio of squared errors says ``better``.
 
@@ -76,6 +76,9 @@ def preference(cut, base, better, worse, part=SELECT):
         Errors of the baseline and of the rivals.
     part : int
         Part of the data that judges.
+    quiet : bool
+        Whether blocks with a small gap count, too, where those with a large one are few: many
+        that agree may say more.
 
     Returns
     -------
@@ -86,10 +89,15 @@ def preference(cut, base, better, worse, part=SELECT):
     _, before = block_chi2(cut, base, part)
     _, apart = block_chi2(cut, better - worse, part)
     active = _active(before - cut.level, 1.0) & _active(apart, OF_MEAN)
-    if active.sum() < MIN_BLOCKS:
-        return NO_TEST_T
-    first, second = (block_chi2(cut, e, part)[1][active] + SOFTEN for e in (better, worse))
+    first, second = (block_chi2(cut, e, part)[1] + SOFTEN for e in (better, worse))
     ratio = np.log(second / first)
+    found = _deviations(ratio[active])
+    return max(found, _deviations(ratio)) if quiet and active.sum() < FEW_BLOCKS else found
+
+
+def _deviations(ratio):
+    if ratio.size < MIN_BLOCKS:
+        return NO_TEST_T
     if not ratio.any():
         return NO_TEST_T
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)

@@ -63,8 +63,10 @@ def is_material(own, refitted, materiality):
     """
     Return whether effects are worth a name.
 
-    That is, whether they move a signal by more than ``materiality`` while the numbers of the
-    model stay, and still by ``VISIBLE`` where these do what they can to replace them.
+    That is, whether they move a signal by more than ``materiality`` where the numbers of the
+    model do what they can to replace them; or while these stay, and still by ``VISIBLE`` where
+    they do not. Numbers that were bent by one motion are wrong in another, though the effect
+    itself may do nothing there.
 
     Parameters
     ----------
@@ -74,8 +76,9 @@ def is_material(own, refitted, materiality):
         Of a sensor, in its standard deviations.
 
     """
-    return (max(own.values(), default=0.0) > materiality
-            and max(refitted.values(), default=0.0) > min(materiality, VISIBLE))
+    left = max(refitted.values(), default=0.0)
+    return left > materiality or (
+        max(own.values(), default=0.0) > materiality and left > min(materiality, VISIBLE))
 
 
 def late_by(measurement):

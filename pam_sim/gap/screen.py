@@ -39,7 +39,9 @@ class Screened:
     A candidate with its best start and the share of the squared errors it promises.
 
     ``seen`` is the rms of its signature in noise floors, of the signal that shows it most,
-    for ``size``, the parameters that were tried first.
+    for ``size``, the parameters that were tried first. ``flat`` is the same with all errors at
+    full weight: a misfit that lasts has little weight left, and what explains it promises
+    nothing.
     """
 
     candidate: Candidate
@@ -47,6 +49,7 @@ class Screened:
     promise: dict
     seen: float = 0.0
     size: dict = field(default_factory=dict)
+    flat: 'Screened' = None
 
 
 def screen(problem, near, found):
@@ -68,9 +71,10 @@ def screen(problem, near, found):
         In the order given; ``promise`` by subsystem, 0 where a candidate does not act.
 
     """
-    spaces = spaces_of(problem, near)
+    even = {s: np.ones_like(temper) for s, temper in near.temper.items()}
+    spaces, flat = spaces_of(problem, near), spaces_of(problem, replace(near, temper=even))
     with ThreadPoolExecutor(default_workers()) as pool:
-        return list(pool.map(lambda c: _best_start(problem, near, c, spaces), found))
+        return list(pool.map(lambda c: _screened(problem, near, c, spaces, flat), found))
 
 
 def spaces_of(problem, near):
@@ -80,9 +84,12 @@ def spaces_of(problem, near):
 
 def free_signature(problem, near, candidate, values, cut, space):
     """Return what an effect does to the weighted errors of a cut that known numbers cannot."""
+    return space.free_of_known(_change(problem, near, candidate, values, cut))
+
+
+def _change(problem, near, candidate, values, cut):
     rig = problem.with_effects([*near.settings(), candidate.setting(values)])
-    change = cut.errors(rig, near.known_z[cut.subsystem]) - near.errors[cut.subsystem]
-    return space.free_of_known(change)
+    return cut.errors(rig, near.known_z[cut.subsystem]) - near.errors[cut.subsystem]
 
 
 class _Space:
@@ -134,20 +141,29 @@ def least_sizes(screened, rig, floors=1.0):
     return found
 
 
-def _best_start(problem, near, candidate, spaces):
-    best = Screened(candidate, tuple(f.coordinate(f.scale) for f in candidate.free), {})
-    starts, seen = candidate.starts(), 0.0
-    first = starts[0]
-    for values in starts:
-        promise, factors = {}, []
+def _screened(problem, near, candidate, spaces, flat):
+    """Return a Screened; each start is simulated once for both weights."""
+    changes = []
+    for values in candidate.starts():
+        changes.append((values, {}))
         for cut in problem.cuts:
-            if not acts_on(candidate.effect, cut.subsystem):
-                continue
-            space = spaces[cut.subsystem]
-            try:
-                change = free_signature(problem, near, candidate, values, cut, space)
-            except InputError:
-                continue
+            if acts_on(candidate.effect, cut.subsystem):
+                try:
+                    changes[-1][1][cut.subsystem] = _change(problem, near, candidate, values, cut)
+                except InputError:
+                    continue
+    return replace(_best_start(candidate, changes, spaces),
+                   flat=_best_start(candidate, changes, flat))
+
+
+def _best_start(candidate, changes, spaces):
+    best = Screened(candidate, tuple(f.coordinate(f.scale) for f in candidate.free), {})
+    first, seen = changes[0][0], 0.0
+    for values, by_cut in changes:
+        promise, factors = {}, []
+        for subsystem, change in by_cut.items():
+            space = spaces[subsystem]
+            change = space.free_of_known(change)
             size = float(change @ change)
             if size <= 0.0:
                 continue
@@ -155,13 +171,14 @@ def _best_start(problem, near, candidate, spaces):
                 seen = max(seen, space.rms(change))
             factor = -float(change @ space.left) / size
             if candidate.amplitudes:
-                low = min(f.lower / values[f.name] for f in candidate.amplitudes)
+                low = min((f.lower / values[f.name] for f in candidate.amplitudes
+                           if values[f.name]), default=0.0)
                 high = AMPLITUDE_RANGE[1]
                 factor = float(np.clip(factor, max(low, -high), high))
             else:
                 factor = float(np.clip(factor, 0.0, 1.0))
             left = space.left + factor * change
-            promise[cut.subsystem] = 1.0 - float(left @ left) / float(space.left @ space.left)
+            promise[subsystem] = 1.0 - float(left @ left) / float(space.left @ space.left)
             factors.append(factor)
         if sum(promise.values()) > sum(best.promise.values()):
             factor = factors[int(np.argmax(list(promise.values())))]

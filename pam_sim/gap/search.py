@@ -36,6 +36,7 @@ from pam_sim.rollout.batch import default_workers
 MAX_EFFECTS = 3
 PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
+IN_FULL = 3                  # of those that promise most with all errors at full weight
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
 BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
@@ -235,7 +236,8 @@ class Search:
         contending = {r.name for r in rivals for s, top in best.items()
                       if r.share[s] > top - CONTENDS and r.share[s] > 0.0}
         rivals += self._fit_all(current, [
-            s for s in screened if s.candidate.name in contending and s not in chosen])
+            s for s in screened if s.candidate.name in contending
+            and s.candidate not in [c.candidate for c in chosen]])
         self.fitted = rivals
         return self._best_of_name(rivals)
 
@@ -243,16 +245,22 @@ class Search:
         """Return the best formulation of every name that promises something."""
         chosen = []
         for cut in cuts:
-            by_name = {}
-            for s in sorted(screened, key=lambda s: -s.promise.get(cut.subsystem, 0.0)):
-                if s.promise.get(cut.subsystem, 0.0) > 0.0:
-                    by_name.setdefault(s.candidate.name, s)
-            ranked = list(by_name.values())
+            ranked = self._ranked(screened, cut.subsystem)
             top = ranked[0].promise[cut.subsystem] if ranked else 0.0
-            for place, s in enumerate(ranked[:MAX_FITTED]):
-                if place < MIN_FITTED or s.promise[cut.subsystem] > PROMISING * top:
-                    chosen.append(s)
-        return [s for i, s in enumerate(chosen) if s not in chosen[:i]]
+            chosen += [s for place, s in enumerate(ranked[:MAX_FITTED]) if place < MIN_FITTED
+                       or s.promise[cut.subsystem] > PROMISING * top]
+            chosen += self._ranked([s.flat for s in screened], cut.subsystem)[:IN_FULL]
+        candidates = [s.candidate for s in chosen]
+        return [s for i, s in enumerate(chosen) if s.candidate not in candidates[:i]]
+
+    @staticmethod
+    def _ranked(screened, subsystem):
+        """Return the best formulation of every name, the most promising first."""
+        by_name = {}
+        for s in sorted(screened, key=lambda s: -s.promise.get(subsystem, 0.0)):
+            if s.promise.get(subsystem, 0.0) > 0.0:
+                by_name.setdefault(s.candidate.name, s)
+        return list(by_name.values())
 
     def _fit_all(self, current, screened):
         """Return the rivals of screened candidates; the simulations hold no lock."""

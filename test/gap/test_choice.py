@@ -61,6 +61,18 @@ def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, sa
     assert preference(cut, base, worse, better) == pytest.approx(-found)
 
 
+@pytest.mark.parametrize('agree, says', [(1.0, True), (0.5, False)])
+def test_many_quiet_blocks_that_agree_count_where_loud_ones_are_few(agree, says):
+    cut, place = Blocks(30), np.arange(30)
+    before = np.where(place < 6, 3.0, 0.45)
+    # Of the loud ones all get better, but half of them hardly; of the quiet ones a share does.
+    after = np.where(place < 6, np.where(place % 2, 0.0, 2.8),
+                     np.where(place % 10 < 10 * agree, 0.0, 0.65))
+    base, better = errors(cut, 0, before), errors(cut, 0, after)
+    assert preference(cut, base, better, base) < CERTAIN_T
+    assert (preference(cut, base, better, base, quiet=True) > CERTAIN_T) == says
+
+
 @pytest.mark.parametrize('off, tied', [(0.1, True), (1.0, False)])
 def test_no_rival_goes_for_less_than_a_formulation_may_be_off(off, tied):
     cut = Blocks(60)

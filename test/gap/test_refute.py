@@ -114,8 +114,9 @@ def test_a_run_gets_the_skew_of_the_certify_recording_within_bounds(skew_s, left
     (4.0, 2.0, True),
     (4.0, 0.5, True),                 # the numbers could hide most of it, but not all
     (4.0, 0.1, False),
+    (0.1, 4.0, True),                 # another motion; there the numbers it bent are wrong
     (0.5, 0.5, False)])
-def test_what_an_effect_moves_itself_decides_whether_it_matters(own, refitted, is_so):
+def test_an_effect_matters_by_what_it_moves_itself_or_what_nothing_replaces(own, refitted, is_so):
     assert is_material({'pressure': own}, {'force': refitted}, 1.0) == is_so
 
 

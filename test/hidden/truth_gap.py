@@ -30,7 +30,7 @@ PRIOR = 0.02
 SUPPLY_PRIOR = 0.005
 LATENCY_SD_S = 1e-3
 EVERY = 25                    # rows of 0.2 ms: compared at 200 Hz
-ROUNDS = 3
+ROUNDS = 5                    # the first at full weight
 
 
 def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
@@ -83,11 +83,12 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
         slopes[s][:, -1] = -np.gradient(base[s], EVERY * sensors.ROW_S) * LATENCY_SD_S
     step = np.zeros(len(names) + 1)
     prior = np.concatenate([theta, [0.0]])
-    for _ in range(ROUNDS):
+    for round_ in range(ROUNDS):
         matrix, right = np.eye(len(names) + 1), -prior
         for s in signals:
             left = target[s] - base[s]
-            weight = 1.0 / tempering(left - slopes[s] @ step)
+            # From full weight: a low one keeps the misfit that made it, and is its own reason.
+            weight = 1.0 / tempering(left - slopes[s] @ step) if round_ else 1.0
             matrix = matrix + weight * slopes[s].T @ slopes[s]
             right = right + weight * slopes[s].T @ left
         step = np.linalg.solve(matrix, right)

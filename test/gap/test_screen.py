@@ -1,0 +1,55 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which effects are worth a fit: what a promise must not depend on."""
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.screen import screen
+
+
+def screened(rig, given, valve_signal):
+    """Return (baseline, candidates as screened) for a recording of a rig and a given model."""
+    recording = Recording(recorded(rig, valve_signal), given.valve)
+    problem = Problem(given, cuts_of(given, [recording]))
+    found = candidates(given, ('pressure', 'contraction', 'force'))
+    return problem.base, screen(problem, problem.base, found)
+
+
+def first(found, subsystem):
+    return max(found, key=lambda s: s.promise.get(subsystem, 0.0)).candidate.name
+
+
+def test_what_a_lasting_misfit_hides_promises_at_full_weight():
+    softer = nominal().with_(effects=[{'name': 'thermal_softening', 'parameters': {
+        'gain_loss_at_20mm_per_s': 0.01, 'time_constant_s': 60.0}}])
+    base, found = screened(softer, nominal(), voltages(24.0))
+    assert base.temper['muscle'][0] > 30.0            # the weight of contraction has gone
+    assert first([s.flat for s in found], 'muscle') == 'thermal_softening'
+
+
+def test_switching_times_are_tried_one_by_one():
+    given = nominal().with_(valve='hsv')
+    late = given.with_(effects=[{'name': 'valve_dead_zone', 'parameters': {
+        'open_time_s': 4e-5, 'close_time_s': 0.0}}])
+    at = np.arange(12000) * 1e-3
+    duty = 0.02 * np.sin(2 * np.pi * 0.7 * at)
+    _, found = screened(late, given, np.column_stack([np.maximum(duty, 0), np.maximum(-duty, 0)]))
+    mine = next(s for s in found if s.candidate.effect == 'valve_dead_zone')
+    opening, closing = mine.start
+    assert mine.promise['valve'] > 0.8 and opening > 0.0 and closing == 0.0
