@@ -17,8 +17,9 @@ How large a hidden effect is: what it moves, in standard deviations of the senso
 
 The numbers of the rig without the effect are fitted to the noise-free fit run (regularised
 least squares: prior deviations as a data sheet has them, full weights and then weights tempered
-by misfit and memory of the residual, a shared latency as nuisance); the gap is what is left of the certify run, as
-rms over the run in standard deviations of the sensor, of the signal where it is largest.
+by misfit and memory of the residual, a shared latency as nuisance); the gap is what is left of
+the certify run, as rms over the run in standard deviations of the sensor, of the signal where it
+is largest.
 """
 
 import numpy as np
