@@ -71,8 +71,7 @@ def screen(problem, near, found):
         In the order given; ``promise`` by subsystem, 0 where a candidate does not act.
 
     """
-    even = {s: np.ones_like(temper) for s, temper in near.temper.items()}
-    spaces, flat = spaces_of(problem, near), spaces_of(problem, replace(near, temper=even))
+    spaces, flat = spaces_of(problem, near), flat_spaces_of(problem, near)
     with ThreadPoolExecutor(default_workers()) as pool:
         return list(pool.map(lambda c: _screened(problem, near, c, spaces, flat), found))
 
@@ -80,6 +79,12 @@ def screen(problem, near, found):
 def spaces_of(problem, near):
     """Return by subsystem the fitted errors with what the known numbers can do taken out."""
     return {cut.subsystem: _Space(problem, cut, near) for cut in problem.cuts}
+
+
+def flat_spaces_of(problem, near):
+    """Return the same as ``spaces_of`` with all errors at full weight."""
+    return spaces_of(problem, replace(near, temper={
+        s: np.ones_like(temper) for s, temper in near.temper.items()}))
 
 
 def free_signature(problem, near, candidate, values, cut, space):

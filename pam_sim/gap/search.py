@@ -29,6 +29,7 @@ from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, 
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_SD_S
 from pam_sim.gap.fit import BOX, Found, Hypothesis
+from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
 from pam_sim.rollout.batch import default_workers
@@ -128,7 +129,7 @@ class Search:
             if not open_cuts:
                 break
             rivals = self._rivals(current, open_cuts)
-            self._set_levels(rivals, open_cuts)
+            self.set_levels(rivals, open_cuts)
             taken = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
             if taken is None:
                 taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
@@ -143,6 +144,13 @@ class Search:
             current = self._other_formulations(self._take(current, taken))
             named += taken
             self.problem.take_slopes(current.settings(), current.known_z)
+        current, named, explained = self._finished(current, named)
+        current, named, explained = self._paired(current, named, explained)
+        return Outcome(self.base, current, named, explained, not self.out_of_time(),
+                       self.screened)
+
+    def _finished(self, current, named):
+        """Return (fit, what stays named, share explained by cut): only what is needed stays."""
         current, named = self._eliminate(current, named)
         current, named = self._established(*self._resolve(current, named))
         current = self._straightened(current)
@@ -150,9 +158,27 @@ class Search:
         poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
         for w in [w for w in named if w.subsystem in poor]:
             current = self._swapped(current, w.name)
-        named = [w for w in named if w.subsystem not in poor]
-        return Outcome(self.base, current, named, explained, not self.out_of_time(),
-                       self.screened)
+        return current, [w for w in named if w.subsystem not in poor], explained
+
+    def _paired(self, current, named, explained):
+        """
+        Return what is left of two effects that explain the largest gap together, if both are.
+
+        Only where one by one named nothing.
+        """
+        cut = max((c for c in self.problem.cuts if self.first_gap[c.subsystem] > self.seen_gap),
+                  key=lambda c: self.first_gap[c.subsystem], default=None)
+        if named or cut is None or self.out_of_time():
+            return current, named, explained
+        level, slopes = cut.level, dict(self.problem.slopes)
+        found = pair_of(self, cut)
+        if found is not None and not self._is_poor(cut, found[0], self._explained(found[0])):
+            self.problem.take_slopes(found[0].settings(), found[0].known_z)
+            both = self._finished(self.problem.polish(found[0]), found[1])
+            if len(both[1]) == len(found[1]):
+                return both
+        cut.level, self.problem.slopes = level, slopes
+        return current, named, explained
 
     def _first_gap(self, cut):
         """
@@ -168,7 +194,7 @@ class Search:
         promise = max((p.promise.get(s, 0.0) for p in self.screened), default=0.0)
         return promise * cut.chi2(self.base.errors[s], FIT)
 
-    def _set_levels(self, rivals, cuts):
+    def set_levels(self, rivals, cuts):
         """Lower the level of noise to what the best rival reaches."""
         for cut in cuts:
             s = cut.subsystem

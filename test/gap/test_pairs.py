@@ -1,0 +1,55 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two effects that a third one looks like as long as they are tried one by one."""
+
+from gap_runs import nominal, recorded, voltages
+from pam_sim.gap import find_gap
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.pairs import promising_pairs
+from pam_sim.gap.screen import screen
+from pam_sim.gap.search import Search
+import pytest
+
+CREEP = {'name': 'creep', 'parameters': {
+    'stiffness_1_n_per_m': 43.0, 'stiffness_2_n_per_m': 47.0, 'time_constant_1_s': 0.9,
+    'time_constant_2_s': 14.0}}
+BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': 3.8e-4}}
+LOOK_ALIKES = ['creep', 'contraction_bias', 'bladder_stiffness', 'end_taper']
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded(nominal().with_(effects=[CREEP, BIAS]), voltages(24.0))
+
+
+def test_the_true_pair_promises_most(run):
+    problem = Problem(nominal(), cuts_of(nominal(), [Recording(run, 'ppr')]))
+    pool = Search(problem, 0.05, 0.01).pool
+    screened = screen(problem, problem.base, pool)
+    cut = next(c for c in problem.cuts if c.subsystem == 'muscle')
+    pairs = promising_pairs(problem, problem.base, screened, cut)
+    assert {c.name for c in pairs[0][0]} == {'creep', 'contraction_bias'}
+    assert all(a.name != b.name for (a, b), _ in pairs)
+
+
+def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
+    both = find_gap(run, nominal(), effects=LOOK_ALIKES)
+    assert {e['name'] for e in both.effects} == {'creep', 'contraction_bias'}
+    assert both.verdict == 'effects'
+    monkeypatch.setattr('pam_sim.gap.search.pair_of', lambda search, cut: None)
+    alone = find_gap(run, nominal(), effects=LOOK_ALIKES)
+    assert {e['name'] for e in alone.effects} != {'creep', 'contraction_bias'}
