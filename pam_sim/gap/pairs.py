@@ -69,11 +69,13 @@ def promising_pairs(problem, base, screened, cut):
     Parameters
     ----------
     problem : Problem
+        Cuts and slopes.
     base : Found
         The baseline.
     screened : list of Screened
         Of the baseline, with their starts.
     cut : Cut
+        Where there is a gap.
 
     Returns
     -------
@@ -135,6 +137,7 @@ def pair_of(search, cut):
     search : Search
         With its baseline, candidates as screened, and choice.
     cut : Cut
+        Where there is a gap.
 
     """
     s, rivals = cut.subsystem, []
