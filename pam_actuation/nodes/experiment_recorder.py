@@ -83,6 +83,7 @@ class ExperimentRecorder(ManagedNode):
     )
 
     core = None
+    bag = None          # folder of the last one opened
 
     def check(self):
         """Refuse topics that are not known."""
@@ -147,6 +148,7 @@ class ExperimentRecorder(ManagedNode):
             overwrite=self.value('overwrite'),
             max_file_bytes=self.value('max_bagfile_size_bytes'),
             max_file_s=self.value('max_bagfile_duration_s'))
+        self.bag = writer.directory
         self.core = RecorderCore(writer)
         self.known = set()
         for source in self.sources.values():
@@ -236,7 +238,8 @@ class ExperimentRecorder(ManagedNode):
             now = time.monotonic()
             if self._take_all():
                 last = now
-            farewell = self.stopping and now - begin < FAREWELL_S and self._others_publish()
+            farewell = (self.stopping and not self.starts_anew and now - begin < FAREWELL_S
+                        and self._others_publish())
             if now - last > QUIET_S and not farewell or now - begin > FAREWELL_S:
                 return
             time.sleep(0.01)
@@ -245,6 +248,16 @@ class ExperimentRecorder(ManagedNode):
         own = {'/diagnostics': 1}
         return any(source.publishers > own.get(source.topic, 0)
                    for source in self.sources.values())
+
+    def let_go(self):
+        """Move the bag aside that may lack somebody's messages: a new one takes its place."""
+        super().let_go()
+        if self.bag is not None and self.bag.exists():
+            beside = (self.bag.with_name(f'{self.bag.name}_part_{k}') for k in range(1, 1000))
+            aside = next(path for path in beside if not path.exists())
+            self.bag.rename(aside)
+            self.get_logger().warning(f'what was recorded so far is kept in {aside}')
+        self.result_code = 0
 
     def diagnostic_values(self):
         """Add what was recorded."""
