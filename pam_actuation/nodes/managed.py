@@ -224,7 +224,7 @@ class ManagedNode(LifecycleNode):
         return subscription
 
     def create_service(self, srv_type, srv_name, callback, **kwargs):
-        """Create a service; those of the node itself, unlike rclpy's, note that they are called."""
+        """Create a service; those of the node itself, not rclpy's, note that they are called."""
         if hasattr(self, 'diagnostics'):
             callback = self._noting(callback)
         return super().create_service(srv_type, srv_name, callback, **kwargs)
