@@ -24,7 +24,7 @@ from pam_actuation.bags import layout
 from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
-from pam_actuation.bags.writer import BagWriter, check_limits
+from pam_actuation.bags.writer import BagWriter, check_limits, set_aside
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
@@ -253,9 +253,7 @@ class ExperimentRecorder(ManagedNode):
         """Move the bag aside that may lack somebody's messages: a new one takes its place."""
         super().let_go()
         if self.bag is not None and self.bag.exists():
-            beside = (self.bag.with_name(f'{self.bag.name}_part_{k}') for k in range(1, 1000))
-            aside = next(path for path in beside if not path.exists())
-            self.bag.rename(aside)
+            aside = set_aside(self.bag)
             self.get_logger().warning(f'what was recorded so far is kept in {aside}')
         self.result_code = 0
 
