@@ -126,6 +126,7 @@ def run(node_class, args=None):
             node.loops.run_once()
     finally:
         why = stopper.reason or watch.reason or 'ended'
+        node.starts_anew = node.starts_anew and not stopper.noted
         node.finish(why)
         stopper.safe.set()
         ended.set()
@@ -168,8 +169,8 @@ def _let_go(node):
         node.let_go()
     except Exception:
         node.get_logger().error(f'cannot start anew:\n{traceback.format_exc()}')
-        node.exit_code = node.exit_code or 1
-    return not (node.exit_code or node.result_code)
+        node.exit_code = 1
+    return node.exit_code is None and node.result_code == 0
 
 
 def _bring_up(node):

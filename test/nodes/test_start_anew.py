@@ -203,6 +203,24 @@ def test_process_is_not_replaced_once_a_signal_came(monkeypatch):
     assert environment[start_anew.COUNTER] == '2'
 
 
+@pytest.mark.parametrize('exit_code, result_code, fails, anew', [
+    (None, 0, False, True), (0, 0, False, False), (1, 0, False, False), (None, 1, False, False),
+    (None, 0, True, False)])
+def test_node_that_is_done_or_failed_is_not_started_anew(exit_code, result_code, fails, anew):
+    pytest.importorskip('rclpy')
+    from pam_actuation.nodes import runner
+    said = []
+
+    def let_go():
+        if fails:
+            raise OSError('no')
+    node = types.SimpleNamespace(
+        exit_code=exit_code, result_code=result_code, let_go=let_go,
+        get_logger=lambda: types.SimpleNamespace(error=said.append))
+    assert runner._let_go(node) == anew
+    assert bool(said) == fails and (node.exit_code == 1 or not fails)
+
+
 def own_ports(pid):
     targets = [os.readlink(link) for link in Path(f'/proc/{pid}/fd').iterdir()]
     return locked_ports(targets) if re.search('_port', ' '.join(targets)) else set()
