@@ -238,8 +238,9 @@ class ExperimentRecorder(ManagedNode):
             now = time.monotonic()
             if self._take_all():
                 last = now
-            farewell = (self.stopping and not self.starts_anew and now - begin < FAREWELL_S
-                        and self._others_publish())
+            if self.starts_anew:
+                return          # the others go on
+            farewell = self.stopping and now - begin < FAREWELL_S and self._others_publish()
             if now - last > QUIET_S and not farewell or now - begin > FAREWELL_S:
                 return
             time.sleep(0.01)
