@@ -28,6 +28,7 @@ import threading
 import traceback
 
 from pam_actuation.nodes.diagnostics import WARN
+from pam_actuation.nodes.start_anew import numbers_kept_off
 from pam_actuation.nodes.start_anew import PortWatch
 from pam_actuation.nodes.start_anew import replace_process
 from pam_sim.errors import InputError
@@ -103,7 +104,8 @@ def run(node_class, args=None):
     stopper = _Stopper()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = node_class()
+        with numbers_kept_off():
+            node = node_class()
     except InputError as error:
         return _refuse(node_class, error)
     except Exception as error:
@@ -143,7 +145,7 @@ def run(node_class, args=None):
         node.destroy_node()
         rclpy.try_shutdown()
     if anew:
-        replace_process(lambda: not stopper.noted)
+        replace_process(watch.removed, lambda: not stopper.noted)
     return node.exit_code or node.result_code
 
 

@@ -20,15 +20,24 @@ others may still write to a killed process of the same number. Was a port remove
 leaves as on every way out, safely and in order, and the process replaces itself by the same
 program: same process id, so that whoever started it sees one process that never ended. Where
 that would undo what somebody has asked of the node, it only tells.
+
+The first new start takes the same number again: a sound port of that name ends what the others
+do for the dead one. A writer that still has a nameless port of that number, though, removes the
+new one with its next message. So a node that finds its port removed again keeps off its number.
 """
 
+import contextlib
 import os
+import re
+import socket
 import sys
 import time
 
 from pam_actuation.nodes.own_port import OwnPorts, REMOVED
 
 COUNTER = 'PAM_STARTED_ANEW'    # environment variable: how often in a row
+KEEP_OFF = 'PAM_KEEP_OFF_UDP_PORTS'     # environment variable: of the numbers kept off
+FIRST_UDP_PORT = 7410
 MOST = 5
 EARLY_S = 5.0                   # look often for so long
 EARLY_PERIOD_S = 0.25
@@ -42,6 +51,28 @@ def times():
         return int(os.environ.get(COUNTER, '0'))
     except ValueError:
         return MOST
+
+
+def udp_ports(names):
+    """
+    Return the UDP ports that decide on the numbers of some shared-memory ports.
+
+    A participant listens on UDP port 2 n and, through shared memory as well, on 2 n + 1; the
+    private ports of the node list (7000 and up) have no such number.
+    """
+    numbers = [int(re.search(r'\d+', name)[0]) for name in names]
+    return [number - 1 for number in numbers if number > FIRST_UDP_PORT]
+
+
+@contextlib.contextmanager
+def numbers_kept_off():
+    """Hold the UDP ports of numbers that did no good while a participant is created inside."""
+    with contextlib.ExitStack() as held:
+        for port in os.environ.get(KEEP_OFF, '').split():
+            holder = held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            with contextlib.suppress(OSError, ValueError, OverflowError):
+                holder.bind(('0.0.0.0', int(port)))
+        yield
 
 
 class PortWatch:
@@ -63,6 +94,8 @@ class PortWatch:
     ----------
     reason : str
         Why the node is to start anew, '' if it is not.
+    removed : list of str
+        The ports it lost then.
 
     """
 
@@ -73,6 +106,7 @@ class PortWatch:
         self._now_s = now_s
         self._begin_s = self._next_s = now_s()
         self.reason = ''
+        self.removed = []
         self._ports.look()
 
     @property
@@ -95,6 +129,7 @@ class PortWatch:
         if (self._alone and now_s - self._begin_s < ANEW_WITHIN_S and times() < MOST
                 and node.may_start_anew()):
             self.reason = f'{what}: it starts itself anew ({times() + 1} of at most {MOST})'
+            self.removed = sorted(self._ports.removed)
             node.starts_anew = node.stopping = True
             return True
         if not node.diagnostics.remark:
@@ -103,17 +138,22 @@ class PortWatch:
         return False
 
 
-def replace_process(still_wanted):
+def replace_process(removed, still_wanted):
     """
     Replace this process by the same program; return only if that is not wanted any more.
 
     Parameters
     ----------
+    removed : list of str
+        Shared-memory ports it lost.
     still_wanted : callable
         Asked last: False if a signal came meanwhile.
 
     """
     environment = {**os.environ, COUNTER: str(times() + 1)}
+    if times():
+        ports = [*os.environ.get(KEEP_OFF, '').split(), *map(str, udp_ports(removed))]
+        environment[KEEP_OFF] = ' '.join(ports)
     if os.sched_getscheduler(0) != os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))     # not for loading modules
     for descriptor in os.listdir('/proc/self/fd'):

@@ -14,9 +14,10 @@
 
 """Test that a process sees that others removed its shared-memory port, and starts anew."""
 
+import contextlib
 import os
 from pathlib import Path
-import re
+import socket
 import sys
 import time
 import types
@@ -194,13 +195,30 @@ def test_process_is_not_replaced_once_a_signal_came(monkeypatch):
     calls = []
     monkeypatch.setattr(os, 'execve', lambda *args: calls.append(args))
     monkeypatch.setattr(os, 'set_inheritable', lambda *args: None)
-    start_anew.replace_process(lambda: False)
+    start_anew.replace_process([PORT], lambda: False)
     assert not calls
-    monkeypatch.setenv(start_anew.COUNTER, '1')
-    start_anew.replace_process(lambda: True)
-    (program, arguments, environment), = calls
-    assert (program, arguments) == (sys.executable, sys.orig_argv)
-    assert environment[start_anew.COUNTER] == '2'
+    for _ in range(3):
+        start_anew.replace_process([PORT, 'fastrtps_port7010'], lambda: True)
+        program, arguments, environment = calls[-1]
+        assert (program, arguments) == (sys.executable, sys.orig_argv)
+        for name, value in environment.items():
+            monkeypatch.setenv(name, value)
+    assert [call[2][start_anew.COUNTER] for call in calls] == ['1', '2', '3']
+    # The first time with the same number, then without.
+    assert [call[2].get(start_anew.KEEP_OFF) for call in calls] == [
+        None, '22660', '22660 22660']
+
+
+def test_numbers_are_kept_off_for_a_while_only(monkeypatch):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(('0.0.0.0', 0))
+        port = one.getsockname()[1]
+    monkeypatch.setenv(start_anew.KEEP_OFF, f'{port} nonsense 99999')
+    for inside in (True, False):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+            with start_anew.numbers_kept_off() if inside else contextlib.nullcontext():
+                with pytest.raises(OSError) if inside else contextlib.nullcontext():
+                    one.bind(('0.0.0.0', port))
 
 
 @pytest.mark.parametrize('exit_code, result_code, fails, anew', [
@@ -222,8 +240,11 @@ def test_node_that_is_done_or_failed_is_not_started_anew(exit_code, result_code,
 
 
 def own_ports(pid):
-    targets = [os.readlink(link) for link in Path(f'/proc/{pid}/fd').iterdir()]
-    return locked_ports(targets) if re.search('_port', ' '.join(targets)) else set()
+    targets = []
+    for link in Path(f'/proc/{pid}/fd').iterdir():
+        with contextlib.suppress(FileNotFoundError):        # closed meanwhile
+            targets.append(os.readlink(link))
+    return locked_ports(targets)
 
 
 @pytest.mark.ros
@@ -256,7 +277,8 @@ def test_node_whose_port_is_removed_comes_back_and_hears(tmp_path):
 
         wait_for(hears, 20.0, 'a node that hears')
         last = rig.health['valve_watchdog'][-1]
-        assert last.values['started_anew'] == '1'
+        # Twice where the listener still had a port without a name.
+        assert last.values['started_anew'] in ('1', '2')
         assert process.running and 'starts itself anew (1 of' in process.log_file.read_text()
         assert port()
     finally:
