@@ -42,6 +42,7 @@ MOST = 5
 EARLY_S = 5.0                   # look often for so long
 EARLY_PERIOD_S = 0.25
 PERIOD_S = 0.5
+LASTS_S = 0.75                  # Fast DDS itself renews a port it finds marked as broken
 ANEW_WITHIN_S = 15.0            # later the node only tells
 
 
@@ -107,6 +108,7 @@ class PortWatch:
         self._begin_s = self._next_s = now_s()
         self.reason = ''
         self.removed = []
+        self._removed_s = None
         self._ports.look()
 
     @property
@@ -123,6 +125,10 @@ class PortWatch:
         node = self._node
         if self._ports.look() != REMOVED:
             node.diagnostics.remark = ''
+            self._removed_s = None
+            return False
+        self._removed_s = now_s if self._removed_s is None else self._removed_s
+        if now_s - self._removed_s < LASTS_S:
             return False
         what = (f'other processes removed its shared-memory port '
                 f'({", ".join(sorted(self._ports.removed))})')
