@@ -20,10 +20,11 @@ sensors and stamps explain), ``parts`` (what is fitted, what judges, what proves
 ``free_run`` (the model on the recorded valve signal), ``cuts`` (each subsystem on its
 measured input), ``candidates`` (what may be missing), ``fit`` (one hypothesis),
 ``screen`` (which are worth a fit), ``compare`` (which one the data prefer), ``choice``
-(which rival wins), ``search`` (one effect after another), ``uncertainty`` (how well its
-numbers are known), ``prove`` (free runs on data kept aside), ``locate`` (where the gap
-sits), ``workflow`` (all of it in order, and the verdict), ``words`` (the verdict in
-sentences), ``result`` (what gap.json holds).
+(which rival wins), ``search`` (one effect after another), ``pairs`` (two at once, where that
+fails), ``uncertainty`` (how well its numbers are known), ``prove`` (free runs on data kept
+aside), ``refute`` (which names those contradict), ``locate`` (where the gap sits),
+``workflow`` (all of it in order, and the verdict), ``words`` (the verdict in sentences),
+``result`` (what gap.json holds).
 A witness without a model of what is missing: ``fingerprint``. Before anything is measured:
 ``plan`` (what a protocol could show) and ``look_alikes``.
 """
