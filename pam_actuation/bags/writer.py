@@ -258,27 +258,6 @@ def _records(metadata):
     return records
 
 
-def set_aside(directory):
-    """
-    Rename a bag to the next free name ``..._part_1``, ``..._part_2``; it stays readable.
-
-    Parameters
-    ----------
-    directory : Path
-        A finished bag.
-
-    Returns
-    -------
-    Path
-        Its new name.
-
-    """
-    number = 1
-    while (aside := directory.with_name(f'{directory.name}_part_{number}')).exists():
-        number += 1
-    return directory.rename(aside)
-
-
 def _make_room(directory, overwrite):
     """Create the bag's directory; remove the bag in it if that is wanted."""
     if directory.is_file():

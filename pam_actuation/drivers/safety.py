@@ -167,11 +167,6 @@ class SafetySupervisor:
         if problem and self._latched is None:
             self._latch('device_refuses', f'the valve did not take its signal: {problem}')
 
-    @property
-    def latched(self):
-        """Tell whether a stop is latched."""
-        return self._latched is not None
-
     def reset(self):
         """
         End a latched stop; return (done, sentence).

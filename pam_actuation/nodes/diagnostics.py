@@ -39,16 +39,10 @@ class DiagnosticsReporter:
     node : ManagedNode
         Gives full name, clock, ``publishers`` and ``diagnostic_values()``.
 
-    Attributes
-    ----------
-    remark : str
-        What is wrong whatever the node does; if not '', every status warns with it.
-
     """
 
     def __init__(self, node):
         self._node = node
-        self.remark = ''
         self.publisher = CountedPublisher(node, DiagnosticArray, '/diagnostics')
         self.level = OK
         self.message = 'starting'
@@ -72,11 +66,8 @@ class DiagnosticsReporter:
             return
         now_ns = self._node.now_ns()
         self._sent, self._sent_ns = (self.level, self.message), now_ns
-        level, message = self.level, self.message
-        if self.remark:
-            level, message = max(level, WARN), f'{message}; {self.remark}'
         self.publisher.publish(diagnostic_array(Status(
-            now_ns, level, self._node.get_fully_qualified_name(), message,
+            now_ns, self.level, self._node.get_fully_qualified_name(), self.message,
             (*self.values, *self._node.diagnostic_values(), *self._counts()))))
 
     def _counts(self):

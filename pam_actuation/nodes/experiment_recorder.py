@@ -24,7 +24,7 @@ from pam_actuation.bags import layout
 from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
-from pam_actuation.bags.writer import BagWriter, check_limits, set_aside
+from pam_actuation.bags.writer import BagWriter, check_limits
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
@@ -83,7 +83,6 @@ class ExperimentRecorder(ManagedNode):
     )
 
     core = None
-    bag = None          # folder of the last one opened
 
     def check(self):
         """Refuse topics that are not known."""
@@ -148,7 +147,6 @@ class ExperimentRecorder(ManagedNode):
             overwrite=self.value('overwrite'),
             max_file_bytes=self.value('max_bagfile_size_bytes'),
             max_file_s=self.value('max_bagfile_duration_s'))
-        self.bag = writer.directory
         self.core = RecorderCore(writer)
         self.known = set()
         for source in self.sources.values():
@@ -238,8 +236,6 @@ class ExperimentRecorder(ManagedNode):
             now = time.monotonic()
             if self._take_all():
                 last = now
-            if self.starts_anew:
-                return          # the others go on
             farewell = self.stopping and now - begin < FAREWELL_S and self._others_publish()
             if now - last > QUIET_S and not farewell or now - begin > FAREWELL_S:
                 return
@@ -249,14 +245,6 @@ class ExperimentRecorder(ManagedNode):
         own = {'/diagnostics': 1}
         return any(source.publishers > own.get(source.topic, 0)
                    for source in self.sources.values())
-
-    def let_go(self):
-        """Move the bag aside that may lack somebody's messages: a new one takes its place."""
-        super().let_go()
-        if self.bag is not None and self.bag.exists():
-            aside = set_aside(self.bag)
-            self.get_logger().warning(f'what was recorded so far is kept in {aside}')
-        self.result_code = 0
 
     def diagnostic_values(self):
         """Add what was recorded."""

@@ -29,12 +29,10 @@ import time
 import traceback
 
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes import start_anew
 from pam_actuation.nodes.conversions import type_of
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
-from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.endpoints import wait_until_matched
@@ -101,8 +99,6 @@ class ManagedNode(LifecycleNode):
         self.exit_code = None       # not None: the process is to end now, with this code
         self.result_code = 0        # with which it ends otherwise
         self.stopping = False
-        self.starts_anew = False    # the process ends by replacing itself, see start_anew
-        self.asked = False          # whether somebody has called a service that changes something
         self.input_error = None     # the user's mistake that stopped the last transition
         self.timing = None
         self._writers = {}
@@ -146,14 +142,6 @@ class ManagedNode(LifecycleNode):
     def teardown(self):
         """Drop what ``setup`` built, apart from publishers and subscriptions (cleanup)."""
 
-    def may_start_anew(self):
-        """Tell whether starting this process anew would undo nothing that was asked of it."""
-        return not self.asked and not self.uses_simulated_time
-
-    def let_go(self):
-        """Let go, after the way out, of what the same process started anew will need."""
-        self.teardown()
-
     def make_simulated_time(self):
         """Return the time the loops run on with use_sim_time."""
         return FollowedTime(self, self.tick_inputs())
@@ -164,8 +152,7 @@ class ManagedNode(LifecycleNode):
 
     def diagnostic_values(self):
         """Return (key, value) pairs that every status of this node shows."""
-        anew = (('started_anew', start_anew.times()),) if start_anew.times() else ()
-        return (*anew, *(self.timing.values() if self.timing else ()))
+        return self.timing.values() if self.timing else ()
 
     # What derived nodes use.
 
@@ -222,18 +209,6 @@ class ManagedNode(LifecycleNode):
             read=WireReader(topic) if plain else None)
         self.subscriptions_polled.append(subscription)
         return subscription
-
-    def create_service(self, srv_type, srv_name, callback, **kwargs):
-        """Create a service; those of the node itself, not rclpy's, note that they are called."""
-        if hasattr(self, 'diagnostics'):
-            callback = self._noting(callback)
-        return super().create_service(srv_type, srv_name, callback, **kwargs)
-
-    def _noting(self, callback):
-        def called(request, response):
-            self.asked = True
-            return callback(request, response)
-        return called
 
     def add_loop(self, period_s, poll_s=None):
         """
@@ -298,13 +273,10 @@ class ManagedNode(LifecycleNode):
             self._make_safe(why)
             if was_active:
                 self._end_work(why)
-            if self.starts_anew:
-                self.get_logger().warning(why)
-            elif was_active:
                 self.get_logger().info(why)
 
     def _end_work(self, why):
-        self.diagnostics.level = ERROR if self.exit_code else WARN if self.starts_anew else OK
+        self.diagnostics.level = ERROR if self.exit_code else OK
         self.diagnostics.message = why
         self.diagnostics.send()
         deadline = time.monotonic() + FAREWELL_S
@@ -443,7 +415,7 @@ class ManagedNode(LifecycleNode):
         wrong ``ros2 lifecycle set`` would end the node and with it the loop.
         """
         service = self._service_change_state
-        original = self._noting(service.callback)
+        original = service.callback
 
         def change_state(request, response):
             try:

@@ -25,12 +25,8 @@ import signal
 import socket
 import sys
 import threading
-import traceback
 
 from pam_actuation.nodes.diagnostics import WARN
-from pam_actuation.nodes.start_anew import numbers_kept_off
-from pam_actuation.nodes.start_anew import PortWatch
-from pam_actuation.nodes.start_anew import replace_process
 from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -38,6 +34,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
 
@@ -58,16 +55,11 @@ class _Stopper(threading.Thread):
         write_end.setblocking(False)
         self._write_end = write_end
         for number in SIGNALS:
-            signal.signal(number, self._note)
+            signal.signal(number, _noted)
         signal.set_wakeup_fd(write_end.fileno(), warn_on_full_buffer=False)
         self.node = None
         self.reason = ''
-        self.noted = False
         self.safe = threading.Event()
-
-    def _note(self, number, frame):
-        """Stand in for the default action of a signal; the thread does the work."""
-        self.noted = True
 
     def run(self):
         """Handle the first signal."""
@@ -82,6 +74,10 @@ class _Stopper(threading.Thread):
                 self.node.safe_stop(f'{self.reason}, the loop did not answer')
             finally:
                 os._exit(1)
+
+
+def _noted(number, frame):
+    """Stand in for the default action of a signal; the thread above does the work."""
 
 
 def run(node_class, args=None):
@@ -104,8 +100,7 @@ def run(node_class, args=None):
     stopper = _Stopper()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        with numbers_kept_off():
-            node = node_class()
+        node = node_class()
     except InputError as error:
         return _refuse(node_class, error)
     except Exception as error:
@@ -115,9 +110,8 @@ def run(node_class, args=None):
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     ended = threading.Event()
-    watch = PortWatch(node, alone=args is None)
     serving = threading.Thread(
-        target=_serve, args=(executor, ended, watch), daemon=True, name='services')
+        target=_serve, args=(executor, ended), daemon=True, name='services')
     stopper.node = node
     stopper.start()
     serving.start()
@@ -127,8 +121,7 @@ def run(node_class, args=None):
         while not node.stopping and node.exit_code is None:
             node.loops.run_once()
     finally:
-        why = stopper.reason or watch.reason or 'ended'
-        node.starts_anew = node.starts_anew and not stopper.noted
+        why = stopper.reason or 'ended'
         node.finish(why)
         stopper.safe.set()
         ended.set()
@@ -141,38 +134,23 @@ def run(node_class, args=None):
             sys.stderr.flush()
             os._exit(node.exit_code or node.result_code)
         executor.shutdown()
-        anew = node.starts_anew and _let_go(node)
         node.destroy_node()
         rclpy.try_shutdown()
-    if anew:
-        replace_process(watch.removed, lambda: not stopper.noted)
     return node.exit_code or node.result_code
 
 
-def _serve(executor, ended, watch):
+def _serve(executor, ended):
     """
-    Answer services and parameter requests until ``ended`` is set; look at the ports meanwhile.
+    Answer services and parameter requests until ``ended`` is set.
 
     Not ``executor.spin``: its shutdown takes away what wakes it, and a thread that was just
     about to wait would then still be waiting when the node is destroyed.
     """
     try:
         while not ended.is_set():
-            executor.spin_once(timeout_sec=watch.period_s)
-            if watch.look():
-                return
+            executor.spin_once(timeout_sec=SERVICE_WAIT_S)
     except ExternalShutdownException:
         pass
-
-
-def _let_go(node):
-    """Return whether a node that wants to start anew can: it left without a failure."""
-    try:
-        node.let_go()
-    except Exception:
-        node.get_logger().error(f'cannot start anew:\n{traceback.format_exc()}')
-        node.exit_code = 1
-    return node.exit_code is None and node.result_code == 0
 
 
 def _bring_up(node):

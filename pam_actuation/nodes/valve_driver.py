@@ -139,10 +139,6 @@ class ValveDriver(ManagedNode):
             self.output.close()
         self.loop = self.output = None
 
-    def may_start_anew(self):
-        """Keep a latched stop: only ``reset`` ends it."""
-        return super().may_start_anew() and (self.loop is None or not self.loop.safety.latched)
-
     def diagnostic_values(self):
         """Add what the valve hangs on, how often it refused, how often others vented it."""
         values = (*super().diagnostic_values(), ('backend', self.value('backend')))

@@ -132,8 +132,6 @@ class RigClient:
                     if not future.result().success:
                         refused.append(name)
                     continue
-                elif not self._clients[name].service_is_ready():
-                    waiting[name] = None        # it left: what was asked is not answered any more
                 if not alive(name):
                     del waiting[name]
                     refused.append(name)

@@ -21,7 +21,7 @@ from mcap_ros2.decoder import DecoderFactory
 from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.source import read_bag
-from pam_actuation.bags.writer import BagWriter, set_aside
+from pam_actuation.bags.writer import BagWriter
 from pam_sim.errors import InputError
 import pytest
 from rosbags.highlevel import AnyReader
@@ -230,12 +230,3 @@ def test_limits_too_small_for_a_file_are_refused(tmp_path):
         with pytest.raises(InputError, match='give 0'):
             BagWriter(tmp_path / 'run', **limits)
     assert not (tmp_path / 'run').exists()
-
-
-def test_bag_set_aside_stays_readable_and_its_name_is_free(tmp_path):
-    for part in (1, 2):
-        path = write_bag(tmp_path / 'run', 3)
-        aside = set_aside(path)
-        assert aside.name == f'run_part_{part}' and not path.exists()
-        with Reader(aside) as reader:
-            assert reader.message_count == 3 * len(codecs.TOPIC_TYPES)
