@@ -96,9 +96,8 @@ def preference(cut, base, better, worse, part=SELECT, quiet=False):
 
 
 def _deviations(ratio):
-    if ratio.size < MIN_BLOCKS:
-        return NO_TEST_T
-    if not ratio.any():
+    """Return by how many deviations the log ratios of some blocks differ from none."""
+    if ratio.size < MIN_BLOCKS or not ratio.any():
         return NO_TEST_T
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
     t = float(np.mean(ratio) / max(spread, 1e-9))

@@ -56,8 +56,6 @@ class _Tried:
 
     def theta(self, factor):
         """Return the normalised parameters with the size scaled."""
-        if not self.candidate.amplitudes:
-            return self.start
         return tuple(t * (1.0 if f.shape else factor)
                      for f, t in zip(self.candidate.free, self.start))
 
@@ -160,8 +158,8 @@ def pair_of(search, cut):
     for name in tied[0].found.hypothesis.names:
         other = next(n for n in tied[0].found.hypothesis.names if n != name)
         beside = [_last(r, other) for r in rivals if other in r.found.hypothesis.names]
-        names = [_last(r, other).name for r in tied if other in r.found.hypothesis.names]
-        named.append(Named(name, s, beside, tuple(names) if other in common else (name,),
+        names = tuple(n for r in tied for n in r.found.hypothesis.names if n != other)
+        named.append(Named(name, s, beside, names if other in common else (name,),
                            [r for r in beside if r.name == name]))
     return tied[0].found, named
 

@@ -261,9 +261,10 @@ class Search:
                 for c in cuts}
         contending = {r.name for r in rivals for s, top in best.items()
                       if r.share[s] > top - CONTENDS and r.share[s] > 0.0}
+        fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
-            s for s in screened if s.candidate.name in contending
-            and s.candidate not in [c.candidate for c in chosen]])
+            s for s in screened
+            if s.candidate.name in contending and s.candidate not in fitted])
         self.fitted = rivals
         return self._best_of_name(rivals)
 

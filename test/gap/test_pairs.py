@@ -20,7 +20,6 @@ from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.pairs import promising_pairs
-from pam_sim.gap.screen import screen
 from pam_sim.gap.search import Search
 import pytest
 
@@ -38,8 +37,7 @@ def run():
 
 def test_the_true_pair_promises_most(run):
     problem = Problem(nominal(), cuts_of(nominal(), [Recording(run, 'ppr')]))
-    pool = Search(problem, 0.05, 0.01).pool
-    screened = screen(problem, problem.base, pool)
+    screened = Search(problem, 0.05, 0.01).screened
     cut = next(c for c in problem.cuts if c.subsystem == 'muscle')
     pairs = promising_pairs(problem, problem.base, screened, cut)
     assert {c.name for c in pairs[0][0]} == {'creep', 'contraction_bias'}
