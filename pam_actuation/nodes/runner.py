@@ -26,6 +26,7 @@ import socket
 import sys
 import threading
 
+from pam_actuation.nodes import own_port
 from pam_actuation.nodes.diagnostics import WARN
 from pam_sim.errors import InputError
 import rclpy
@@ -99,8 +100,7 @@ def run(node_class, args=None):
     """
     stopper = _Stopper()
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = node_class()
+        node = own_port.create(lambda: _new(node_class, args), _end)
     except InputError as error:
         return _refuse(node_class, error)
     except Exception as error:
@@ -137,6 +137,17 @@ def run(node_class, args=None):
         node.destroy_node()
         rclpy.try_shutdown()
     return node.exit_code or node.result_code
+
+
+def _new(node_class, args):
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    return node_class()
+
+
+def _end(node, why):
+    node.get_logger().warning(why)
+    node.destroy_node()
+    rclpy.shutdown()
 
 
 def _serve(executor, ended):

@@ -20,6 +20,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from pam_actuation.nodes import own_port
 from pam_actuation.nodes import qos
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -50,6 +51,17 @@ def local_context(domain_id, arguments=()):
     return context
 
 
+def _new_node(domain_id):
+    context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
+    return Node(NAME, context=context, use_global_arguments=False, enable_rosout=False,
+                start_parameter_services=False)
+
+
+def _end(node):
+    node.destroy_node()
+    rclpy.try_shutdown(context=node.context)
+
+
 class RigClient:
     """
     Steer managed nodes and listen to their health.
@@ -69,10 +81,8 @@ class RigClient:
     """
 
     def __init__(self, domain_id):
-        self._context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
-        self.node = Node(
-            NAME, context=self._context, use_global_arguments=False,
-            enable_rosout=False, start_parameter_services=False)
+        self.node = own_port.create(lambda: _new_node(domain_id), lambda node, _: _end(node))
+        self._context = self.node.context
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._clients = {}
@@ -164,5 +174,4 @@ class RigClient:
     def close(self):
         """Leave the graph."""
         self._executor.shutdown(timeout_sec=1.0)
-        self.node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
+        _end(self.node)
