@@ -22,8 +22,10 @@ run and with the real-time priority of the plant, a bare echo: one rclpy node wi
 another one with a callback, the message and the rate of the valve signal (the driver
 passes every command on). Prints for each loop the ticks that did not run and how irregular the
 others were, and the age of a valve signal when the plant applies it beside that of a message
-in the callback of the echo. Exit code 1 if more than 0.1 % of the ticks of plant or controller
-did not run, or the 99th percentile of the plant is more than twice that of the echo.
+in the callback of the echo. A bare loop of 1 kHz without ROS, that does nothing and goes before
+all others, shows what the machine itself allows. Exit code 1 if more than 0.1 % of the ticks of
+plant or controller did not run, or the 99th percentile of the plant is more than twice that of
+the echo.
 """
 
 import argparse
@@ -36,7 +38,7 @@ import tempfile
 import time
 
 from pam_actuation.nodes.realtime import ask_for_realtime
-from pam_actuation.nodes.timing import Latency
+from pam_actuation.nodes.timing import Latency, LoopTiming
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT
 from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
@@ -44,7 +46,10 @@ from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLAN
 ALLOWED_MISSED = 0.001
 ALLOWED_RATIO = 2.0
 ECHO_PRIORITY = 3           # of the plant: 1 asked for, and its rank of 2
+BARE_PRIORITY = 20
+BARE_S = 1e-3
 LOOPS = (PLANT, 'sofc_controller')
+BARE = 'bare loop'
 
 
 def echo(role):
@@ -82,21 +87,39 @@ def echo(role):
                       **dict(latency.values('echo'))}))
 
 
-class Echo:
-    """Both nodes of the echo as processes."""
+def bare_loop():
+    """Be the bare loop until SIGTERM; print its timing."""
+    stopped = []
+    signal.signal(signal.SIGTERM, lambda *_: stopped.append(True))
+    refused = ask_for_realtime(BARE_PRIORITY)
+    timing, due = LoopTiming(BARE_S), time.monotonic()
+    while not stopped:
+        due += BARE_S
+        wait_s = due - time.monotonic()
+        if wait_s > 0.0:
+            time.sleep(wait_s)
+        elif wait_s < -BARE_S:
+            due -= wait_s // BARE_S * BARE_S + BARE_S       # those did not run
+        timing.begin(time.monotonic_ns())
+        timing.end(time.monotonic_ns())
+    print(json.dumps({'refused': refused, **dict(timing.values())}))
+
+
+class Beside:
+    """Both nodes of the echo and the bare loop as processes."""
 
     def __init__(self, environment):
         self._processes = [
             subprocess.Popen([sys.executable, __file__, '--echo', role], env=environment,
                              stdout=subprocess.PIPE, text=True, start_new_session=True)
-            for role in ('listener', 'talker')]
+            for role in ('listener', 'talker', BARE)]
 
     def end(self):
-        """End both and return what the listener found."""
+        """End all and return what the listener and the bare loop found."""
         for process in reversed(self._processes):
             process.terminate()
         said = [process.communicate(timeout=20.0)[0] for process in self._processes]
-        return json.loads(said[0])
+        return json.loads(said[0]), json.loads(said[2])
 
 
 def measure(seconds, folder):
@@ -117,7 +140,7 @@ def measure(seconds, folder):
     result, last = session.Result(''), {}
     try:
         with session.RigSession(plan) as rig:
-            beside = Echo(session.node_environment(rig.domain_id, plan.folder))
+            beside = Beside(session.node_environment(rig.domain_id, plan.folder))
 
             def note(done_s, total_s):
                 for name in LOOPS:
@@ -126,12 +149,12 @@ def measure(seconds, folder):
                         last[name] = status[2]
 
             session.run_guarded(rig, result, note)
-            found = beside.end()
+            found, last_of_all = beside.end()
     finally:
         plan.remove()
     if not last:
         raise SystemExit(result.failure or 'the nodes did not report')
-    return {'nodes': last, 'echo': found, 'failure': result.failure,
+    return {'nodes': last, BARE: last_of_all, 'echo': found, 'failure': result.failure,
             'cpu_share': result.cpu_share}
 
 
@@ -141,10 +164,10 @@ def judge(found):
           '| longest tick |')
     print('|---|---|---|---|---|---|---|')
     good = not found['failure']
-    for name, values in found['nodes'].items():
+    for name, values in (*found['nodes'].items(), (BARE, found[BARE])):
         ticks, missed = int(values['loop.ticks']), int(values['loop.missed'])
         share = missed / (ticks + missed)
-        good &= share <= ALLOWED_MISSED
+        good &= share <= ALLOWED_MISSED or name == BARE
         print(f'| {name} | {float(values["loop.period_wanted_ms"]):g} ms | {ticks} '
               f'| {missed} ({share:.3%}) | {int(values["loop.overruns"]) / ticks:.3%} '
               f'| {values["loop.jitter_max_ms"]} ms | {values["loop.busy_max_ms"]} ms |')
@@ -158,7 +181,7 @@ def judge(found):
               f'| {values[key + ".max_ms"]} ms |')
     print(f'\nratio of the 99th percentiles {ratio:.2f}; processor (share of one core): '
           + ', '.join(f'{name} {share:.2f}' for name, share in found['cpu_share'].items()))
-    for problem in filter(None, (found['failure'], beside['refused'])):
+    for problem in filter(None, (found['failure'], beside['refused'], found[BARE]['refused'])):
         print(problem)
     return good
 
@@ -167,10 +190,10 @@ def main():
     """Measure and judge."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--seconds', type=float, default=60.0)
-    parser.add_argument('--echo', choices=('talker', 'listener'), help=argparse.SUPPRESS)
+    parser.add_argument('--echo', choices=('talker', 'listener', BARE), help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.echo:
-        return echo(args.echo)
+        return bare_loop() if args.echo == BARE else echo(args.echo)
     with tempfile.TemporaryDirectory() as folder:
         found = measure(args.seconds, folder)
     return 0 if judge(found) else 1
