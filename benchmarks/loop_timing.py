@@ -41,6 +41,7 @@ from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import Latency, LoopTiming
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT
+from pam_actuation.rigging.processes import end_with_parent
 from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
 
 ALLOWED_MISSED = 0.001
@@ -111,7 +112,8 @@ class Beside:
     def __init__(self, environment):
         self._processes = [
             subprocess.Popen([sys.executable, __file__, '--echo', role], env=environment,
-                             stdout=subprocess.PIPE, text=True, start_new_session=True)
+                             stdout=subprocess.PIPE, text=True, start_new_session=True,
+                             preexec_fn=end_with_parent)
             for role in ('listener', 'talker', BARE)]
 
     def end(self):

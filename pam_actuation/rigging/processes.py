@@ -107,7 +107,7 @@ class NodeProcess:
         with open(self.log_file, 'wb') as log:
             self._process = subprocess.Popen(
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True, preexec_fn=_end_with_parent)
+                start_new_session=True, preexec_fn=end_with_parent)
         self.pid = self._process.pid
 
     @property
@@ -170,7 +170,7 @@ def end_all(processes, timeout_s=5.0):
             process.wait(timeout_s)
 
 
-def _end_with_parent():
-    """Ask Linux for a SIGTERM to this process when its parent dies."""
+def end_with_parent():
+    """Ask Linux for a SIGTERM to this process when its parent dies (a ``preexec_fn``)."""
     if LIBC is not None:
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
