@@ -186,10 +186,14 @@ class Witness:
             for topic in HEARD}
         self._health = PolledSubscription(node, DiagnosticArray, '/diagnostics', qos.RECORDER)
         self.last = {}
+        self.heard = {}
+        self._stood_safe = False
         self.forget()
 
     def forget(self):
-        """Begin anew with what is heard and said."""
+        """Begin anew with what is heard and said; the last valve signal is remembered."""
+        if self.heard.get('valve_signal'):
+            self._stood_safe = self.heard['valve_signal'][-1].efforts == self._safe
         self.heard = {topic: [] for topic in HEARD}
         self.said = []
 
@@ -222,9 +226,15 @@ class Witness:
                      and status.stamp_ns >= since_ns and re.search(words, status.message)), None)
 
     def safe_since(self, since_ns):
-        """Return the stamp of the first of three safe valve signals in a row, None if none."""
+        """
+        Return the stamp of the first of three safe valve signals in a row, None if none.
+
+        The time itself where the valve stood at the safe signal already and nothing else came.
+        """
         after = sorted((one for one in self.heard['valve_signal'] if one.stamp_ns >= since_ns),
                        key=lambda one: one.stamp_ns)
+        if not after and self._stood_safe:
+            return since_ns
         safe = [one.efforts == self._safe for one in after]
         return next((after[k].stamp_ns for k in range(len(safe) - 2) if all(safe[k:k + 3])), None)
 

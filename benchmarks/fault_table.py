@@ -74,7 +74,7 @@ class Case:
 
 
 NO_COMMAND, NO_PRESSURE = 'no valid pressure command', 'no valid measured pressure'
-SILENT, PAUSED = 'fell silent', 'itself was stopped'
+SILENT, PAUSED = 'fell silent|ended with the signal that vents', 'itself was stopped'
 VENTED_REFERENCE = 'muscle vented'
 CASES = {
     'kill_controller': Case('SIGKILL of the controller', 'kill', CONTROLLER, DRIVER, NO_COMMAND),
@@ -210,7 +210,7 @@ def check_bag(outcomes, killed):
     last_ns = max(signals)
     for one in outcomes:
         end_ns = one['safe_ns'] or one['onset_ns']
-        present = one['safe_ns'] is None or one['safe_ns'] in signals | commands
+        present = one['safe_ns'] in {None, one['onset_ns']} | signals | commands
         one['recorded'] = whole and (
             last_ns >= end_ns and present or killed and end_ns > last_ns >= end_ns - LOST_S * 1e9)
 

@@ -28,6 +28,7 @@ sound port of that name ends what the others do in vain; from the third on it ke
 """
 
 import contextlib
+import math
 import os
 import re
 import socket
@@ -38,6 +39,7 @@ PORT = re.compile(r'(fastrtps_port\d+)(?:_el)?')
 PROBATION_S = 1.2           # ports were removed 0.3 to 0.64 s after the start
 LOOK_S, LOOKS = 0.01, 4     # a port on its way to be created anew is missing for a moment
 MOST = 8
+LOOK_AGAIN_S = 2.0
 
 
 def port_files(directory=DIRECTORY):
@@ -83,6 +85,13 @@ class OwnPorts:
                 found.add(match[1])
         return found
 
+    def inode(self, name):
+        """Return the inode of the file that has the name of a port now, None if there is none."""
+        try:
+            return os.stat(os.path.join(self._directory, name)).st_ino
+        except OSError:
+            return None
+
     def removed(self):
         """Return the names of those that others do not find any more, or find another one."""
         names = self.names()
@@ -96,6 +105,51 @@ class OwnPorts:
                     mapped.setdefault(name, set()).add(int(fields[4]))
         return {name for name in names
                 if name in mapped and files.get(name) not in mapped[name]}
+
+
+class PortWatch:
+    """
+    Whether others still find the ports of this process; cheap enough to ask twice a second.
+
+    Parameters
+    ----------
+    ports : OwnPorts, optional
+        Default: those of this process.
+    now_s : callable, optional
+        Steady time [s].
+
+    """
+
+    def __init__(self, ports=None, now_s=time.monotonic):
+        self._ports = ports or OwnPorts()
+        self._now_s = now_s
+        self._inodes = self._present()
+        self._looked_s = -math.inf
+        self._suspected = set()
+        self._removed = set()
+
+    def _present(self):
+        try:
+            names = self._ports.names()
+        except OSError:
+            return {}               # not Linux
+        return {name: self._ports.inode(name) for name in names}
+
+    def removed(self):
+        """Return the names of ports found removed twice, ``LOOK_AGAIN_S`` apart or more."""
+        if all(self._ports.inode(name) == inode for name, inode in self._inodes.items()):
+            self._suspected = self._removed = set()
+        elif self._now_s() - self._looked_s >= LOOK_AGAIN_S:
+            self._looked_s = self._now_s()
+            try:
+                found = self._ports.removed()
+            except OSError:
+                found = set()
+            self._removed = found & self._suspected
+            self._suspected = found
+            if not found:
+                self._inodes = self._present()      # the middleware has renewed it itself
+        return self._removed
 
 
 def stays_removed(ports, sleep=time.sleep):

@@ -21,7 +21,8 @@ import subprocess
 import sys
 import time
 
-from pam_actuation.nodes.own_port import numbers_kept_off, OwnPorts, port_files, stays_removed
+from pam_actuation.nodes.own_port import numbers_kept_off, OwnPorts, port_files
+from pam_actuation.nodes.own_port import PortWatch, stays_removed
 import pytest
 
 PORT = 'fastrtps_port11661'
@@ -98,6 +99,66 @@ def test_missing_for_a_moment_is_not_removed(system):
     assert not stays_removed(
         OwnPorts(str(process), str(ports)), lambda _: (ports / 'kept').rename(ports / PORT)
         if (ports / 'kept').exists() else None)
+
+
+def test_watch_tells_what_stays_removed(system):
+    process, ports = system
+    now = [0.0]
+    watch = PortWatch(OwnPorts(str(process), str(ports)), lambda: now[0])
+    (ports / PORT).rename(ports / 'kept')
+    told = []
+    for now[0] in (0.0, 0.5, 1.0, 3.0, 4.0):
+        told.append(watch.removed())
+    assert told == [set(), set(), set(), {PORT}, {PORT}]    # not at the first look
+    (ports / 'kept').rename(ports / PORT)
+    assert watch.removed() == set()
+
+
+def test_watch_accepts_a_port_that_the_process_has_renewed(system):
+    process, ports = system
+    now = [0.0]
+    watch = PortWatch(OwnPorts(str(process), str(ports)), lambda: now[0])
+    (ports / PORT).rename(ports / 'kept')
+    (ports / PORT).touch()
+    tell(process, ports)
+    for now[0] in (0.0, 3.0, 6.0):
+        assert watch.removed() == set()
+
+
+@pytest.mark.ros
+def test_node_without_its_port_says_so(tmp_path):
+    pytest.importorskip('rclpy')
+    from pam_actuation.rigging.client import RigClient
+    from pam_actuation.rigging.domain import DomainLock
+    from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+    lock = DomainLock()
+    client = node = None
+    try:
+        node = NodeProcess('valve_watchdog', '/one', {'diagnostics_period_s': 0.2},
+                           node_environment(lock.domain_id, tmp_path), tmp_path)
+        client = RigClient(lock.domain_id)
+        told = wait_for_status(client, node, lambda message: message)
+        assert 'removed' not in told
+        for name in OwnPorts(f'/proc/{node.pid}').names():
+            os.unlink(Path('/dev/shm') / name)
+        told = wait_for_status(client, node, lambda message: 'removed' in message)
+        assert 'start this node anew' in told
+    finally:
+        end_all([node] if node else [])
+        if client is not None:
+            client.close()
+        lock.release()
+
+
+def wait_for_status(client, node, wanted):
+    """Return the message of a node's status that is wanted."""
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        client.spin(0.1)
+        message = client.statuses.get(node.full_name, (0, ''))[1]
+        if wanted(message):
+            return message
+    raise AssertionError(f'{node.full_name} says {client.statuses.get(node.full_name)}')
 
 
 def start(domain_id, folder):
