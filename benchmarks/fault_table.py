@@ -39,6 +39,7 @@ from fault_rig import FaultRig
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.recover import recover_bag
 from pam_actuation.drivers.safety import SafetyLimits
+from pam_actuation.rigging.transitions import termination_as_interrupt
 from pam_sim.errors import InputError
 from tqdm import tqdm
 
@@ -351,7 +352,8 @@ def main():
         outcomes = read_outcomes(Path(arguments.out))
     else:
         series = Series(arguments)
-        series.run()
+        with termination_as_interrupt():
+            series.run()
         outcomes = series.outcomes
     outcomes = [one for one in outcomes if one['valve'] == arguments.valve]
     print(table(outcomes, arguments.valve))

@@ -34,6 +34,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.nodes import qos
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan
+from pam_actuation.rigging.transitions import termination_as_interrupt
 from recording_load import experiment_text
 from tqdm import tqdm
 
@@ -143,7 +144,7 @@ def main():
                          f'sofc_{args.valve}', args.valve, str(Path(folder) / 'bag'))
         result = session.Result(str(Path(folder) / 'bag'))
         try:
-            with session.RigSession(plan) as rig:
+            with termination_as_interrupt(), session.RigSession(plan) as rig:
                 samples = Samples(rig, args.seconds)
                 session.run_guarded(rig, result, samples.note)
         finally:
