@@ -37,6 +37,7 @@ import sys
 import tempfile
 import time
 
+from pam_actuation.nodes.loops import LoopSet
 from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import Latency, LoopTiming
 from pam_actuation.rigging import session
@@ -89,20 +90,19 @@ def echo(role):
 
 
 def bare_loop():
-    """Be the bare loop until SIGTERM; print its timing."""
+    """Be a loop of the nodes' own kind without a node until SIGTERM; print its timing."""
     stopped = []
     signal.signal(signal.SIGTERM, lambda *_: stopped.append(True))
     refused = ask_for_realtime(BARE_PRIORITY)
-    timing, due = LoopTiming(BARE_S), time.monotonic()
-    while not stopped:
-        due += BARE_S
-        wait_s = due - time.monotonic()
-        if wait_s > 0.0:
-            time.sleep(wait_s)
-        elif wait_s < -BARE_S:
-            due -= wait_s // BARE_S * BARE_S + BARE_S       # those did not run
+    timing, loops = LoopTiming(BARE_S), LoopSet()
+
+    def tick():
         timing.begin(time.monotonic_ns())
         timing.end(time.monotonic_ns())
+
+    loops.add(BARE_S, tick)
+    while not stopped:
+        loops.run_once()
     print(json.dumps({'refused': refused, **dict(timing.values())}))
 
 

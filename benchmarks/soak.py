@@ -32,6 +32,7 @@ import tempfile
 
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.conversions import stamp_ns
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan
 from pam_actuation.rigging.transitions import termination_as_interrupt
@@ -47,7 +48,8 @@ SIZES = ('VmRSS', 'RssAnon')
 
 def memory_kb(pid):
     """Return the sizes of a process [kB] by name."""
-    status = dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').open())
+    lines = Path(f'/proc/{pid}/status').read_text().splitlines()
+    status = dict(line.split(':', 1) for line in lines)
     return {name: int(status[name].split()[0]) for name in SIZES}
 
 
@@ -73,11 +75,10 @@ class Samples:
         self._bar = tqdm(total=round(seconds), unit='s', disable=None)
 
     def _hear(self, message):
-        stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         for status in message.status:
             for item in status.values:
                 if item.key == 'loop.ticks':
-                    self._ticks[status.name] = stamp_s, int(item.value)
+                    self._ticks[status.name] = 1e-9 * stamp_ns(message), int(item.value)
 
     def note(self, done_s, total_s):
         """Note one sample if it is time to."""

@@ -35,7 +35,8 @@ import socket
 import time
 
 DIRECTORY = '/dev/shm'
-PORT = re.compile(r'(fastrtps_port\d+)(?:_el)?')
+PORT = re.compile(r'fastrtps_port\d+')
+LOCK = re.compile(rf'({PORT.pattern})_el')
 PROBATION_S = 1.2           # ports were removed 0.3 to 0.64 s after the start
 LOOK_S, LOOKS = 0.01, 4     # a port on its way to be created anew is missing for a moment
 MOST = 8
@@ -43,16 +44,11 @@ LOOK_AGAIN_S = 2.0
 
 
 def port_files(directory=DIRECTORY):
-    """Return the name of each shared-memory port of this machine with the inode of its file."""
-    found = {}
+    """Return the names of all shared-memory ports of this machine, whoever is behind them."""
     try:
-        for entry in os.scandir(directory):
-            match = PORT.fullmatch(entry.name)
-            if match and match[1] == entry.name:
-                found[entry.name] = entry.inode()
+        return set(filter(PORT.fullmatch, os.listdir(directory)))
     except OSError:
-        pass                # no such folder, so no such ports
-    return found
+        return set()        # no such folder, so no such ports
 
 
 class OwnPorts:
@@ -79,9 +75,8 @@ class OwnPorts:
                 target = os.readlink(os.path.join(folder, descriptor))
             except OSError:
                 continue            # closed meanwhile
-            name = os.path.basename(target.removesuffix(' (deleted)'))
-            match = PORT.fullmatch(name)
-            if match and name.endswith('_el'):
+            match = LOCK.fullmatch(os.path.basename(target.removesuffix(' (deleted)')))
+            if match:
                 found.add(match[1])
         return found
 
@@ -95,7 +90,6 @@ class OwnPorts:
     def removed(self):
         """Return the names of those that others do not find any more, or find another one."""
         names = self.names()
-        files = port_files(self._directory)
         mapped = {}
         with open(os.path.join(self._process, 'maps'), 'rb') as stream:
             for line in stream:
@@ -104,7 +98,7 @@ class OwnPorts:
                     name = os.path.basename(fields[5].strip().removesuffix(' (deleted)'))
                     mapped.setdefault(name, set()).add(int(fields[4]))
         return {name for name in names
-                if name in mapped and files.get(name) not in mapped[name]}
+                if name in mapped and self.inode(name) not in mapped[name]}
 
 
 class PortWatch:
@@ -163,13 +157,14 @@ def stays_removed(ports, sleep=time.sleep):
     return names
 
 
-def ports_in_use(sleep=time.sleep):
-    """Return the names of all shared-memory ports of this machine, whoever is behind them."""
-    names = set()
-    for look in range(LOOKS):
-        if look and names:
-            sleep(LOOK_S)
-        names |= port_files().keys()
+def ports_in_use():
+    """Return the names of all ports found in ``LOOKS`` looks; one look if there is none."""
+    names = port_files()
+    for _ in range(LOOKS - 1):
+        if not names:
+            break
+        time.sleep(LOOK_S)
+        names |= port_files()
     return names
 
 
@@ -202,16 +197,15 @@ def create(new, end):
         The node.
 
     """
+    ports, before = OwnPorts(), ports_in_use()
     removed, kept_off = set(), set()
     for attempt in range(MOST):
-        before = ports_in_use()
         with numbers_kept_off(kept_off):
             node = new()
-        ports = OwnPorts()
+        kept_off |= removed
         try:
-            again = {name for name in ports.names() if removed or name in before}
-            kept_off |= removed
-            removed = _removed_soon(ports) if again else set()
+            on_probation = removed or ports.names() & before
+            removed = _removed_soon(ports) if on_probation else set()
         except OSError:
             break                   # not Linux
         if not removed or attempt == MOST - 1:

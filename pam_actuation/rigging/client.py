@@ -82,8 +82,7 @@ class RigClient:
 
     def __init__(self, domain_id):
         self.node = own_port.create(lambda: _new_node(domain_id), lambda node, _: _end(node))
-        self._context = self.node.context
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = SingleThreadedExecutor(context=self.node.context)
         self._executor.add_node(self.node)
         self._clients = {}
         self.statuses = {}

@@ -77,7 +77,7 @@ def test_own_port_is_told_from_that_of_others(system):
     process, ports = system
     assert OwnPorts(str(process), str(ports)).names() == {PORT}
     assert set(port_files(str(ports))) == {PORT, 'fastrtps_port11663'}
-    assert port_files(str(ports / 'nowhere')) == {}
+    assert port_files(str(ports / 'nowhere')) == set()
 
 
 @pytest.mark.parametrize('name, removed', [(PORT, {PORT}), ('fastrtps_port11663', set())])
@@ -128,37 +128,20 @@ def test_watch_accepts_a_port_that_the_process_has_renewed(system):
 @pytest.mark.ros
 def test_node_without_its_port_says_so(tmp_path):
     pytest.importorskip('rclpy')
-    from pam_actuation.rigging.client import RigClient
-    from pam_actuation.rigging.domain import DomainLock
-    from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
-    lock = DomainLock()
-    client = node = None
+    from live_rig import LiveRig, wait_for
+    rig = LiveRig(tmp_path)
     try:
-        node = NodeProcess('valve_watchdog', '/one', {'diagnostics_period_s': 0.2},
-                           node_environment(lock.domain_id, tmp_path), tmp_path)
-        client = RigClient(lock.domain_id)
-        told = wait_for_status(client, node, lambda message: message)
-        assert 'removed' not in told
-        for name in OwnPorts(f'/proc/{node.pid}').names():
+        rig.start('valve_watchdog', diagnostics_period_s=0.2)
+        rig.listen({})
+        told = rig.health['valve_watchdog']
+        wait_for(lambda: told, 60.0, 'a status')
+        assert 'removed' not in told[-1].message
+        for name in OwnPorts(f'/proc/{rig.processes["valve_watchdog"].pid}').names():
             os.unlink(Path('/dev/shm') / name)
-        told = wait_for_status(client, node, lambda message: 'removed' in message)
-        assert 'start this node anew' in told
+        wait_for(lambda: 'removed' in told[-1].message, 60.0, 'a status that tells it')
+        assert 'start this node anew' in told[-1].message
     finally:
-        end_all([node] if node else [])
-        if client is not None:
-            client.close()
-        lock.release()
-
-
-def wait_for_status(client, node, wanted):
-    """Return the message of a node's status that is wanted."""
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        client.spin(0.1)
-        message = client.statuses.get(node.full_name, (0, ''))[1]
-        if wanted(message):
-            return message
-    raise AssertionError(f'{node.full_name} says {client.statuses.get(node.full_name)}')
+        rig.close()
 
 
 def start(domain_id, folder):
