@@ -17,6 +17,7 @@
 import contextlib
 import functools
 import os
+import tempfile
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.mcap_write import McapWriter
@@ -49,14 +50,19 @@ class DataFile:
         self._synced = 0
         self._schemas, self._channels = {}, {}
         self._stream = open(path, 'xb', buffering=0)
+        self._closing = contextlib.ExitStack()
+        self._closing.enter_context(self._stream)
         try:
             # Held while recording, so that nobody repairs a file that is being written.
             disk.lock(self._stream)
+            # Without a name, so that a killed process leaves nothing.
+            index = self._closing.enter_context(
+                tempfile.TemporaryFile(dir=path.parent, buffering=0))
             self.mcap = McapWriter(
-                functools.partial(disk.write_all, self._stream), library=LIBRARY)
+                functools.partial(disk.write_all, self._stream), library=LIBRARY, index=index)
             begin(self)
         except OSError:
-            self._stream.close()
+            self._closing.close()
             path.unlink()
             raise
 
@@ -103,7 +109,7 @@ class DataFile:
         """Write the index and close."""
         self.mcap.finish()
         disk.sync(self._stream.fileno())
-        self._stream.close()
+        self._closing.close()
 
     def cut(self):
         """Take back what a failed write left behind; return messages in the file by topic."""
@@ -125,4 +131,4 @@ class DataFile:
         with contextlib.suppress(OSError):
             self._truncate()
         with contextlib.suppress(OSError):
-            self._stream.close()
+            self._closing.close()

@@ -32,6 +32,7 @@ from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex, Schema, Statistics,
     SummaryOffset)
 import numpy as np
+from pam_actuation.bags import disk
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -58,6 +59,9 @@ class McapWriter:
         Content of the header.
     chunk_bytes : int
         A chunk of this size is closed; ``close_chunk`` closes it earlier.
+    index : binary file, optional
+        Empty, seekable: keeps the index of the chunks (about 200 bytes each) until ``finish``,
+        so that hours of recording need no memory. In memory by default.
 
     Attributes
     ----------
@@ -68,7 +72,7 @@ class McapWriter:
 
     """
 
-    def __init__(self, write, profile='ros2', library='', chunk_bytes=CHUNK_BYTES):
+    def __init__(self, write, profile='ros2', library='', chunk_bytes=CHUNK_BYTES, index=None):
         self._write_all = write
         self._chunk_bytes = chunk_bytes
         self._compressor = zstandard.ZstdCompressor()
@@ -76,7 +80,8 @@ class McapWriter:
         self._schemas = {}
         self._channels = {}
         self._counts = {}
-        self._chunks = []
+        self._chunk_index = io.BytesIO() if index is None else index
+        self._chunk_index_bytes = self._chunk_count = 0
         self._metadata = []
         self._start_ns = self._end_ns = None
         self._begin_chunk()
@@ -215,8 +220,13 @@ class McapWriter:
             compressed_size=packed, message_end_time=end_ns, message_start_time=start_ns,
             message_index_length=position - self.offset - len(chunk),
             message_index_offsets=offsets, uncompressed_size=size)
+        # The index first, at its place: if either write fails, none of the two counts.
+        entry = _bytes(summary)
+        self._chunk_index.seek(self._chunk_index_bytes)
+        disk.write_all(self._chunk_index, entry)
         self._write(b''.join(parts))
-        self._chunks.append(summary)
+        self._chunk_index_bytes += len(entry)
+        self._chunk_count += 1
         for channel, entries in index.items():
             self._counts[channel] = self._counts.get(channel, 0) + len(entries) // 2
         if index:
@@ -250,13 +260,12 @@ class McapWriter:
         self._write(_bytes(DataEnd(data_section_crc=0)))
         start = self.offset
         summary, offsets = b'', b''
-        for opcode, records in (
-                (Opcode.SCHEMA, self._schemas.values()),
-                (Opcode.CHANNEL, self._channels.values()),
-                (Opcode.STATISTICS, [self._statistics()]),
-                (Opcode.CHUNK_INDEX, self._chunks),
-                (Opcode.METADATA_INDEX, self._metadata)):
-            group = b''.join(map(_bytes, records))
+        for opcode, group in (
+                (Opcode.SCHEMA, _all_bytes(self._schemas.values())),
+                (Opcode.CHANNEL, _all_bytes(self._channels.values())),
+                (Opcode.STATISTICS, _bytes(self._statistics())),
+                (Opcode.CHUNK_INDEX, self._all_chunks()),
+                (Opcode.METADATA_INDEX, _all_bytes(self._metadata))):
             if group:
                 offsets += _bytes(SummaryOffset(
                     group_opcode=opcode, group_start=start + len(summary),
@@ -270,10 +279,14 @@ class McapWriter:
             summary_start=start, summary_offset_start=offset_start, summary_crc=crc)
         self._write(body + _bytes(footer) + MAGIC)
 
+    def _all_chunks(self):
+        self._chunk_index.seek(0)
+        return self._chunk_index.read(self._chunk_index_bytes)
+
     def _statistics(self):
         return Statistics(
             attachment_count=0, channel_count=len(self._channels),
-            channel_message_counts=dict(self._counts), chunk_count=len(self._chunks),
+            channel_message_counts=dict(self._counts), chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()), metadata_count=len(self._metadata),
             message_start_time=self._start_ns or 0, message_end_time=self._end_ns or 0,
             schema_count=len(self._schemas))
@@ -284,6 +297,10 @@ def _bytes(record):
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
+
+
+def _all_bytes(records):
+    return b''.join(map(_bytes, records))
 
 
 def _compression(content):

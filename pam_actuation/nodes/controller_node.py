@@ -46,6 +46,7 @@ def report_reason(diagnostics, reason, well=FOLLOWING):
 class ControllerNode(ManagedNode):
     """Call a control law at its rate; on every way out command atmospheric pressure."""
 
+    ASYNCHRONOUS = True
     DEFAULT_CONTROLLER = ''
     PARAMETERS = (
         NodeParameter(

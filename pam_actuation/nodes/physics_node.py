@@ -29,6 +29,7 @@ class PhysicsNode(ManagedNode):
     Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
     """
 
+    ASYNCHRONOUS = True
     plant = None
     _latency = None
 

@@ -38,6 +38,7 @@ SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'S
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
+PUBLICATION_MODE = 'RMW_FASTRTPS_PUBLICATION_MODE'      # other middlewares do not look at it
 
 
 class _Stopper(threading.Thread):
@@ -140,6 +141,8 @@ def run(node_class, args=None):
 
 
 def _new(node_class, args):
+    if node_class.ASYNCHRONOUS:
+        os.environ.setdefault(PUBLICATION_MODE, 'ASYNCHRONOUS')
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     return node_class()
 

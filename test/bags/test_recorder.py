@@ -15,10 +15,12 @@
 """The recorder's count: what came, what was written, what was dropped, what never came."""
 
 import errno
+import io
 import threading
 import time
 
 from pam_actuation.bags import codecs
+from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.mcap_scan import scan
@@ -269,6 +271,28 @@ def test_a_full_disk_between_two_files_keeps_the_first(tmp_path, monkeypatch):
     assert [path.name for path in (tmp_path / 'run').glob('*.mcap')] == ['run_0.mcap']
     assert len(load_run(tmp_path / 'run').topics['pressure']) == 100
     assert bag_info(tmp_path / 'run').dropped == 100
+
+
+def test_a_disk_too_full_for_the_index_keeps_what_is_indexed(tmp_path, monkeypatch):
+    class SmallDisk(io.BytesIO):
+        def write(self, data):
+            if self.tell() + len(data) > 300:
+                raise OSError(errno.ENOSPC, 'No space left on device')
+            return super().write(data)
+
+    monkeypatch.setattr('tempfile.TemporaryFile', lambda **_: SmallDisk())
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=0.01)
+    deadline, i = time.monotonic() + 20.0, 0
+    while not core.write_error and time.monotonic() < deadline:
+        core.receive(TOPIC, payload(i), START_NS + i, START_NS + i, i + 1)
+        time.sleep(0.002)
+        i += 1
+    summary = core.close()
+    assert 'No space left' in summary.write_error
+    assert 0 < summary.written < summary.received == summary.written + summary.dropped
+    for counts in independent_readers(tmp_path / 'run').values():
+        assert counts == {TOPIC: summary.written}
+    assert bag_info(tmp_path / 'run').dropped == summary.dropped
 
 
 def test_queue_length_is_checked(tmp_path):

@@ -15,6 +15,7 @@
 """The written bag: Jazzy layout, and readable by the two independent readers."""
 
 from pathlib import Path
+import tracemalloc
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -30,6 +31,7 @@ from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS,
 import yaml
 
 COUNT = 30
+CHUNKS = 1000
 
 
 @pytest.fixture(scope='module')
@@ -190,6 +192,33 @@ def test_same_messages_give_the_same_bytes(tmp_path):
         tmp_path / 'b/run/run_0.mcap').read_bytes()
     assert (tmp_path / 'a/run/metadata.yaml').read_bytes() == (
         tmp_path / 'b/run/metadata.yaml').read_bytes()
+
+
+def test_hours_of_recording_need_no_memory(tmp_path):
+    names = [f'/m{k}/pressure' for k in range(12)]
+    raw = codecs.encode('pressure', example_messages()['pressure'])
+    sizes = []
+    with BagWriter(tmp_path / 'run', METADATA) as writer:
+        for name in names:
+            writer.add_topic(name, codecs.TOPIC_TYPES['pressure'])
+        tracemalloc.start()
+        try:
+            for i in range(CHUNKS + 1):
+                for name in names:
+                    writer.write(name, raw, START_NS + i, START_NS + i)
+                writer.flush()
+                if i in (CHUNKS // 4, CHUNKS):
+                    sizes.append(tracemalloc.get_traced_memory()[0])
+        finally:
+            tracemalloc.stop()
+    # The index alone would be about 200 bytes for each of the chunks between.
+    assert sizes[1] - sizes[0] < 10_000
+    with open(writer.file, 'rb') as stream:
+        summary = make_reader(stream).get_summary()
+    assert len(summary.chunk_indexes) == CHUNKS + 1 == summary.statistics.chunk_count
+    assert all(len(chunk.message_index_offsets) == 12 for chunk in summary.chunk_indexes)
+    assert [path.name for path in sorted((tmp_path / 'run').iterdir())] == [
+        'metadata.yaml', 'run_0.mcap']
 
 
 @pytest.mark.parametrize('limits', ({'max_file_s': 0.05 * 4}, {'max_file_bytes': 100_000}))
