@@ -21,8 +21,8 @@ All nodes and the recorder live, at the rates of `pam run`. Every 10 s the memor
 process (`VmRSS`, `RssAnon` of /proc) is noted; the stamps of what each loop sends come from the
 bag. Printed, for a twelfth of the run after the warm-up and for the last one: the mean memory,
 the period of each loop (the slope of its stamps over the number of periods, so that a
-message that was not sent does not count as a longer period) and the share of periods
-without a message. Exit code 1 if a process grew by more than 1 %, the period of a loop changed
+message that was not sent does not count as a longer period) and how many messages it sent per
+period (the driver behind a regulator also answers commands between). Exit code 1 if a process grew by more than 1 %, the period of a loop changed
 by more than 0.001 %, or the experiment did not come to its end with every message recorded.
 """
 
@@ -96,7 +96,7 @@ def mean_kb(rows, name):
 
 def period_of(stamps_ns):
     """
-    Return the period of a loop [ns] and the share of periods in which it sent nothing.
+    Return the period of a loop [ns] and how many messages it sent per period.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def period_of(stamps_ns):
     intervals_ns = np.diff(stamps_ns)
     counted = np.cumsum(np.rint(intervals_ns / np.median(intervals_ns)))
     slope_ns = np.polyfit(counted, stamps_ns[1:] - stamps_ns[0], 1)[0]
-    return slope_ns, 1.0 - len(counted) / counted[-1]
+    return slope_ns, len(counted) / counted[-1]
 
 
 def judge(samples, bag):
@@ -123,15 +123,15 @@ def judge(samples, bag):
               f'| {mean_kb(late, "VmRSS") / 1024.0:.1f} MiB | {growth["VmRSS"]:+.2%} '
               f'| {growth["RssAnon"]:+.2%} |')
     print('\n| loop, by its topic | period after the warm-up | at the end | change '
-          '| periods without a message, then | at the end |')
+          '| messages per period, then | at the end |')
     print('|---|---|---|---|---|---|')
     topics = load_run(bag).topics
     for topic in LOOPS:
-        (before_ns, missed), (after_ns, missed_late) = map(period_of, spans(topics[topic].stamp_ns))
-        drift = after_ns / before_ns - 1.0
+        early, late = map(period_of, spans(topics[topic].stamp_ns))
+        drift = late[0] / early[0] - 1.0
         good &= abs(drift) <= ALLOWED_DRIFT
-        print(f'| {topic} | {before_ns * 1e-6:.6f} ms | {after_ns * 1e-6:.6f} ms | {drift:+.5%} '
-              f'| {missed:.3%} | {missed_late:.3%} |')
+        print(f'| {topic} | {early[0] * 1e-6:.6f} ms | {late[0] * 1e-6:.6f} ms | {drift:+.5%} '
+              f'| {early[1]:.5f} | {late[1]:.5f} |')
     return good
 
 
