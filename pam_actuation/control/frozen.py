@@ -17,15 +17,17 @@ Notices a measured motion that stands still although the pressure moved the musc
 
 A frozen sensor goes on sending its last value with new stamps. It is told from a muscle at
 rest by the pressure: a value that stays the same to the last bit while the measured pressure
-changes by far more than friction can hold is not what the muscle does. At its resting length,
-or without a force, a muscle may lie on a stop, and pressure moves nothing until it lifts its
-load; a sensor that is frozen there is not noticed.
+changes by far more than friction can hold is not what the muscle does; of a joint it is the
+difference of both pressures. At its resting length, or without a force, a muscle may lie on a
+stop, as a joint at the ends of its range, and pressure moves nothing; a sensor that is frozen
+there is not noticed.
 """
 
 import math
 
 AFTER_NS = 200_000_000
 SWING_PA = 150_000.0         # twice the dry friction of a bad rig holds it over 110 kPa
+JOINT_SWING_PA = 300_000.0   # that of the realistic rigs holds a joint over 100 to 215 kPa
 RESUME_NS = 2_000_000_000
 
 
@@ -38,13 +40,21 @@ class FrozenMeasurement:
 
     Parameters
     ----------
-    resting : float
-        Contraction [m] or force [N] up to which the muscle may lie on a stop.
+    lowest, highest : float
+        Contraction [m], force [N] or angle [rad] up to which, and from which on, the muscle or
+        joint may lie on a stop.
+    swing_pa : float
+        More pressure than friction can hold [Pa].
 
     """
 
-    def __init__(self, resting):
-        self.resting = resting
+    def __init__(self, lowest, highest=math.inf, swing_pa=SWING_PA):
+        self._between = lowest, highest
+        self._swing_pa = swing_pa
+        self.forget()
+
+    def forget(self):
+        """Begin anew."""
         self.frozen = False
         self._value = math.nan
         self._since_ns = 0
@@ -60,9 +70,10 @@ class FrozenMeasurement:
         now_ns, stamp_ns : int
             Time of the tick, and stamp of the value.
         value : float
-            Measured contraction [m] or force [N], finite.
+            Measured contraction [m], force [N] or angle [rad], finite.
         pressure_pa : float
-            Measured absolute pressure, NaN where none is fresh: then nothing is noticed.
+            Measured absolute pressure, of a joint that of the flexor less that of the extensor;
+            NaN where none is fresh: then nothing is noticed.
 
         """
         if value != self._value or stamp_ns < self._since_ns:
@@ -70,10 +81,10 @@ class FrozenMeasurement:
             self._lowest_pa, self._highest_pa = math.inf, -math.inf
             if self.frozen and now_ns - self._noticed_ns >= RESUME_NS:
                 self.frozen = False
-        if value > self.resting and math.isfinite(pressure_pa):
+        if self._between[0] < value < self._between[1] and math.isfinite(pressure_pa):
             self._lowest_pa = min(self._lowest_pa, pressure_pa)
             self._highest_pa = max(self._highest_pa, pressure_pa)
-        if (self._highest_pa - self._lowest_pa > SWING_PA
+        if (self._highest_pa - self._lowest_pa > self._swing_pa
                 and stamp_ns - self._since_ns >= AFTER_NS):
             self.frozen = True
             self._noticed_ns = now_ns

@@ -16,7 +16,8 @@
 The controller of a joint on a clock: messages in, two pressure commands and state out.
 
 No ROS inside. The faults of its inputs are handled as by ``loop.ControllerLoop``, with the
-joint angle in place of the contraction; while it does not run, both muscles are vented.
+joint angle in place of the contraction; while it does not run, both muscles are vented. While
+a torque is followed the joint may well be blocked: a frozen angle is looked for only otherwise.
 A missing pressure or force of either muscle is not used. A wanted co-contraction counts
 until the next one; one that is not finite is ignored, one beyond the limits stops there.
 
@@ -30,6 +31,7 @@ import math
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
+from pam_actuation.control.frozen import FrozenMeasurement, JOINT_SWING_PA
 from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory
 from pam_actuation.control.loop import (
@@ -44,6 +46,7 @@ from pam_sim.units import P_ATM_PA
 
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
+_STOP_RAD = 0.01             # this near an end of its range the joint may lie on a stop
 _INPUT_NAMES = (
     'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced', 'joint_state_stamp_sec',
     'joint_state_stamp_nanosec', 'angle_rad', *codes.reference_names('rad'), 'elapsed_s',
@@ -89,6 +92,8 @@ class JointControllerLoop:
         self.ticks = 0
         self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
         self._range = joint.range_rad
+        self._frozen = FrozenMeasurement(
+            self._range[0] + _STOP_RAD, self._range[1] - _STOP_RAD, JOINT_SWING_PA)
         self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
@@ -214,8 +219,17 @@ class JointControllerLoop:
         if reason != codes.OK:
             return reason
         if self.follows_torque:
+            self._frozen.forget()
             return codes.OK if self.efforts.fresh(now_ns) else codes.EFFORT_LOST
+        flexor_pa, extensor_pa = self._fresh_pressures_pa(now_ns)
+        if self._frozen.judge(now_ns, self._angle.stamp_ns, angle, flexor_pa - extensor_pa):
+            return codes.ANGLE_FROZEN
         return REFERENCE_REASONS[self.references.state(now_ns)]
+
+    def _fresh_pressures_pa(self, now_ns):
+        """Return both measured pressures [Pa], NaN for one that is not fresh."""
+        return tuple(message.pressure_pa if fresh(message, now_ns) else math.nan
+                     for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
 
     def _run(self, inputs, may_learn):
         """Return the commands [Pa] of the law that counts; the other one stands aside."""
@@ -239,8 +253,7 @@ class JointControllerLoop:
         elapsed_s = math.nan
         if self._used_ns is not None:
             elapsed_s = (measured_ns - self._used_ns) * 1e-9
-        pressures = (self._pressures[side].pressure_pa if fresh(self._pressures[side], now_ns)
-                     else math.nan for side in (FLEXOR, EXTENSOR))
+        pressures = self._fresh_pressures_pa(now_ns)
         if changed and self._commands_pa is not None:
             pressures = self._commands_pa       # a law goes on from the commands of the other
         forces = (self._forces[side].force_n if fresh(self._forces[side], now_ns)

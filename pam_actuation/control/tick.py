@@ -30,7 +30,7 @@ from pam_sim.units import P_ATM_PA
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
- FORCE_FROZEN) = range(22)
+ FORCE_FROZEN, ANGLE_FROZEN) = range(23)
 REASONS = (
     'ok',
     'no contraction measured yet',
@@ -53,7 +53,8 @@ REASONS = (
     'joint angle is outside what the joint can do',
     'wanted torque lost, muscles vented',
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
-    'force stands still although the pressure changed: sensor frozen')
+    'force stands still although the pressure changed: sensor frozen',
+    'joint angle stands still although the pressures changed: sensor frozen or joint blocked')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')

@@ -21,10 +21,12 @@ from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.joint_loop import JointControllerLoop
 from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.messages import AngleReference, JointAngle, Pressure, START_NS
+from pam_actuation.messages import (
+    AngleReference, JointAngle, NamedEfforts, Pressure, START_NS)
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
@@ -91,6 +93,57 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
     _, commands = bench.tick()
     assert loop.reason == codes.REASONS[codes.OK]
     assert bench.internal('tick') == 21
+
+
+def test_a_frozen_encoder_vents_both_muscles_until_the_joint_moves_again(joint, loop):
+    bench = Bench(joint, loop)
+    held, seen = [], []
+    for k in range(2200):
+        now = bench.now_ns
+        wanted = 0.5 * math.sin(2.0 * math.pi * 0.5 * k * 0.005)
+        loop.on_joint_reference(AngleReference(now, wanted, 0.0))
+        if not 600 <= k < 1600:
+            angle, commands = bench.tick()
+            held.append(loop._angle.angle_rad)
+        else:
+            angle, commands = bench.tick(
+                joint_state=JointAngle(now + bench.period_ns, held[-1]))
+        seen.append((k, loop.reason, [command.pressure_pa for command in commands], angle))
+    told = [k for k, reason, _, _ in seen if reason == codes.REASONS[codes.ANGLE_FROZEN]]
+    assert 640 < told[0] < 1600                     # before the encoder speaks again
+    assert told == list(range(told[0], told[-1] + 1))
+    assert 1600 <= told[-1] < 1600 + 401            # at most 2 s after it was last found frozen
+    assert all(commands == [P_ATM_PA] * 2 for _, _, commands, _ in seen[told[0]:told[-1] + 1])
+    assert {reason for _, reason, _, _ in seen[:600] + seen[told[-1] + 1:]} == {
+        codes.REASONS[codes.OK]}
+
+
+@pytest.mark.parametrize('angle_rad, swing_pa', [
+    (0.1, 140e3),               # 280 kPa from end to end: held by friction
+    ('upper', 250e3)])          # lies on its stop
+def test_what_a_joint_may_do_is_not_taken_for_a_frozen_encoder(joint, loop, angle_rad, swing_pa):
+    if angle_rad == 'upper':
+        angle_rad = joint.range_rad[1]
+    for k in range(400):
+        now = START_NS + k * 5 * MS_NS
+        swing = swing_pa * math.sin(0.01 * k)
+        loop.on_joint_state(JointAngle(now, angle_rad))
+        loop.on_joint_reference(AngleReference(now, angle_rad, 0.0))
+        for side, pressure_pa in ((FLEXOR, 3e5 + swing / 2.0), (EXTENSOR, 3e5 - swing / 2.0)):
+            loop.on_pressure(side, Pressure(now, pressure_pa))
+        loop.tick(now)
+        assert loop.reason == codes.REASONS[codes.OK]
+
+
+def test_a_blocked_joint_may_be_given_any_torque(joint, loop):
+    for k in range(400):
+        now = START_NS + k * 5 * MS_NS
+        loop.on_joint_state(JointAngle(now, 0.1))
+        loop.on_named_efforts(NamedEfforts(now, ('muscle',), (0.3 * math.sin(0.05 * k),)))
+        for side, sign in ((FLEXOR, 1.0), (EXTENSOR, -1.0)):
+            loop.on_pressure(side, Pressure(now, 4e5 + sign * 1e3 * k))
+        loop.tick(now)
+        assert loop.reason == codes.REASONS[codes.OK]
 
 
 def test_without_reference_or_with_one_long_lost_it_vents(joint, loop):
