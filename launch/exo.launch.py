@@ -50,6 +50,6 @@ def generate_launch_description():
         GroupAction([IncludeLaunchDescription(
             PythonLaunchDescriptionSource(file), launch_arguments={
                 **{name: LaunchConfiguration(name) for name in HANDED_ON},
-                'namespace': namespace, 'seed': str(k)}.items())])
+                'namespace': namespace, 'seed': str(2 * k)}.items())])
         for k, namespace in enumerate(KNEES)]
     return LaunchDescription([*arguments, *knees])

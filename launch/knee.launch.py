@@ -30,12 +30,14 @@ from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
+from launch.substitutions import PythonExpression
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
-NAME = {'muscle': ParameterValue(LaunchConfiguration('namespace'), value_type=str)}
+NAME = {'muscle': ParameterValue(PythonExpression(
+    ["'", LaunchConfiguration('namespace'), "'.rsplit('/', 1)[-1]"]), value_type=str)}
 
 
 def _arguments():
@@ -49,7 +51,7 @@ def _arguments():
             description='Joint preset, or path of its file.'),
         DeclareLaunchArgument(
             'controller_file', default_value='',
-            description='Controller preset or file; empty: the preset that fits the valve.'),
+            description='Controller preset or file; empty: the preset of valve and joint.'),
         DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),

@@ -39,11 +39,15 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.resources import find_config
+from pam_actuation.rigging.layouts import played
 
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
-HARDWARE_FILE = 'hardware_file'
+# Noted from the arguments.
+HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW = (
+    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals')
 
 
 def _arguments():
@@ -64,7 +68,7 @@ def _arguments():
             description='Self-organizing fuzzy controller or PID.'),
         DeclareLaunchArgument(
             'controller_file', default_value='',
-            description='Controller preset or file; empty: the preset that fits the valve.'),
+            description='Controller preset or file; empty: the preset of valve and experiment.'),
         DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),
@@ -110,16 +114,16 @@ def generate_launch_description():
     """Return nodes, arguments and the two ways to end."""
     valve = {'valve_type': _text('valve')}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
-    control = {'rig': _text('rig'), 'controller': _text('controller_file')}
+    control = {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)}
     learning = {'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
 
     def chosen(name):
-        return IfCondition(EqualsSubstitution(LaunchConfiguration('controller'), name))
+        return IfCondition(EqualsSubstitution(LaunchConfiguration(CONTROLLER), name))
 
     recorder = _node(
         RECORDER, valve, seed,
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
-         'controller': ParameterValue(_controller_name(), value_type=str)},
+         'controller': _text(CONTROLLER_NAME)},
         condition=IfCondition(LaunchConfiguration('record')))
     hardware = LaunchConfiguration('hardware')
     plant = _node(
@@ -129,11 +133,12 @@ def generate_launch_description():
         'hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
         condition=IfCondition(NotEqualsSubstitution(hardware, 'sim')))
     driver = _node(
-        'valve_driver', valve, {'rig': _text('rig')}, LaunchConfiguration(HARDWARE_FILE))
+        'valve_driver', valve, {'rig': _text('rig'), 'accept_valve_command': ParameterValue(
+            LaunchConfiguration(RAW), value_type=bool)}, LaunchConfiguration(HARDWARE_FILE))
     watchdog = _node(
         'valve_watchdog', valve, condition=IfCondition(EqualsSubstitution(hardware, 'sim')))
     reference = _node(
-        'reference_generator',
+        'reference_generator', valve,
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
          'exit_when_finished': True})
     nodes = [
@@ -149,13 +154,21 @@ def generate_launch_description():
             (plant, 'the plant ended'), (sensors, 'the sensors ended'),
             (recorder, 'the recorder ended'))]
     return LaunchDescription(
-        [*_arguments(), OpaqueFunction(function=_find_hardware), *nodes, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_what_is_needed), *nodes, *ends])
 
 
-def _find_hardware(context):
-    """Return the action that notes which parameter file the argument ``hardware`` means."""
-    name = LaunchConfiguration('hardware').perform(context)
-    return [SetLaunchConfiguration(HARDWARE_FILE, str(find_config('hardware', name)))]
+def _note_what_is_needed(context):
+    """Return the actions that note what the arguments lead to."""
+    def given(name):
+        return LaunchConfiguration(name).perform(context)
+
+    kind = given('controller')
+    name, raw = played(
+        given('experiment'), given('rig'), given('valve'), given('controller_file'),
+        PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
+    noted = {HARDWARE_FILE: str(find_config('hardware', given('hardware'))),
+             CONTROLLER: kind if name else 'none', CONTROLLER_NAME: name, RAW: str(raw).lower()}
+    return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
 
 
 def _shut_down(reason):
@@ -163,12 +176,3 @@ def _shut_down(reason):
     def on_exit(event, context):
         return [] if context.is_shutdown else [EmitEvent(event=Shutdown(reason=reason))]
     return on_exit
-
-
-def _controller_name():
-    """Return the controller the nodes load: the file given, else the preset."""
-    preset = IfElseSubstitution(
-        EqualsSubstitution(LaunchConfiguration('controller'), 'pid'), 'pid',
-        ['sofc_', LaunchConfiguration('valve')])
-    given = EqualsSubstitution(LaunchConfiguration('controller_file'), '')
-    return IfElseSubstitution(given, preset, LaunchConfiguration('controller_file'))

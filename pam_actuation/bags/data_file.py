@@ -55,16 +55,23 @@ class DataFile:
         try:
             # Held while recording, so that nobody repairs a file that is being written.
             disk.lock(self._stream)
-            # Without a name, so that a killed process leaves nothing.
-            index = self._closing.enter_context(
-                tempfile.TemporaryFile(dir=path.parent, buffering=0))
             self.mcap = McapWriter(
-                functools.partial(disk.write_all, self._stream), library=LIBRARY, index=index)
+                functools.partial(disk.write_all, self._stream), library=LIBRARY,
+                index=self._open_index(path.parent))
             begin(self)
         except OSError:
             self._closing.close()
             path.unlink()
             raise
+
+    def _open_index(self, folder):
+        """Return a file without a name, so that a killed process leaves nothing."""
+        try:
+            index = tempfile.TemporaryFile(dir=folder, buffering=0)
+        except OSError:
+            return None             # not on this file system: in memory then
+        self._closing.callback(_close_quietly, index)
+        return index
 
     def register(self, name, type_name, qos, type_hash):
         """Announce a topic with its definition."""
@@ -123,6 +130,8 @@ class DataFile:
         return {name: in_file.get(channel, 0) for name, channel in self._channels.items()}
 
     def _truncate(self):
+        if self._stream.closed:
+            return
         self._stream.truncate(self.mcap.offset)
         self._stream.seek(self.mcap.offset)
 
@@ -132,3 +141,9 @@ class DataFile:
             self._truncate()
         with contextlib.suppress(OSError):
             self._closing.close()
+
+
+def _close_quietly(stream):
+    """Close a file of which nothing is needed any more."""
+    with contextlib.suppress(OSError):
+        stream.close()

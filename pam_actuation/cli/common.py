@@ -64,12 +64,13 @@ def add_rig_options(parser):
         help='valve type; default: the one of the rig')
 
 
-def add_controller_options(parser):
+def add_controller_options(
+        parser, default='sofc_ppr or sofc_hsv, after the valve; sofc_force_… for an experiment '
+        'in force'):
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
         '--controller', default=None, metavar='NAME|FILE',
-        help='controller preset or YAML (default: sofc_ppr or sofc_hsv, after the valve; '
-        'sofc_force_… for an experiment in force)')
+        help=f'controller preset or YAML (default: {default})')
     parser.add_argument(
         '--rules', default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(

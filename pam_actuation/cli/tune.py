@@ -40,7 +40,9 @@ def add_arguments(parser):
         '--check', action='append', default=None, metavar='NAME|FILE',
         help=f'experiment of the held-out check, may be repeated (default: {CHECK} and those of '
         'the search, with other noise)')
-    add_controller_options(parser)
+    add_controller_options(
+        parser, 'that of the first bag, else sofc_ppr or sofc_hsv, after the valve; it tracks '
+        'contraction')
     parser.add_argument('--rollouts', type=int, default=3000, metavar='N',
                         help='budget of simulated runs of the search (default: %(default)s)')
     parser.add_argument('--randomise', type=int, default=0, metavar='N',

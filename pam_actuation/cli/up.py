@@ -29,7 +29,7 @@ def add_arguments(parser):
     parser.add_argument('--model', default='', metavar='NAME',
                         help='rig or joint: preset, or path of a model file')
     parser.add_argument('--controller', default='', metavar='NAME',
-                        help='controller preset or file (default: that of the valve)')
+                        help='controller preset or file (default: that of valve and experiment)')
     parser.add_argument('--experiment', default='', metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', default='sim', metavar='NAME',

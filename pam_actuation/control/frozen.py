@@ -35,8 +35,8 @@ class FrozenMeasurement:
     """
     Compares the newest value of what is tracked with the range of the pressure.
 
-    ``frozen`` stays until the value has changed and is still changing 2 s later: a muscle that
-    is blocked looks the same, and must not be filled against the obstacle again at once.
+    ``frozen`` stays until the value has changed, for 2 s at least: a muscle that is blocked
+    looks the same, and must not be filled against the obstacle again at once.
 
     Parameters
     ----------
@@ -59,6 +59,11 @@ class FrozenMeasurement:
         self._value = math.nan
         self._since_ns = 0
         self._noticed_ns = 0
+        self._changed = False       # since it was noticed
+        self._lowest_pa, self._highest_pa = math.inf, -math.inf
+
+    def pause(self):
+        """Forget the pressures, not what was found: what comes now is not compared with them."""
         self._lowest_pa, self._highest_pa = math.inf, -math.inf
 
     def judge(self, now_ns, stamp_ns, value, pressure_pa):
@@ -78,9 +83,8 @@ class FrozenMeasurement:
         """
         if value != self._value or stamp_ns < self._since_ns:
             self._value, self._since_ns = value, stamp_ns
-            self._lowest_pa, self._highest_pa = math.inf, -math.inf
-            if self.frozen and now_ns - self._noticed_ns >= RESUME_NS:
-                self.frozen = False
+            self._changed = True
+            self.pause()
         if self._between[0] < value < self._between[1] and math.isfinite(pressure_pa):
             self._lowest_pa = min(self._lowest_pa, pressure_pa)
             self._highest_pa = max(self._highest_pa, pressure_pa)
@@ -88,4 +92,7 @@ class FrozenMeasurement:
                 and stamp_ns - self._since_ns >= AFTER_NS):
             self.frozen = True
             self._noticed_ns = now_ns
+            self._changed = False
+        elif self._changed and now_ns - self._noticed_ns >= RESUME_NS:
+            self.frozen = False
         return self.frozen

@@ -33,7 +33,7 @@ from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
 from pam_actuation.control.frozen import FrozenMeasurement, JOINT_SWING_PA
 from pam_actuation.control.joint_torque import JointTorque
-from pam_actuation.control.joint_trajectory import angle_trajectory
+from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
 from pam_actuation.control.loop import (
     fresh, measurement_reason, REFERENCE_REASONS, STALL_NS)
 from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
@@ -83,17 +83,18 @@ class JointControllerLoop:
                              '`mode: joint`', controller.rig_name)
         self.controller = controller
         self.torque = JointTorque(joint, controller)
-        self.references = ReferenceBuffer(JOINT)
+        lower, upper = joint.range_rad
+        self.references = ReferenceBuffer(JOINT, (lower - TOLERANCE_RAD, upper + TOLERANCE_RAD))
         self.efforts = EffortBuffer(name)
         self.follows_torque = False     # and not an angle
-        self.rejected_references = 0
+        self._refused_trajectories = 0
         self.refusal = ''           # why the newest trajectory was not taken
         self.reason = codes.REASONS[codes.NO_ANGLE]
         self.ticks = 0
         self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
-        self._range = joint.range_rad
+        self._range = lower, upper
         self._frozen = FrozenMeasurement(
-            self._range[0] + _STOP_RAD, self._range[1] - _STOP_RAD, JOINT_SWING_PA)
+            lower + _STOP_RAD, upper - _STOP_RAD, JOINT_SWING_PA)
         self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
@@ -108,6 +109,20 @@ class JointControllerLoop:
         """Rate [Hz] at which ``tick`` is to be called."""
         return self.controller.rate_hz
 
+    @property
+    def rejected_references(self):
+        """Number of references and trajectories that were not usable."""
+        return self.references.refused + self._refused_trajectories
+
+    def forget(self):
+        """Forget all inputs, as before the first ones; what was learned stays."""
+        self.references.clear()
+        self.efforts = EffortBuffer(self._name)
+        self._frozen.forget()
+        self.follows_torque = False
+        self._trajectory = self._angle = None
+        self._pressures, self._forces = [None, None], [None, None]
+
     def on_joint_state(self, message):
         """Take a ``JointAngle``."""
         self._angle = message
@@ -121,12 +136,12 @@ class JointControllerLoop:
         self._forces[side] = message
 
     def on_joint_reference(self, message):
-        """Take an ``AngleReference``; one that is not finite is ignored and counted."""
-        self.rejected_references += not self.references.set_reference(message)
+        """Take an ``AngleReference``; an unusable one is ignored and counted."""
+        self.references.set_reference(message)
 
     def on_joint_trajectory(self, message):
         """Take an ``AngleTrajectory``; an unusable one is ignored and counted."""
-        self.rejected_references += not self.references.set_trajectory(message)
+        self.references.set_trajectory(message)
 
     def on_named_trajectory(self, message):
         """Take a ``NamedTrajectory``; the next tick counts it or, where unusable, refuses it."""
@@ -147,7 +162,7 @@ class JointControllerLoop:
             self.refusal = ''
         except InputError as error:
             self.refusal = str(error)
-            self.rejected_references += 1
+            self._refused_trajectories += 1
 
     def on_named_efforts(self, message):
         """Take ``NamedEfforts``; the next tick counts them or, where unusable, refuses them."""
@@ -173,6 +188,7 @@ class JointControllerLoop:
         controller = self.controller
         if self._trajectory is not None:
             self._take_trajectory(now_ns)
+        self.references.refuse_ahead(now_ns)
         changed = self._choose_law(now_ns)
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
@@ -219,7 +235,8 @@ class JointControllerLoop:
         if reason != codes.OK:
             return reason
         if self.follows_torque:
-            self._frozen.forget()
+            self._frozen.pause()
+            self._frozen.judge(now_ns, self._angle.stamp_ns, angle, math.nan)
             return codes.OK if self.efforts.fresh(now_ns) else codes.EFFORT_LOST
         flexor_pa, extensor_pa = self._fresh_pressures_pa(now_ns)
         if self._frozen.judge(now_ns, self._angle.stamp_ns, angle, flexor_pa - extensor_pa):

@@ -87,7 +87,7 @@ def angle_trajectory(stamp_ns, names, points, joint, range_rad, now_ns, present_
         raise InputError('lies in the past', WHERE)
     if begin_ns + times[0] > now_ns and math.isfinite(present_rad):
         times.insert(0, now_ns - begin_ns)
-        angles.insert(0, present_rad)
+        angles.insert(0, min(max(present_rad, range_rad[0]), range_rad[1]))
         rates.insert(0, math.nan)
     return AngleTrajectory(begin_ns, tuple(times), tuple(angles), tuple(rates))
 

@@ -129,8 +129,7 @@ class ControllerLoop:
             self._range = (
                 -0.5 * controller.upper_force_n, _FORCE_MARGIN * controller.upper_force_n)
         self._reasons = _REASONS[self.tracked]
-        self.references = ReferenceBuffer(self.tracked)
-        self.rejected_references = 0
+        self.references = ReferenceBuffer(self.tracked, self._range)
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
         self._frozen = FrozenMeasurement(_RESTING[self.tracked])
@@ -145,6 +144,11 @@ class ControllerLoop:
     def rate_hz(self):
         """Rate [Hz] at which ``tick`` is to be called."""
         return self.controller.rate_hz
+
+    @property
+    def rejected_references(self):
+        """Number of references and trajectories that were not usable."""
+        return self.references.refused
 
     @property
     def ticks(self):
@@ -163,13 +167,19 @@ class ControllerLoop:
         """Take a ``Force``."""
         self._force = message
 
+    def forget(self):
+        """Forget all inputs, as before the first ones; what was learned stays."""
+        self.references.clear()
+        self._frozen.forget()
+        self._contraction = self._pressure = self._force = None
+
     def on_reference(self, message):
-        """Take a ``Reference``; one that is not finite is ignored and counted."""
-        self.rejected_references += not self.references.set_reference(message)
+        """Take a ``Reference``; an unusable one is ignored and counted."""
+        self.references.set_reference(message)
 
     def on_reference_trajectory(self, message):
         """Take a ``ReferenceTrajectory``; an unusable one is ignored and counted."""
-        self.rejected_references += not self.references.set_trajectory(message)
+        self.references.set_trajectory(message)
 
     def tick(self, now_ns, learning=True):
         """
@@ -223,6 +233,7 @@ class ControllerLoop:
         self._last_tick_ns = now_ns
         reason = self._measured_reason(now_ns)
         references = self.references
+        references.refuse_ahead(now_ns)
         if reason == codes.OK:
             reason = REFERENCE_REASONS[references.state(now_ns)]
         may_learn = bool(

@@ -29,6 +29,8 @@ is interpolated (cubic through positions and rates). Rules:
 * After ``LOST_S`` without either the reference is lost: the last position is held with
   zero rate until ``HOLD_S``, then there is none and the muscle is to be vented. A new
   message resumes at once.
+* A reference stamped more than ``AHEAD_S`` ahead, or a trajectory whose first point is more
+  than ``TRAJECTORY_LIFE_S`` ahead, does not count: it could not grow old.
 """
 
 from bisect import bisect_right
@@ -40,6 +42,7 @@ TRAJECTORY_LIFE_S = 1.0
 TRUST_S = 0.2
 LOST_S = 0.5
 HOLD_S = 2.0
+AHEAD_S = 0.02
 
 # By what is tracked: fields of value and rate in the messages, and the rate [unit/s] beyond
 # what the points say that is a jump. 4 rad/s are about 0.05 m/s on a small pulley.
@@ -60,45 +63,86 @@ class ReferenceBuffer:
     tracked : Tracked
         What the messages ask for. Those that ask for a force carry no rate of it; between
         points of a trajectory it is that of the line through them, without a trajectory 0.
+    allowed : tuple of float
+        Lowest and highest value; a message that asks for more is refused, not followed half way.
+
+    Attributes
+    ----------
+    refused : int
+        Messages that were not usable.
+    refusal : str
+        Why the newest of them was not, '' before the first.
 
     """
 
-    def __init__(self, tracked=CONTRACTION):
+    def __init__(self, tracked=CONTRACTION, allowed=(-math.inf, math.inf)):
+        self._lower, self._upper = allowed
+        self._unit = {'n': 'N'}.get(tracked.unit, tracked.unit)
+        self.refused = 0
+        self.refusal = ''
         self._field, self._rate_field = _FIELDS[tracked]
         self._jump_per_s = JUMP_PER_S[tracked]
         self.clear()
 
     def clear(self):
         """Forget everything."""
-        self.reference = None
+        self.reference = self._accepted = None
         self.trajectory = None
         self._times_ns = self._values = self._rates = ()
 
     def set_reference(self, message):
-        """Take a ``Reference``; one that is not finite is ignored and False returned."""
-        if not math.isfinite(self._value(message)):
-            return False
+        """Take a ``Reference``; one that is not usable is ignored and False returned."""
+        if not self._allowed(self._value(message)):
+            return self._refuse(f'a reference {self._outside}')
         self.reference = message
         return True
+
+    def _allowed(self, value):
+        return math.isfinite(value) and self._lower <= value <= self._upper
+
+    @property
+    def _outside(self):
+        return f'is not finite or not within {self._lower:g} to {self._upper:g} {self._unit}'
+
+    def _refuse(self, why):
+        self.refused += 1
+        self.refusal = why
+        return False
 
     def set_trajectory(self, message):
         """
         Take a ``ReferenceTrajectory``; an unusable one is ignored and False returned.
 
-        Usable: at least one point, equal lengths, finite, times strictly rising.
+        Usable: at least one point, equal lengths, allowed values, times strictly rising.
         """
         times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
         values = self._value(message)
         usable = (
             len(times) > 0 and len(times) == len(values)
             and all(a < b for a, b in zip(times, times[1:]))
-            and all(math.isfinite(x) for x in values))
-        if usable:
-            self.trajectory = message
-            self._times_ns = times
-            self._values = values
-            self._rates = getattr(message, self._rate_field) if self._rate_field else ()
-        return usable
+            and all(map(self._allowed, values)))
+        if not usable:
+            return self._refuse(f'a trajectory does not rise in time, or {self._outside}')
+        self.trajectory = message
+        self._times_ns = times
+        self._values = values
+        self._rates = getattr(message, self._rate_field) if self._rate_field else ()
+        return True
+
+    def refuse_ahead(self, now_ns):
+        """Forget what is stamped too far ahead of a time."""
+        limit_ns = now_ns + AHEAD_S * 1e9
+        if self.reference is not None and self.reference.stamp_ns > limit_ns:
+            if self.reference is not self._accepted:
+                self._refuse(f'a reference is stamped more than {AHEAD_S:g} s ahead')
+            # The clock may have been set back: then the former one is ahead as well.
+            former = self._accepted
+            self.reference = former if former and former.stamp_ns <= limit_ns else None
+        self._accepted = self.reference
+        if self.trajectory is not None and self._times_ns[0] - now_ns > TRAJECTORY_LIFE_S * 1e9:
+            self._refuse(f'a trajectory begins more than {TRAJECTORY_LIFE_S:g} s ahead')
+            self.trajectory = None
+            self._times_ns = self._values = self._rates = ()
 
     def _value(self, message):
         """Return what a message asks for, of the quantity that counts here."""

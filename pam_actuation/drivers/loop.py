@@ -194,7 +194,7 @@ class DriverLoop:
         return channel.pressure_pa
 
     def _safe_efforts(self):
-        return SAFE_EFFORTS['hsv'] if self.is_hsv else (max(self.config.ppr.lowest_v, 0.0),)
+        return SAFE_EFFORTS['hsv' if self.is_hsv else 'ppr']
 
     def _signal(self, now_ns, efforts):
         return ValveSignal(now_ns, self._names, efforts)

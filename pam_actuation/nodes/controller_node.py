@@ -21,6 +21,7 @@ from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.refusals import RefusalLog
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
@@ -47,7 +48,7 @@ class ControllerNode(ManagedNode):
     """Call a control law at its rate; on every way out command atmospheric pressure."""
 
     ASYNCHRONOUS = True
-    DEFAULT_CONTROLLER = ''
+    DEFAULT_CONTROLLERS = {}            # preset by valve
     PARAMETERS = (
         NodeParameter(
             'controller', '', 'Controller preset, or path of a controller file. Empty: the '
@@ -58,6 +59,7 @@ class ControllerNode(ManagedNode):
     )
 
     learning = False
+    loop = None
 
     def setup(self):
         """Load the controller, create the topics."""
@@ -66,10 +68,11 @@ class ControllerNode(ManagedNode):
         from pam_sim import load_rig
         valve = self.value('valve_type')
         rig = load_rig(self.value('rig'), valve=valve)
-        name = self.value('controller') or self.DEFAULT_CONTROLLER.format(valve=valve)
+        name = self.value('controller') or self.DEFAULT_CONTROLLERS[valve]
         load_controller(name, rig).step(0.0, 0.0, 0.0, 0.0, 0.0)    # compiled before time counts
         self.controller = load_controller(name, rig)
         self.loop = ControllerLoop(self.controller)
+        self._refusals = RefusalLog(self.get_logger())
         self.add_publisher('pressure_command')
         self.add_publisher('controller_state')
         self.inputs = [
@@ -103,6 +106,10 @@ class ControllerNode(ManagedNode):
     def start(self):
         """Begin without memory of a former run; what was learned stays."""
         self._last_ns = None
+        if not self.participants:           # in lockstep what waits is of the first tick
+            for subscription in self.subscriptions_polled:
+                subscription.take()
+            self.loop.forget()
         self.add_loop(1.0 / self.controller.rate_hz)
 
     def tick(self):
@@ -118,7 +125,17 @@ class ControllerNode(ManagedNode):
         command, state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', state)
+        self._refusals.note(self.loop.references.refusal)
         report_reason(self.diagnostics, self.loop.reason)
+
+    def diagnostic_values(self):
+        """Add wishes that were refused."""
+        values = super().diagnostic_values()
+        if self.loop is None:
+            return values
+        references = self.loop.references
+        return (*values, ('references.refused', references.refused),
+                ('references.refusal', references.refusal))
 
     def safe_stop(self, why):
         """Command atmospheric pressure: the driver vents."""

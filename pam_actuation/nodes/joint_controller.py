@@ -23,6 +23,7 @@ from pam_actuation.nodes.controller_node import report_reason
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.refusals import RefusalLog
 from pam_actuation.nodes.runner import run
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
@@ -51,7 +52,7 @@ class JointNode(LearningSwitch, ManagedNode):
     PARAMETERS = (
         NodeParameter(
             'controller', '', 'Controller preset or file with mode joint. Empty: the preset '
-            'that fits the valve.'),
+            'that fits the valve and the size of the joint.'),
         NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint the controller is made for: '
                       'preset or path.'),
         NodeParameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
@@ -59,17 +60,17 @@ class JointNode(LearningSwitch, ManagedNode):
     )
 
     loop = None
-    _refusals = ()
 
     def setup(self):
         """Load the controller, create the topics."""
         from pam_actuation.control.config import load_controller
         from pam_actuation.control.joint_loop import JointControllerLoop
+        from pam_actuation.control.modes.files import joint_preset_for
         from pam_sim.joint import load_joint
         from pam_sim.joint.urdf import joint_urdf
         valve = self.value('valve_type')
         joint = load_joint(self.value('joint'), valve=valve)
-        name = self.value('controller') or f'sofc_joint_{valve}'
+        name = self.value('controller') or joint_preset_for(joint, valve)
         load_controller(name, joint).step(0.0, 0.0, 0.0, 0.0, 0.0)  # compiled before time counts
         self.loop = JointControllerLoop(
             load_controller(name, joint), joint, self.value('muscle'))
@@ -87,6 +88,7 @@ class JointNode(LearningSwitch, ManagedNode):
             for topic, handler in (('pressure', self.loop.on_pressure),
                                    ('force', self.loop.on_force))
             for k, side in enumerate(SIDES)]
+        self._refusals = RefusalLog(self.get_logger())
         self._freeze_service = self.create_freeze_service()
 
     def teardown(self):
@@ -97,6 +99,9 @@ class JointNode(LearningSwitch, ManagedNode):
 
     def start(self):
         """Begin without memory of a former run; what was learned stays."""
+        for subscription in self.subscriptions_polled:
+            subscription.take()
+        self.loop.forget()
         self.add_loop(1.0 / self.loop.rate_hz)
 
     def tick(self):
@@ -111,17 +116,11 @@ class JointNode(LearningSwitch, ManagedNode):
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)
         self.send('controller_state', state)
-        self._warn_of_refusals()
+        self._refusals.note(
+            self.loop.refusal, self.loop.references.refusal, self.loop.efforts.refusal)
         report_reason(
             self.diagnostics, self.loop.reason,
             GIVING if self.loop.follows_torque else FOLLOWING)
-
-    def _warn_of_refusals(self):
-        """Log why a wish was not taken, once per reason."""
-        before, self._refusals = self._refusals, (self.loop.refusal, self.loop.efforts.refusal)
-        for refusal in self._refusals:
-            if refusal and refusal not in before:
-                self.get_logger().warning(f'a wish was refused: {refusal}')
 
     def safe_stop(self, why):
         """Command atmospheric pressure: both drivers vent."""
@@ -137,7 +136,7 @@ class JointNode(LearningSwitch, ManagedNode):
         return (*values, ('learning', self.learning),
                 ('follows', 'torque' if self.loop.follows_torque else 'angle'),
                 ('references.refused', self.loop.rejected_references),
-                ('references.refusal', self.loop.refusal),
+                ('references.refusal', self.loop.refusal or self.loop.references.refusal),
                 ('efforts.refused', self.loop.efforts.rejected),
                 ('efforts.refusal', self.loop.efforts.refusal))
 

@@ -277,15 +277,21 @@ class ManagedNode(LifecycleNode):
             if was_active:
                 self._end_work(why)
                 self.get_logger().info(why)
+            else:
+                self._farewell()
 
     def _end_work(self, why):
         self.diagnostics.level = ERROR if self.exit_code else OK
         self.diagnostics.message = why
         self.diagnostics.send()
+        self._farewell()
+        self.stop()
+
+    def _farewell(self):
+        """Wait a little until everybody has what was sent last."""
         deadline = time.monotonic() + FAREWELL_S
         for publisher in (*self.publishers_counted, self.diagnostics.publisher):
             publisher.wait_for_all_acked(max(deadline - time.monotonic(), 0.0))
-        self.stop()
 
     def destroy_node(self):
         """
@@ -325,6 +331,7 @@ class ManagedNode(LifecycleNode):
         """Make the output safe after a failed transition; the node is unconfigured then."""
         self._end_loops()
         self._make_safe('a transition failed')
+        self._farewell()
         return self._transition('recover', self._cleanup)
 
     def _transition(self, word, action):
@@ -338,6 +345,8 @@ class ManagedNode(LifecycleNode):
             self.get_logger().error(f'cannot {word}: {error}')
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             self.input_error = error
+            if action == self._configure:
+                self._undo_setup()
             return TransitionCallbackReturn.FAILURE
         except Exception as error:
             self.get_logger().error(f'cannot {word}:\n{traceback.format_exc()}')
@@ -404,6 +413,17 @@ class ManagedNode(LifecycleNode):
             self.simulated_time.close()
             self.simulated_time, self.loops.time = None, SteadyTime()
         self.teardown()
+        self._drop_endpoints()
+
+    def _undo_setup(self):
+        """Take back what a configure that failed has built, as far as it came."""
+        try:
+            self.teardown()
+        except Exception as error:
+            self.get_logger().debug(f'not built yet: {error}')
+        self._drop_endpoints()
+
+    def _drop_endpoints(self):
         for publisher in self.publishers_counted:
             publisher.destroy()
         for subscription in self.subscriptions_polled:

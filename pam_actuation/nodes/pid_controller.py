@@ -25,7 +25,7 @@ class PidNode(ControllerNode):
 
     NAME = 'pid_controller'
     REALTIME_RANK = 1
-    DEFAULT_CONTROLLER = 'pid'
+    DEFAULT_CONTROLLERS = {'ppr': 'pid', 'hsv': 'pid_hsv'}
 
 
 def main(args=None):

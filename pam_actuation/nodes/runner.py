@@ -25,6 +25,8 @@ import signal
 import socket
 import sys
 import threading
+import time
+import traceback
 
 from pam_actuation.nodes import own_port
 from pam_actuation.nodes.diagnostics import WARN
@@ -38,6 +40,7 @@ SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'S
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
+SENDING_S = 0.05            # for the thread of the middleware
 PUBLICATION_MODE = 'RMW_FASTRTPS_PUBLICATION_MODE'      # other middlewares do not look at it
 
 
@@ -74,6 +77,8 @@ class _Stopper(threading.Thread):
         if not self.safe.wait(limit_s):
             try:
                 self.node.safe_stop(f'{self.reason}, the loop did not answer')
+                if self.node.ASYNCHRONOUS:
+                    time.sleep(SENDING_S)
             finally:
                 os._exit(1)
 
@@ -112,7 +117,7 @@ def run(node_class, args=None):
     executor.add_node(node)
     ended = threading.Event()
     serving = threading.Thread(
-        target=_serve, args=(executor, ended), daemon=True, name='services')
+        target=_serve, args=(node, executor, ended), daemon=True, name='services')
     stopper.node = node
     stopper.start()
     serving.start()
@@ -141,10 +146,15 @@ def run(node_class, args=None):
 
 
 def _new(node_class, args):
-    if node_class.ASYNCHRONOUS:
-        os.environ.setdefault(PUBLICATION_MODE, 'ASYNCHRONOUS')
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    return node_class()
+    asked_for = os.environ.get(PUBLICATION_MODE)
+    if node_class.ASYNCHRONOUS and asked_for is None:
+        os.environ[PUBLICATION_MODE] = 'ASYNCHRONOUS'
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        return node_class()
+    finally:
+        if asked_for is None:
+            os.environ.pop(PUBLICATION_MODE, None)      # not for processes this one starts
 
 
 def _end(node, why):
@@ -153,18 +163,22 @@ def _end(node, why):
     rclpy.shutdown()
 
 
-def _serve(executor, ended):
+def _serve(node, executor, ended):
     """
     Answer services and parameter requests until ``ended`` is set.
 
     Not ``executor.spin``: its shutdown takes away what wakes it, and a thread that was just
     about to wait would then still be waiting when the node is destroyed.
     """
-    try:
-        while not ended.is_set():
+    while not ended.is_set():
+        try:
             executor.spin_once(timeout_sec=SERVICE_WAIT_S)
-    except ExternalShutdownException:
-        pass
+        except ExternalShutdownException:
+            return
+        except Exception:
+            # One request that fails must not take the others away, as the emergency stop.
+            node.get_logger().error(f'a service failed:\n{traceback.format_exc()}')
+            ended.wait(SERVICE_WAIT_S)
 
 
 def _bring_up(node):

@@ -30,7 +30,7 @@ class SofcNode(LearningSwitch, ControllerNode):
 
     NAME = 'sofc_controller'
     REALTIME_RANK = 1
-    DEFAULT_CONTROLLER = 'sofc_{valve}'
+    DEFAULT_CONTROLLERS = {'ppr': 'sofc_ppr', 'hsv': 'sofc_hsv'}
     PARAMETERS = (
         *ControllerNode.PARAMETERS,
         NodeParameter(

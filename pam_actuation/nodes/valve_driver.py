@@ -209,7 +209,7 @@ class ValveDriver(ManagedNode):
         with self.loops.lock:
             response.success, response.message = self.loop.emergency_stop('service call')
             if self.loops:
-                self.tick()         # not a moment later
+                self._guarded(self.tick)        # not a moment later
             else:
                 self.safe_stop('emergency stop')
         return response

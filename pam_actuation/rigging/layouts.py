@@ -57,18 +57,27 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
     hardware : str
         ``sim``, another name in config/hardware, or a parameter file.
     controller : str
-        Controller preset or file; '' for the preset of the valve.
+        Controller preset or file; '' for the preset of valve and experiment.
     experiment : str
-        Name or file; '': none, references come from elsewhere.
+        Name or file; '': none, references come from elsewhere. One in pressure or in raw
+        valve signals speaks to the driver itself: there is no controller then.
     record : str
         Folder of the bag; '': no recorder.
 
+    Raises
+    ------
+    InputError
+        In the experiment, or where the rig cannot do it.
+
     """
     kind = {'valve_type': valve}
-    driver = {**kind, 'rig': rig}
-    nodes = [NodeSpec('sofc_controller', namespace, {**driver, 'controller': controller})]
+    described = {**kind, 'rig': rig}
+    name, raw = played(experiment, rig, valve, controller)
+    driver = {**described, 'accept_valve_command': True} if raw else described
+    nodes = [NodeSpec('sofc_controller', namespace, {**described, 'controller': name})
+             ] if name else []
     if hardware == 'sim':
-        nodes += [NodeSpec('plant_simulator', namespace, driver),
+        nodes += [NodeSpec('plant_simulator', namespace, described),
                   NodeSpec('valve_watchdog', namespace, kind),
                   NodeSpec('valve_driver', namespace, driver)]
     else:
@@ -81,8 +90,42 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
             **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'})
             for node in nodes]
         nodes.append(NodeSpec('experiment_recorder', namespace, {
-            **driver, 'output': record, 'experiment': experiment}))
+            **described, 'output': record, 'experiment': experiment, 'controller': name}))
     return nodes
+
+
+def played(experiment, rig, valve, controller='', presets=None):
+    """
+    Return what an experiment needs: name of the controller, '' for none; raw valve signals.
+
+    Parameters
+    ----------
+    experiment : str
+        Name or file; '' for none: the controller follows references from elsewhere.
+    rig, valve : str
+        Model by name or file, and kind of valve.
+    controller : str
+        Preset or file; '' for the preset.
+    presets : dict, optional
+        Preset by valve; default: that of the self-organizing controller.
+
+    Raises
+    ------
+    InputError
+        In the experiment, or where the rig cannot do it.
+
+    """
+    if not experiment:
+        return controller or (presets or {}).get(valve, f'sofc_{valve}'), False
+    from pam_actuation.control.modes.files import preset_for
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    wanted, model = load_experiment(experiment), load_rig(rig, valve=valve)
+    wanted.check_reachable(model)
+    name = ''
+    if wanted.tracked:
+        name = controller or (presets or {}).get(valve) or preset_for(wanted, model)
+    return name, wanted.sends_valve_command(valve)
 
 
 def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', controller='',

@@ -32,12 +32,12 @@ from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
-    change, SessionFailed, termination_as_interrupt, TRANSITION_TIMEOUT_S)
+    change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
+    TRANSITION_TIMEOUT_S)
 from pam_sim.errors import InputError
 import yaml
 
 START_TIMEOUT_S = 60.0        # a busy machine compiles for long
-CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
 FINISHED = 'finished'
@@ -222,7 +222,7 @@ class RigSession:
         end_all(self.processes.values())
         return problems
 
-    def _deactivate(self, names, timeout_s=TRANSITION_TIMEOUT_S):
+    def _deactivate(self, names, timeout_s=STOP_TIMEOUT_S):
         problems = []
         for name in names:
             if name in self._active and self.processes[name].running:
@@ -230,6 +230,8 @@ class RigSession:
                     self.change([name], 'deactivate', timeout_s)
                 except SessionFailed as error:
                     problems.append(str(error))
+                    # The driver, which vents, must not wait for a node that does not answer.
+                    end_all([self.processes[name]])
         return problems
 
     def _note_cpu(self):

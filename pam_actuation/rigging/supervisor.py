@@ -29,13 +29,13 @@ import time
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.layouts import ORDER
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
-from pam_actuation.rigging.transitions import change, SessionFailed
+from pam_actuation.rigging.transitions import (
+    change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S)
 from pam_sim.errors import InputError
 
 START_TIMEOUT_S = 60.0
-CLOSE_TIMEOUT_S = 60.0        # a recorder writes what is queued
 VENT_S = 0.6                  # for the air, before the plant stops
-DRIVER = 'valve_driver'
+DRIVER, RECORDER = 'valve_driver', 'experiment_recorder'
 
 
 class Supervisor:
@@ -150,10 +150,13 @@ class Supervisor:
             if not of_a_kind:
                 continue
             try:
-                change(self.client, of_a_kind, 'deactivate', CLOSE_TIMEOUT_S)
+                change(self.client, of_a_kind, 'deactivate',
+                       CLOSE_TIMEOUT_S if name == RECORDER else STOP_TIMEOUT_S)
             except SessionFailed as error:
                 if all(one.running for one in of_a_kind):       # those that ended come below
                     problems.append(str(error))
+                # The driver, which vents, must not wait for a node that does not answer.
+                end_all(of_a_kind)
             if name == DRIVER:
                 self.client.spin(VENT_S)
         self._active = []

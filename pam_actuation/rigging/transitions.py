@@ -19,6 +19,8 @@ import signal
 import threading
 
 TRANSITION_TIMEOUT_S = 15.0
+STOP_TIMEOUT_S = 5.0          # to deactivate: the driver, which vents, comes after others
+CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
 
 
 class SessionFailed(Exception):

@@ -295,6 +295,31 @@ def test_a_disk_too_full_for_the_index_keeps_what_is_indexed(tmp_path, monkeypat
     assert bag_info(tmp_path / 'run').dropped == summary.dropped
 
 
+def test_where_no_file_without_a_name_can_be_made_the_index_stays_in_memory(
+        tmp_path, monkeypatch):
+    def refuse(**_):
+        raise OSError(errno.EOPNOTSUPP, 'Operation not supported')
+
+    monkeypatch.setattr('tempfile.TemporaryFile', refuse)
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+    core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+    assert core.close().complete
+    assert bag_info(tmp_path / 'run').complete
+
+
+def test_an_index_that_cannot_be_closed_spoils_nothing(tmp_path, monkeypatch):
+    class NetworkDisk(io.BytesIO):
+        def close(self):
+            super().close()
+            raise OSError(errno.EDQUOT, 'Disk quota exceeded')
+
+    monkeypatch.setattr('tempfile.TemporaryFile', lambda **_: NetworkDisk())
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
+    core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+    assert core.close().complete
+    assert bag_info(tmp_path / 'run').complete
+
+
 def test_queue_length_is_checked(tmp_path):
     with BagWriter(tmp_path / 'run', {}) as writer:
         with pytest.raises(InputError, match='max_queued'):

@@ -104,6 +104,54 @@ def test_reference_that_is_not_finite_is_ignored_and_counted():
     assert by_name(state)['reference_m'] == 0.01
 
 
+def test_a_reference_from_the_future_does_not_keep_the_muscle_filled():
+    loop = ready()
+    loop.tick(START)
+    now = START + MS
+    loop.on_reference(Reference(now + 3600_000 * MS, 0.02, -0.05))
+    loop.on_reference_trajectory(ReferenceTrajectory(
+        now + 3600_000 * MS, (0, 500 * MS), (0.01, 0.02), (0.02, 0.02)))
+    _, state = loop.tick(now)
+    assert loop.reason == 'ok' and by_name(state)['reference_m'] == 0.01    # the one before
+    assert loop.rejected_references == 2 and 's ahead' in loop.references.refusal
+    now += 2100 * MS
+    loop.on_contraction(Contraction(now, 0.01))
+    command, _ = loop.tick(now)
+    assert loop.reason == 'reference lost, muscle vented' and command.pressure_pa == P_ATM_PA
+
+
+def test_a_reference_a_little_ahead_counts_and_one_of_a_clock_set_back_does_not():
+    loop = ready()
+    loop.on_reference(Reference(START + 15 * MS, 0.012, 0.0))
+    assert by_name(loop.tick(START)[1])['reference_m'] == 0.012
+    loop.on_contraction(Contraction(START - 60_000 * MS, 0.01))
+    loop.tick(START - 60_000 * MS)
+    assert loop.reason == 'no reference yet' and loop.rejected_references == 0
+
+
+@pytest.mark.parametrize('wanted', [14.0, -0.02, 0.11])
+def test_a_contraction_no_muscle_has_is_refused(wanted):
+    loop = ready()
+    loop.on_reference(Reference(START + MS, wanted, 0.0))
+    loop.on_reference_trajectory(ReferenceTrajectory(
+        START, (0, 500 * MS), (0.01, wanted), (0.0, 0.0)))
+    _, state = loop.tick(START + MS)
+    assert by_name(state)['reference_m'] == 0.01 and loop.rejected_references == 2
+    assert 'not within -0.01 to 0.1 m' in loop.references.refusal
+
+
+def test_a_loop_that_forgot_waits_for_new_inputs():
+    loop = ready()
+    loop.tick(START)
+    assert loop.reason == 'ok'
+    loop.forget()
+    command, _ = loop.tick(START + MS)
+    assert loop.reason == 'no contraction measured yet' and command.pressure_pa == P_ATM_PA
+    loop.on_contraction(Contraction(START + MS, 0.01))
+    loop.tick(START + MS)
+    assert loop.reason == 'no reference yet'
+
+
 def test_error_belongs_to_the_measurement_and_preview_to_now():
     loop = ControllerLoop(sofc({'lead_s': 0.1}))
     loop.on_contraction(Contraction(START - 4 * MS, 0.01))
@@ -201,9 +249,18 @@ def test_a_frozen_contraction_vents_until_it_moves_again():
     assert at_s == pytest.approx(0.755) and 'contraction stands still' in reason
     assert command_pa == P_ATM_PA
     assert all(command_pa == P_ATM_PA for t, _, command_pa in seen if t >= at_s)
-    # It moves at once when vented; what is only blocked is not filled again for 2 s.
-    seen = swing(loop, START + 1000 * MS, 3.0, lambda t: 0.01 + 1e-5 * t, lambda t: P_ATM_PA)
+    # It moves at once when vented and comes to rest, to the last bit; what is only blocked is not
+    # filled again for 2 s.
+    seen = swing(loop, START + 1000 * MS, 3.0, lambda t: max(0.01 - 0.02 * t, 0.003),
+                 lambda t: P_ATM_PA)
     assert next(t for t, reason, _ in seen if reason == 'ok') == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_contraction_that_never_moves_again_stays_frozen():
+    loop = ready()
+    swing(loop, START, 1.0, lambda t: 0.01, lambda t: 3e5 + 2e5 * t)
+    seen = swing(loop, START + 1000 * MS, 4.0, lambda t: 0.01, lambda t: P_ATM_PA)
+    assert all('stands still' in reason for _, reason, _ in seen)
 
 
 @pytest.mark.parametrize('contraction, pressure_pa', [

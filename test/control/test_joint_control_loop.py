@@ -124,7 +124,7 @@ def test_a_frozen_encoder_vents_both_muscles_until_the_joint_moves_again(joint, 
 def test_what_a_joint_may_do_is_not_taken_for_a_frozen_encoder(joint, loop, angle_rad, swing_pa):
     if angle_rad == 'upper':
         angle_rad = joint.range_rad[1]
-    for k in range(400):
+    for k in range(700):
         now = START_NS + k * 5 * MS_NS
         swing = swing_pa * math.sin(0.01 * k)
         loop.on_joint_state(JointAngle(now, angle_rad))
@@ -133,6 +133,34 @@ def test_what_a_joint_may_do_is_not_taken_for_a_frozen_encoder(joint, loop, angl
             loop.on_pressure(side, Pressure(now, pressure_pa))
         loop.tick(now)
         assert loop.reason == codes.REASONS[codes.OK]
+
+
+def test_a_frozen_encoder_is_not_forgotten_for_a_torque(joint, loop):
+    def drive(begin, ticks, difference_pa, torque=False):
+        for k in range(begin, begin + ticks):
+            now = START_NS + k * 5 * MS_NS
+            loop.on_joint_state(JointAngle(now, 0.1))
+            if torque:
+                loop.on_named_efforts(NamedEfforts(now, ('muscle',), (0.1,)))
+            else:
+                loop.on_joint_reference(AngleReference(now, 0.3, 0.0))
+            for side, sign in ((FLEXOR, 0.5), (EXTENSOR, -0.5)):
+                loop.on_pressure(side, Pressure(now, 3e5 + sign * difference_pa(k - begin)))
+            loop.tick(now)
+
+    drive(0, 100, lambda k: 4e3 * k)
+    assert loop.reason == codes.REASONS[codes.ANGLE_FROZEN]
+    drive(300, 100, lambda k: 0.0, torque=True)
+    assert loop.follows_torque and loop.reason == codes.REASONS[codes.OK]
+    drive(800, 1, lambda k: 0.0)
+    assert not loop.follows_torque and loop.reason == codes.REASONS[codes.ANGLE_FROZEN]
+
+
+@pytest.mark.parametrize('angle_rad', [20.0, -1.1])
+def test_an_angle_the_joint_does_not_have_is_refused_and_not_gone_to(joint, loop, angle_rad):
+    loop.on_joint_reference(AngleReference(START_NS, angle_rad, 0.0))
+    assert loop.references.reference is None and loop.rejected_references == 1
+    assert 'not within -1.02 to 1.02 rad' in loop.references.refusal
 
 
 def test_a_blocked_joint_may_be_given_any_torque(joint, loop):

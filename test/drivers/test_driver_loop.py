@@ -70,6 +70,11 @@ class Chain:
         return self.statuses[-1]
 
 
+def test_the_signal_that_vents_a_regulator_is_no_voltage_whatever_its_range():
+    loop = Chain('ppr', **{'ppr.lowest_v': 1.0}).loop
+    assert loop.safe_signal(START).efforts == SAFE['ppr']
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_follows_and_vents_when_the_controller_dies(valve):
     """The pressure arrives; 0.3 s after the last command the safe signal is out."""

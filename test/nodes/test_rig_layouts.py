@@ -27,16 +27,36 @@ def test_a_simulated_rig_has_a_watchdog_and_a_real_one_sensors():
     assert names(layouts.rig()) == [
         '/muscle/plant_simulator', '/muscle/sofc_controller', '/muscle/valve_driver',
         '/muscle/valve_watchdog']
-    real = layouts.rig('/leg', hardware='dummy', experiment='rest', record='bag')
+    real = layouts.rig('/leg', hardware='dummy', experiment='short_sine', record='bag')
     assert names(real) == [
         '/leg/experiment_recorder', '/leg/hardware_sensors', '/leg/reference_generator',
         '/leg/sofc_controller', '/leg/valve_driver']
+    assert {node.parameters['controller'] for node in real
+            if 'controller' in node.parameters} == {'sofc_ppr'}
     for node in real:
         awaited = node.parameters.get('await_subscriber')
         assert awaited == (
             None if node.name == 'experiment_recorder' else '/leg/experiment_recorder')
         assert node.parameter_file.endswith('dummy.yaml') == (
             node.name in ('valve_driver', 'hardware_sensors'))
+
+
+@pytest.mark.parametrize('experiment, valve, raw', [
+    ('multisine', 'ppr', False), ('decay', 'hsv', True), ('voltage_steps', 'ppr', True)])
+def test_no_controller_speaks_beside_an_experiment_in_pressure_or_raw_signals(
+        experiment, valve, raw):
+    nodes = {node.name: node.parameters
+             for node in layouts.rig(valve=valve, experiment=experiment, record='bag')}
+    assert 'sofc_controller' not in nodes
+    assert nodes['valve_driver'].get('accept_valve_command', False) is raw
+    assert nodes['experiment_recorder']['controller'] == ''
+    assert nodes['reference_generator']['valve_type'] == valve
+
+
+def test_a_force_is_tracked_by_a_controller_of_forces():
+    nodes = {node.name: node.parameters
+             for node in layouts.rig(rig='dmsp_5_300_isometric', experiment='force_sine')}
+    assert nodes['sofc_controller']['controller'] == 'sofc_force_ppr'
 
 
 def test_both_knees_have_all_nodes_their_names_and_seeds():
@@ -62,7 +82,9 @@ def test_every_node_has_its_place_in_the_order():
 
 @pytest.mark.parametrize('arguments, words', [
     (['knee', '--record', 'bag'], '--record'), (['exo', '--hardware', 'dummy'], '--hardware'),
-    (['rig', '--hardware', 'nothing'], 'nothing')])
+    (['rig', '--hardware', 'nothing'], 'nothing'),
+    (['rig', '--experiment', 'nowhere'], 'nowhere'),
+    (['rig', '--experiment', 'voltage_steps', '--valve', 'hsv'], 'voltage')])
 def test_a_mistake_is_one_sentence(arguments, words, capsys):
     assert main(['up', *arguments]) == 2
     assert words in capsys.readouterr().err

@@ -25,10 +25,19 @@ KINDS = ('sofc', 'pid')       # laws that can be wrapped
 _MODES = {FORCE.mode: ForceMode, JOINT.mode: JointMode}
 
 
+LARGE_JOINT_KG_M2 = 0.03      # moment of inertia: a leg, and not a rod on a bench
+
+
 def preset_for(experiment, rig):
     """Return the name of the self-organizing controller for an experiment's quantity."""
     mode = 'force_' if experiment.domain == FORCE.topic else ''
     return f'sofc_{mode}{rig.valve}'
+
+
+def joint_preset_for(joint, valve):
+    """Return the name of the self-organizing controller for a joint of this size."""
+    size = 'knee' if joint.parameters['inertia_kg_m2'] > LARGE_JOINT_KG_M2 else 'joint'
+    return f'sofc_{size}_{valve}'
 
 
 def read_mode(tree, rig):
