@@ -47,7 +47,6 @@ def report_reason(diagnostics, reason, well=FOLLOWING):
 class ControllerNode(ManagedNode):
     """Call a control law at its rate; on every way out command atmospheric pressure."""
 
-    ASYNCHRONOUS = True
     DEFAULT_CONTROLLERS = {}            # preset by valve
     PARAMETERS = (
         NodeParameter(

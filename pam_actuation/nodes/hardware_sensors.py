@@ -45,7 +45,6 @@ class HardwareSensors(ManagedNode):
 
     NAME = 'hardware_sensors'
     REALTIME_RANK = 2
-    ASYNCHRONOUS = True
     PARAMETERS = (
         NodeParameter('backend', 'iio_adc', 'What the sensors hang on.',
                       choices=tuple(SENSOR_INPUTS)),

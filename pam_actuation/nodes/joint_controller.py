@@ -48,7 +48,6 @@ class JointNode(LearningSwitch, ManagedNode):
 
     NAME = 'joint_controller'
     REALTIME_RANK = 1
-    ASYNCHRONOUS = True
     PARAMETERS = (
         NodeParameter(
             'controller', '', 'Controller preset or file with mode joint. Empty: the preset '

@@ -91,9 +91,6 @@ class ManagedNode(LifecycleNode):
     NAME = ''
     STUCK_AFTER_S = 2.0         # how long the way out may take
     REALTIME_RANK = 0           # added to a real-time priority: among equals nobody gives way
-    # Whether a thread of the middleware does the sending: a tick does not wait for a receiver
-    # that holds its port, but what was sent last may be lost if the process is killed.
-    ASYNCHRONOUS = False
     FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
     PARAMETERS = ()
 

@@ -29,7 +29,6 @@ class PhysicsNode(ManagedNode):
     Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
     """
 
-    ASYNCHRONOUS = True
     plant = None
     _latency = None
 

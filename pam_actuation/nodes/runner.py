@@ -25,7 +25,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 import traceback
 
 from pam_actuation.nodes import own_port
@@ -40,8 +39,6 @@ SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'S
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
-SENDING_S = 0.05            # for the thread of the middleware
-PUBLICATION_MODE = 'RMW_FASTRTPS_PUBLICATION_MODE'      # other middlewares do not look at it
 
 
 class _Stopper(threading.Thread):
@@ -77,8 +74,6 @@ class _Stopper(threading.Thread):
         if not self.safe.wait(limit_s):
             try:
                 self.node.safe_stop(f'{self.reason}, the loop did not answer')
-                if self.node.ASYNCHRONOUS:
-                    time.sleep(SENDING_S)
             finally:
                 os._exit(1)
 
@@ -146,15 +141,8 @@ def run(node_class, args=None):
 
 
 def _new(node_class, args):
-    asked_for = os.environ.get(PUBLICATION_MODE)
-    if node_class.ASYNCHRONOUS and asked_for is None:
-        os.environ[PUBLICATION_MODE] = 'ASYNCHRONOUS'
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        return node_class()
-    finally:
-        if asked_for is None:
-            os.environ.pop(PUBLICATION_MODE, None)      # not for processes this one starts
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    return node_class()
 
 
 def _end(node, why):
