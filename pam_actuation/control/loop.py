@@ -25,14 +25,15 @@ input                                          what the loop does
 no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
-contraction the same to the last bit for       vents until 2 s after it has changed
+contraction the same to the last bit for       vents until it has changed, 2 s at least
 0.2 s while the pressure changed by 150 kPa
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
 reference silent for more than 0.5 s           holds the last position, learning frozen
 reference silent for more than 2 s             vents
-a reference or trajectory that is not finite   that message is ignored
+a reference or trajectory that is not finite,  that message is ignored and counted
+out of reach or from the future
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
@@ -43,13 +44,12 @@ import math
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.frozen import FrozenMeasurement
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
-from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.reference_buffer import MAX_AHEAD_NS, ReferenceBuffer
 from pam_actuation.control.tick import TickCore, TickInputs
 from pam_actuation.messages import ControllerState, Pressure
 from pam_sim.errors import InputError
 
 MAX_AGE_NS = 100_000_000
-MAX_AHEAD_NS = 20_000_000
 STALL_NS = 250_000_000
 _FORCE_MARGIN = 1.5       # of the largest force in the table: above, the load cell is wrong
 # Codes of: none yet, too old, too far ahead, not finite, implausible.

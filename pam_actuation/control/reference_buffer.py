@@ -29,7 +29,7 @@ is interpolated (cubic through positions and rates). Rules:
 * After ``LOST_S`` without either the reference is lost: the last position is held with
   zero rate until ``HOLD_S``, then there is none and the muscle is to be vented. A new
   message resumes at once.
-* A reference stamped more than ``AHEAD_S`` ahead, or a trajectory whose first point is more
+* A reference stamped more than ``MAX_AHEAD_NS`` ahead, or a trajectory whose first point is more
   than ``TRAJECTORY_LIFE_S`` ahead, does not count: it could not grow old.
 """
 
@@ -42,7 +42,7 @@ TRAJECTORY_LIFE_S = 1.0
 TRUST_S = 0.2
 LOST_S = 0.5
 HOLD_S = 2.0
-AHEAD_S = 0.02
+MAX_AHEAD_NS = 20_000_000       # of the stamp of any input
 
 # By what is tracked: fields of value and rate in the messages, and the rate [unit/s] beyond
 # what the points say that is a jump. 4 rad/s are about 0.05 m/s on a small pulley.
@@ -131,10 +131,10 @@ class ReferenceBuffer:
 
     def refuse_ahead(self, now_ns):
         """Forget what is stamped too far ahead of a time."""
-        limit_ns = now_ns + AHEAD_S * 1e9
+        limit_ns = now_ns + MAX_AHEAD_NS
         if self.reference is not None and self.reference.stamp_ns > limit_ns:
             if self.reference is not self._accepted:
-                self._refuse(f'a reference is stamped more than {AHEAD_S:g} s ahead')
+                self._refuse(f'a reference is stamped more than {MAX_AHEAD_NS * 1e-9:g} s ahead')
             # The clock may have been set back: then the former one is ahead as well.
             former = self._accepted
             self.reference = former if former and former.stamp_ns <= limit_ns else None

@@ -106,8 +106,7 @@ class ControllerNode(ManagedNode):
         """Begin without memory of a former run; what was learned stays."""
         self._last_ns = None
         if not self.participants:           # in lockstep what waits is of the first tick
-            for subscription in self.subscriptions_polled:
-                subscription.take()
+            self.discard_arrived()
             self.loop.forget()
         self.add_loop(1.0 / self.controller.rate_hz)
 

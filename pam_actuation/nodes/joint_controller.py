@@ -98,8 +98,7 @@ class JointNode(LearningSwitch, ManagedNode):
 
     def start(self):
         """Begin without memory of a former run; what was learned stays."""
-        for subscription in self.subscriptions_polled:
-            subscription.take()
+        self.discard_arrived()
         self.loop.forget()
         self.add_loop(1.0 / self.loop.rate_hz)
 

@@ -210,6 +210,11 @@ class ManagedNode(LifecycleNode):
         self.subscriptions_polled.append(subscription)
         return subscription
 
+    def discard_arrived(self):
+        """Take what waits in the subscriptions and forget it."""
+        for subscription in self.subscriptions_polled:
+            subscription.take()
+
     def add_loop(self, period_s, poll_s=None):
         """
         Run ``tick`` every ``period_s`` on the steady clock while active.

@@ -115,16 +115,18 @@ def played(experiment, rig, valve, controller='', presets=None):
         In the experiment, or where the rig cannot do it.
 
     """
+    name = controller or (presets or {}).get(valve)
     if not experiment:
-        return controller or (presets or {}).get(valve, f'sofc_{valve}'), False
+        return name or f'sofc_{valve}', False
     from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
     from pam_sim import load_rig
     wanted, model = load_experiment(experiment), load_rig(rig, valve=valve)
     wanted.check_reachable(model)
-    name = ''
-    if wanted.tracked:
-        name = controller or (presets or {}).get(valve) or preset_for(wanted, model)
+    if not wanted.tracked:
+        name = ''
+    elif not name:
+        name = preset_for(wanted, model)
     return name, wanted.sends_valve_command(valve)
 
 

@@ -28,6 +28,7 @@ import time
 
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.layouts import ORDER
+from pam_actuation.rigging.plan import DRIVER, RECORDER
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S)
@@ -35,7 +36,6 @@ from pam_sim.errors import InputError
 
 START_TIMEOUT_S = 60.0
 VENT_S = 0.6                  # for the air, before the plant stops
-DRIVER, RECORDER = 'valve_driver', 'experiment_recorder'
 
 
 class Supervisor:

@@ -165,12 +165,6 @@ def test_a_node_can_be_stopped_and_started_again(rig):
     wait_for(lambda: rig.health['valve_driver'][-1].level == 0, 3.0, 'the driver')
 
 
-def longest_wait_s(rig, topic, since_s):
-    """Return the longest time between two messages of a topic, from half a second before on."""
-    times = [heard.time_s for heard in rig.heard[topic] if heard.time_s > since_s - 0.5]
-    return max(b - a for a, b in zip(times, [*times[1:], time.monotonic()]))
-
-
 def test_a_killed_controller_lets_the_driver_vent_and_say_why(rig):
     wait_for(lambda: rig.heard['valve_signal'][-1].plain.efforts[0] > 1.0, 5.0, 'pressure')
     killed_s = time.monotonic()
@@ -185,10 +179,7 @@ def test_a_killed_controller_lets_the_driver_vent_and_say_why(rig):
     last_command_ns = rig.heard['pressure_command'][-1].plain.stamp_ns
     assert vented()[0].plain.stamp_ns - last_command_ns < 300_000_000
     wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 5.0, 'the reason')
-    why = rig.health['valve_driver'][-1].message
-    # Fast DDS may hold up the readings as well, where the killed process held a lock of it.
-    assert 'no valid pressure command' in why or (
-        'no valid measured pressure' in why and longest_wait_s(rig, 'pressure', killed_s) > 0.1)
+    assert 'no valid pressure command' in rig.health['valve_driver'][-1].message
     assert rig.processes['valve_driver'].running
 
 
