@@ -33,7 +33,8 @@ from pam_actuation.rigging.client import local_context
 import rclpy
 
 def numbered():
-    return [name for name in OwnPorts().names() if len(name) > len('fastrtps_port7001')]
+    # those of the participant; the ones of its multicasts, below, have the same name in any domain
+    return [name for name in OwnPorts().names() if int(name.removeprefix('fastrtps_port')) > 7400]
 
 def new():
     node = rclpy.create_node('one', context=local_context(int(sys.argv[1])))
