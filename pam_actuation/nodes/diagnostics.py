@@ -25,7 +25,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Status
 from pam_actuation.nodes.conversions import diagnostic_array
 from pam_actuation.nodes.endpoints import CountedPublisher
-from pam_actuation.nodes.own_port import PortWatch
 
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 SHORTEST_INTERVAL_NS = 20_000_000    # a message that changes with every tick is not a flood
@@ -51,7 +50,6 @@ class DiagnosticsReporter:
         self.silent = True
         self._sent = None
         self._sent_ns = 0
-        self._ports = PortWatch()
 
     def update(self, level, message, values=()):
         """Set the state; send it at once when level or message changed."""
@@ -68,14 +66,8 @@ class DiagnosticsReporter:
             return
         now_ns = self._node.now_ns()
         self._sent, self._sent_ns = (self.level, self.message), now_ns
-        level, message = self.level, self.message
-        lost = self._ports.removed()
-        if lost:
-            level = max(level, WARN)
-            message += (f'; other processes removed its shared-memory port '
-                        f'({", ".join(sorted(lost))}) and may not be heard: start this node anew')
         self.publisher.publish(diagnostic_array(Status(
-            now_ns, level, self._node.get_fully_qualified_name(), message,
+            now_ns, self.level, self._node.get_fully_qualified_name(), self.message,
             (*self.values, *self._node.diagnostic_values(), *self._counts()))))
 
     def _counts(self):

@@ -27,8 +27,8 @@ import sys
 import threading
 import traceback
 
-from pam_actuation.nodes import own_port
 from pam_actuation.nodes.diagnostics import WARN
+from pam_actuation.nodes.transport import avoid_shared_memory
 from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -101,7 +101,9 @@ def run(node_class, args=None):
     """
     stopper = _Stopper()
     try:
-        node = own_port.create(lambda: _new(node_class, args), _end)
+        avoid_shared_memory()
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = node_class()
     except InputError as error:
         return _refuse(node_class, error)
     except Exception as error:
@@ -138,17 +140,6 @@ def run(node_class, args=None):
         node.destroy_node()
         rclpy.try_shutdown()
     return node.exit_code or node.result_code
-
-
-def _new(node_class, args):
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    return node_class()
-
-
-def _end(node, why):
-    node.get_logger().warning(why)
-    node.destroy_node()
-    rclpy.shutdown()
 
 
 def _serve(node, executor, ended):

@@ -20,8 +20,8 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from pam_actuation.nodes import own_port
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.transport import avoid_shared_memory
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -40,6 +40,7 @@ def local_context(domain_id, arguments=()):
     context = rclpy.Context()
     before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    avoid_shared_memory()
     try:
         rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
                    signal_handler_options=SignalHandlerOptions.NO)
@@ -49,17 +50,6 @@ def local_context(domain_id, arguments=()):
         else:
             os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
     return context
-
-
-def _new_node(domain_id):
-    context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
-    return Node(NAME, context=context, use_global_arguments=False, enable_rosout=False,
-                start_parameter_services=False)
-
-
-def _end(node):
-    node.destroy_node()
-    rclpy.try_shutdown(context=node.context)
 
 
 class RigClient:
@@ -81,7 +71,9 @@ class RigClient:
     """
 
     def __init__(self, domain_id):
-        self.node = own_port.create(lambda: _new_node(domain_id), lambda node, _: _end(node))
+        context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
+        self.node = Node(NAME, context=context, use_global_arguments=False, enable_rosout=False,
+                         start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self.node.context)
         self._executor.add_node(self.node)
         self._clients = {}
@@ -173,4 +165,5 @@ class RigClient:
     def close(self):
         """Leave the graph."""
         self._executor.shutdown(timeout_sec=1.0)
-        _end(self.node)
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.node.context)

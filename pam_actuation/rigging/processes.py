@@ -21,6 +21,8 @@ import signal
 import subprocess
 import sys
 
+from pam_actuation.nodes.transport import avoid_shared_memory
+
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
 PR_SET_PDEATHSIG = 1
@@ -29,7 +31,7 @@ TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 def node_environment(domain_id, log_dir):
     """
-    Return the environment of the nodes: one domain, this machine only, one thread each.
+    Return the environment of the nodes: one domain, this machine only by UDP, one thread each.
 
     Parameters
     ----------
@@ -45,6 +47,7 @@ def node_environment(domain_id, log_dir):
         ROS_DOMAIN_ID=str(domain_id), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
         ROS_LOG_DIR=str(log_dir), PYTHONPATH=os.pathsep.join(search),
         OPENBLAS_NUM_THREADS='1', OMP_NUM_THREADS='1', NUMBA_NUM_THREADS='1')
+    avoid_shared_memory(environment)
     return environment
 
 

@@ -23,6 +23,7 @@ from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES, RosWriter
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 import rclpy
@@ -70,8 +71,7 @@ class LiveRig:
 
         ``topics`` are types by topic, ``None`` for all of a muscle.
         """
-        self._context = rclpy.Context()
-        rclpy.init(context=self._context, domain_id=self.domain_id, args=[])
+        self._context = local_context(self.domain_id)
         self.node = Node('listener', namespace=self._namespace, context=self._context)
         for topic, message_type in (topics or MESSAGE_TYPES).items():
             self.hear(message_type, topic, self._hearer(topic))

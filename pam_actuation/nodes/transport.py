@@ -1,0 +1,56 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How Fast DDS, below ROS 2, moves the messages of a process: through UDP, not shared memory.
+
+Fast DDS guards each shared-memory port by a lock that lies in the shared memory itself. A process
+that is killed or stopped while it holds the lock holds up all who send there for 1 s (fixed when
+Fast DDS is built: ``BOOST_INTERPROCESS_TIMEOUT_WHEN_LOCKING_DURATION_MS`` in its
+``boostconfig.hpp``), and one that takes the place of a killed one may never be heard (Fast DDS
+issues 5053, 5469). A driver must not be held up by a node that has died; UDP has no such lock.
+"""
+
+import os
+
+from pam_actuation.resources import config_dir
+
+PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+
+
+def avoid_shared_memory(environment=os.environ):
+    """
+    Let participants created later in this process receive through UDP.
+
+    What the user has chosen stays: a profile file of his own, or transports. Where ROS looks
+    at this machine only, rmw_fastrtps adds shared memory itself, whatever the transports; a
+    profile then says where to receive. Other middleware ignores both variables.
+
+    Parameters
+    ----------
+    environment : dict of str
+        The variables, changed in place; default: those of this process.
+
+    Raises
+    ------
+    InputError
+        The profile is missing: the installation is incomplete.
+
+    """
+    if PROFILES in environment or environment.setdefault(TRANSPORTS, 'UDPv4') != 'UDPv4':
+        return
+    if (environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
+            or environment.get('ROS_LOCALHOST_ONLY') == '1'):
+        environment[PROFILES] = str(config_dir() / 'middleware' / 'fastdds_loopback.xml')
