@@ -28,7 +28,7 @@ import threading
 import traceback
 
 from pam_actuation.nodes.diagnostics import WARN
-from pam_actuation.nodes.transport import avoid_shared_memory
+from pam_actuation.nodes.transport import prepare_middleware
 from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -101,7 +101,7 @@ def run(node_class, args=None):
     """
     stopper = _Stopper()
     try:
-        avoid_shared_memory()
+        prepare_middleware()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
     except InputError as error:

@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.transport import avoid_shared_memory
+from pam_actuation.nodes.transport import prepare_middleware
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -40,7 +40,7 @@ def local_context(domain_id, arguments=()):
     context = rclpy.Context()
     before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    avoid_shared_memory()
+    prepare_middleware()
     try:
         rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
                    signal_handler_options=SignalHandlerOptions.NO)

@@ -21,7 +21,7 @@ import signal
 import subprocess
 import sys
 
-from pam_actuation.nodes.transport import avoid_shared_memory
+from pam_actuation.nodes.transport import prepare_middleware
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
@@ -47,7 +47,7 @@ def node_environment(domain_id, log_dir):
         ROS_DOMAIN_ID=str(domain_id), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
         ROS_LOG_DIR=str(log_dir), PYTHONPATH=os.pathsep.join(search),
         OPENBLAS_NUM_THREADS='1', OMP_NUM_THREADS='1', NUMBA_NUM_THREADS='1')
-    avoid_shared_memory(environment)
+    prepare_middleware(environment)
     return environment
 
 

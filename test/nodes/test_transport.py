@@ -19,7 +19,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-from pam_actuation.nodes.transport import avoid_shared_memory, PROFILES, TRANSPORTS
+from pam_actuation.nodes.transport import LOOPBACK, NETWORK, prepare_middleware
+from pam_actuation.nodes.transport import PROFILES, TRANSPORTS
 from pam_actuation.rigging.processes import node_environment
 import pytest
 
@@ -44,31 +45,38 @@ print(heard[0], *(line.split('/')[-1].strip() for line in open('/proc/self/maps'
 """
 
 
-@pytest.mark.parametrize('given', [LOCAL, {'ROS_LOCALHOST_ONLY': '1'}])
-def test_udp_on_this_machine_needs_a_profile(given):
+def profile(**given):
+    """Return the name of the profile and the transports that are set beside some variables."""
     environment = dict(given)
-    avoid_shared_memory(environment)
-    assert environment[TRANSPORTS] == 'UDPv4'
-    assert Path(environment[PROFILES]).is_file()
+    prepare_middleware(environment)
     once = dict(environment)
-    avoid_shared_memory(environment)
+    prepare_middleware(environment)
     assert environment == once
+    assert Path(environment[PROFILES]).is_file()
+    return Path(environment[PROFILES]).name, environment[TRANSPORTS]
+
+
+def test_udp_on_this_machine_needs_a_profile():
+    assert profile(**LOCAL) == (LOOPBACK, 'UDPv4')
+    assert profile(ROS_LOCALHOST_ONLY='1') == (LOOPBACK, 'UDPv4')
 
 
 def test_udp_in_a_network_needs_none():
+    assert profile() == (NETWORK, 'UDPv4')
+    assert profile(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET') == (NETWORK, 'UDPv4')
+
+
+def test_child_may_look_less_far_than_its_parent():
     environment = {}
-    avoid_shared_memory(environment)
-    assert environment == {TRANSPORTS: 'UDPv4'}
-    environment.update(LOCAL)           # as for the child of a process that looks further
-    avoid_shared_memory(environment)
-    assert PROFILES in environment
+    prepare_middleware(environment)
+    assert profile(**environment, **LOCAL) == (LOOPBACK, 'UDPv4')
 
 
-@pytest.mark.parametrize('chosen', [{PROFILES: '/home/me/profile.xml'}, {TRANSPORTS: 'SHM'}])
-def test_choice_of_the_user_stays(chosen):
-    environment = {**LOCAL, **chosen}
-    avoid_shared_memory(environment)
-    assert environment == {**LOCAL, **chosen}
+def test_choice_of_the_user_stays():
+    environment = {**LOCAL, PROFILES: '/home/me/profile.xml'}
+    prepare_middleware(environment)
+    assert environment == {**LOCAL, PROFILES: '/home/me/profile.xml'}
+    assert profile(**LOCAL, **{TRANSPORTS: 'SHM'}) == (NETWORK, 'SHM')
 
 
 @pytest.mark.ros
