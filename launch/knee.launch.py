@@ -108,7 +108,8 @@ def generate_launch_description():
         for node, reason in (
             (reference, 'the experiment is over'), (plant, 'the joint ended'),
             (controller, 'the controller ended'),
-            *((driver, 'a valve driver ended') for driver in drivers))]
+            *((driver, 'a valve driver ended') for driver in drivers),
+            *((watchdog, 'a watchdog ended') for watchdog in watchdogs))]
     return LaunchDescription(
         [*_arguments(), plant, *drivers, *watchdogs, controller, reference, *ends])
 

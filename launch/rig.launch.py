@@ -152,7 +152,7 @@ def generate_launch_description():
         for node, reason in (
             (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
             (plant, 'the plant ended'), (sensors, 'the sensors ended'),
-            (recorder, 'the recorder ended'))]
+            (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'))]
     return LaunchDescription(
         [*_arguments(), OpaqueFunction(function=_note_what_is_needed), *nodes, *ends])
 

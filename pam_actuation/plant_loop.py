@@ -138,6 +138,42 @@ class PlantClock:
         return count
 
 
+class Backlog:
+    """
+    Holds back what arrives just after the plant stood still, until the rest is there.
+
+    A process that was stopped finds its clock far ahead and its messages still on their way
+    through the middleware. Physics that went on at once would let the valve signal from before
+    act all that time: a filling valve would fill a muscle that was vented long ago.
+
+    Parameters
+    ----------
+    after_s : float
+        Time between two calls [s] from which it was a standstill.
+    patience_s : float
+        How long the messages may take to arrive then [s].
+
+    """
+
+    def __init__(self, after_s=0.05, patience_s=0.02):
+        self._after_ns = round(after_s * _NS)
+        self._patience_ns = round(patience_s * _NS)
+        self._last_ns = None
+        self._until_ns = 0
+        self._held = []
+
+    def take(self, now_ns, arrived):
+        """Return what is to be applied now, as a list; None while more may be on its way."""
+        last_ns, self._last_ns = self._last_ns, now_ns
+        if last_ns is not None and now_ns - last_ns > self._after_ns:
+            self._until_ns = now_ns + self._patience_ns
+        self._held += arrived
+        if last_ns is not None and last_ns <= now_ns < self._until_ns:
+            return None
+        taken, self._held = self._held, []
+        return taken
+
+
 class PlantLoop(PlantClock):
     """
     A live plant of one muscle on a clock.

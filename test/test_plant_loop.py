@@ -17,7 +17,7 @@
 import math
 
 from pam_actuation.messages import Force, ValveSignal
-from pam_actuation.plant_loop import PlantLoop
+from pam_actuation.plant_loop import Backlog, PlantLoop
 import pam_sim
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -130,3 +130,17 @@ def test_noise_and_jitter_from_the_rig():
     assert samples[0]['supply_pressure'].pressure_pa == pytest.approx(801_325.0)
     assert str(read(1)) == str(samples)
     assert str(read(2)) != str(samples)
+
+
+def test_what_arrives_after_a_standstill_waits_for_the_rest():
+    """Nothing for 20 ms, then all of it; on time everything at once."""
+    backlog = Backlog(after_s=0.05, patience_s=0.02)
+    assert backlog.take(START, ['a']) == ['a']
+    assert backlog.take(START + 40 * MS, []) == []
+    back = START + 1000 * MS
+    assert backlog.take(back, []) is None
+    assert backlog.take(back + 1 * MS, ['b', 'c']) is None
+    assert backlog.take(back + 19 * MS, ['d']) is None
+    assert backlog.take(back + 20 * MS, ['e']) == ['b', 'c', 'd', 'e']
+    assert backlog.take(back + 21 * MS, ['f']) == ['f']
+    assert backlog.take(START, ['g']) == ['g']          # a clock that was set back waits for none

@@ -18,8 +18,10 @@ The controller of a joint on a clock: messages in, two pressure commands and sta
 No ROS inside. The faults of its inputs are handled as by ``loop.ControllerLoop``, with the
 joint angle in place of the contraction; while it does not run, both muscles are vented. While
 a torque is followed the joint may well be blocked: a frozen angle is looked for only otherwise.
-A missing pressure or force of either muscle is not used. A wanted co-contraction counts
-until the next one; one that is not finite is ignored, one beyond the limits stops there.
+A missing force of either muscle is not used, nor is a pressure that was never measured. Where
+one muscle is not under air although it should be, or its pressure is lost, both are vented.
+A wanted co-contraction counts until the next one; one that is not finite is ignored, one beyond
+the limits stops there.
 
 A wanted torque is followed in place of an angle where no wish of an angle is fresh, 0.5 s
 after the last ``joint_reference`` or the end of a trajectory. It counts for 0.1 s; then both
@@ -39,6 +41,7 @@ from pam_actuation.control.loop import (
 from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.slack_muscle import SlackMuscle
 from pam_actuation.messages import ControllerState, Pressure
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
@@ -95,6 +98,7 @@ class JointControllerLoop:
         self._range = lower, upper
         self._frozen = FrozenMeasurement(
             lower + _STOP_RAD, upper - _STOP_RAD, JOINT_SWING_PA)
+        self._slack = SlackMuscle(), SlackMuscle()      # flexor, extensor
         self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
@@ -118,7 +122,8 @@ class JointControllerLoop:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
-        self._frozen.forget()
+        for muscle in (self._frozen, *self._slack):
+            muscle.forget()
         self.follows_torque = False
         self._trajectory = self._angle = None
         self._pressures, self._forces = [None, None], [None, None]
@@ -234,11 +239,17 @@ class JointControllerLoop:
         reason = measurement_reason(self._angle, angle, self._range, _REASONS, now_ns)
         if reason != codes.OK:
             return reason
+        pressures_pa = self._fresh_pressures_pa(now_ns)
+        wanted_pa = self._commands_pa or (P_ATM_PA, P_ATM_PA)
+        # Both are asked, each for its own sake.
+        if any([muscle.judge(now_ns, *pair) for muscle, pair in zip(
+                self._slack, zip(wanted_pa, pressures_pa))]):
+            return codes.MUSCLE_SLACK
         if self.follows_torque:
             self._frozen.pause()
             self._frozen.judge(now_ns, self._angle.stamp_ns, angle, math.nan)
             return codes.OK if self.efforts.fresh(now_ns) else codes.EFFORT_LOST
-        flexor_pa, extensor_pa = self._fresh_pressures_pa(now_ns)
+        flexor_pa, extensor_pa = pressures_pa
         if self._frozen.judge(now_ns, self._angle.stamp_ns, angle, flexor_pa - extensor_pa):
             return codes.ANGLE_FROZEN
         return REFERENCE_REASONS[self.references.state(now_ns)]

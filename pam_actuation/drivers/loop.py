@@ -67,6 +67,7 @@ class DriverLoop:
         self.ticks = 0
         self.late_ticks = 0
         self.saturated_ticks = 0
+        self.saturated_s = 0.0
         self._last_ns = None
         self._law_ns = None
         self._used_stamp_ns = None
@@ -134,6 +135,8 @@ class DriverLoop:
         self._efforts = efforts
         if decision.pressure_pa is not None and self.law.saturated:
             self.saturated_ticks += 1
+            if self._last_ns is not None:
+                self.saturated_s += max(now_ns - self._last_ns, 0) / _NS
         self._last_ns = now_ns
         return self._signal(now_ns, efforts), self._status(now_ns, decision)
 
@@ -235,6 +238,7 @@ class DriverLoop:
             ('commands_out_of_order', str(safety.order.steps_back)),
             ('saturation', ('low', 'none', 'high')[self.law.saturated + 1]),
             ('saturated_ticks', str(self.saturated_ticks)),
+            ('saturated_s', f'{self.saturated_s:.3f}'),
             ('vents', str(safety.vents)),
         ]
         if safety.supply.received:

@@ -22,7 +22,7 @@ passed in, so that live nodes, simulation and replay give the same answers.
 from collections import deque
 import math
 
-from pam_sim.units import gauge_kpa
+from pam_sim.units import gauge_kpa, P_ATM_PA
 
 NS_PER_S = 1_000_000_000
 _NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all bits set
@@ -124,8 +124,15 @@ class FrozenMonitor:
             self.frozen = False
 
     def flow(self, change_pa):
-        """Add the pressure change [Pa] expected from the flow of one tick."""
+        """
+        Add the pressure change [Pa] expected from the flow of one tick.
+
+        Emptying ends at the atmosphere: a sensor that reads a little above it at rest, and
+        always the same, is not frozen.
+        """
         self.expected_pa += change_pa
+        if self._value_pa is not None:
+            self.expected_pa = max(self.expected_pa, min(P_ATM_PA - self._value_pa, 0.0))
 
     def check(self, stamp_ns, room_pa=math.inf):
         """

@@ -192,6 +192,10 @@ class SafetySupervisor:
         self._pending['command'].clear()
         return True, f'Reset; it was: {text}. Waiting for a new pressure_command.'
 
+    def take_over(self, former):
+        """Start with what is latched in the supervisor of the driver as it was before."""
+        self._latched = former._latched
+
     def tick(self, now_ns):
         """Take the queued messages and return the Decision for ``now_ns``."""
         fault = self._clock(now_ns)

@@ -37,10 +37,13 @@ class SignalWatchdog:
         One of ``WAITING``, ``HEARS``, ``RESTS``, ``VENTS``.
     vents : int
         How often it has vented.
+    valve_type : {'ppr', 'hsv'}
+        The valve for which it speaks: that of the driver it heard last.
 
     Parameters
     ----------
     valve_type : {'ppr', 'hsv'}
+        Assumed until the driver is heard.
     timeout_s : float
         Silence [s] from which it vents.
 
@@ -49,8 +52,7 @@ class SignalWatchdog:
     def __init__(self, valve_type, timeout_s):
         self.state = WAITING
         self.vents = 0
-        self._names = VALVE_NAMES[valve_type]
-        self._safe = SAFE_EFFORTS[valve_type]
+        self.valve_type = valve_type
         self._timeout_ns = round(timeout_s * 1e9)
         self._heard_ns = None
         self._last = None
@@ -62,6 +64,10 @@ class SignalWatchdog:
             self._own_stamps.discard(message.stamp_ns)
             return
         self._heard_ns, self._last = now_ns, message
+        # A signal for the other valve would vent nothing, whatever this one was told.
+        for valve_type, names in VALVE_NAMES.items():
+            if set(names) <= {*message.names}:
+                self.valve_type = valve_type
 
     def tick(self, now_ns):
         """Return the safe ValveSignal to send, None while there is nothing to say."""
@@ -77,9 +83,10 @@ class SignalWatchdog:
             self.vents += 1
         self.state = VENTS
         self._own_stamps.add(now_ns)
-        return ValveSignal(now_ns, self._names, self._safe)
+        return ValveSignal(now_ns, VALVE_NAMES[self.valve_type], SAFE_EFFORTS[self.valve_type])
 
     def _vented(self):
         """Tell whether the last signal heard is the safe one."""
         efforts = dict(zip(self._last.names, self._last.efforts))
-        return tuple(efforts.get(name) for name in self._names) == self._safe
+        return SAFE_EFFORTS[self.valve_type] == tuple(
+            efforts.get(name) for name in VALVE_NAMES[self.valve_type])

@@ -58,7 +58,8 @@ class JointLoops:
         Run one period; return the commands of flexor and extensor as ``Pressure``.
 
         ``instead``: measurements by topic in place of those of the plant, None for one that
-        is missing; ``joint_state``, ``pressure`` and ``force`` (of both muscles).
+        is missing; ``joint_state``, ``pressure`` and ``force`` (of both muscles), or those
+        of one, such as ``flexor/pressure``.
         """
         self.now_ns += self.period_ns
         self.plant.advance_to(self.now_ns)
@@ -67,7 +68,8 @@ class JointLoops:
         control.on_joint_state(instead.get('joint_state', measured['joint_state']))
         for k, side in enumerate(SIDES):
             for topic, take in (('pressure', control.on_pressure), ('force', control.on_force)):
-                take(k, instead.get(topic, measured[f'{side}/{topic}']))
+                one = f'{side}/{topic}'
+                take(k, instead.get(one, instead.get(topic, measured[one])))
         commands, self.state = control.tick(self.now_ns)
         self.ticks += 1
         for k, (side, driver) in enumerate(zip(SIDES, self.drivers)):

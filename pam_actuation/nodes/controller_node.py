@@ -59,6 +59,7 @@ class ControllerNode(ManagedNode):
 
     learning = False
     loop = None
+    state = None            # what was sent last as controller_state
 
     def setup(self):
         """Load the controller, create the topics."""
@@ -120,9 +121,9 @@ class ControllerNode(ManagedNode):
             old = self.participants and topic not in MEASURED
             for message, _ in subscription.take_before(now_ns) if old else subscription.take():
                 handler(message)
-        command, state = self.loop.tick(now_ns, self.learning)
+        command, self.state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
-        self.send('controller_state', state)
+        self.send('controller_state', self.state)
         self._refusals.note(self.loop.references.refusal)
         report_reason(self.diagnostics, self.loop.reason)
 

@@ -123,6 +123,8 @@ class PolledSubscription:
         self._wait_set = None
         self.topic = self._subscription.topic_name
         self.received = 0
+        self.lost = 0               # by the sequence numbers of a single publisher
+        self._sequence = None
         self.newest = None          # the message taken or collected last
 
     def take(self, limit=2000):
@@ -151,6 +153,7 @@ class PolledSubscription:
                 item = handle.take_message(self._type, self._raw)
                 if item is None:
                     return
+                self._count_lost(item[1]['publication_sequence_number'])
                 if self._read is not None:
                     item = self._read(item[0]), item[1]
                 if item[0] is None:         # dropped, as the middleware does with message objects
@@ -158,6 +161,11 @@ class PolledSubscription:
                 waiting.append(item)
                 self.newest = item[0]
                 self.received += 1
+
+    def _count_lost(self, sequence):
+        last, self._sequence = self._sequence, sequence
+        if last is not None and sequence > last + 1 and self.publishers == 1:
+            self.lost += sequence - last - 1
 
     def wait(self, timeout_s):
         """Wait until a message arrives, at most ``timeout_s``; the processor is free meanwhile."""

@@ -55,7 +55,8 @@ class JointNode(LearningSwitch, ManagedNode):
         NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint the controller is made for: '
                       'preset or path.'),
         NodeParameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
-        NodeParameter('learning', True, 'Whether the rules change while running.'),
+        NodeParameter(
+            'learning', True, 'Whether the rules change while running.', live=True),
     )
 
     loop = None
@@ -75,7 +76,6 @@ class JointNode(LearningSwitch, ManagedNode):
             load_controller(name, joint), joint, self.value('muscle'))
         self._description = self.create_publisher(String, 'robot_description', qos.LATCHED)
         self._description.publish(String(data=joint_urdf(joint, self.value('muscle'))))
-        self.learning = self.value('learning')
         self._commands = [f'{side}/pressure_command' for side in SIDES]
         for topic in (*self._commands, 'controller_state'):
             self.add_publisher(topic)

@@ -16,6 +16,7 @@
 
 import sys
 
+from pam_actuation.nodes import qos
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
@@ -56,7 +57,8 @@ class JointSimulator(PhysicsNode):
                 topics += ('supply_pressure',)
             for topic in topics:
                 self.add_publisher(f'{side}/{topic}')
-            self.signals[side] = self.add_subscription(f'{side}/valve_signal')
+            self.signals[side] = self.add_subscription(
+                f'{side}/valve_signal', qos.PHYSICS)
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""

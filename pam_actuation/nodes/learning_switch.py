@@ -12,23 +12,38 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The service that freezes the rules of a controller, for every node that has rules."""
+"""What freezes the rules of a controller: a parameter and a service, for nodes with rules."""
 
+from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
 
 class LearningSwitch:
-    """Mixed into a ManagedNode: ``learning`` and the service ``~/freeze_learning``."""
+    """
+    Mixed into a ManagedNode with the live parameter ``learning``.
+
+    The service ``~/freeze_learning`` sets that parameter; ``learning`` is what the loop reads.
+    """
 
     learning = False
+    _follows_parameter = False
 
     def create_freeze_service(self):
-        """Offer the service; return it."""
+        """Follow the parameter from now on and offer the service; return it."""
+        self.learning = self.value('learning')
+        if not self._follows_parameter:
+            self.add_post_set_parameters_callback(self._on_parameters)
+            self._follows_parameter = True
         return self.create_service(SetBool, '~/freeze_learning', self._freeze)
 
+    def _on_parameters(self, parameters):
+        for parameter in parameters:
+            if parameter.name == 'learning':
+                with self.loops.lock:
+                    self.learning = parameter.value
+
     def _freeze(self, request, response):
-        with self.loops.lock:
-            self.learning = not request.data
+        self.set_parameters([Parameter('learning', value=not request.data)])
         response.success = True
         response.message = 'learning is on' if self.learning else 'learning is frozen'
         return response

@@ -152,7 +152,8 @@ class ManagedNode(LifecycleNode):
 
     def diagnostic_values(self):
         """Return (key, value) pairs that every status of this node shows."""
-        return self.timing.values() if self.timing else ()
+        lost = ((f'lost.{one.topic}', one.lost) for one in self.subscriptions_polled)
+        return (*(self.timing.values() if self.timing else ()), *lost)
 
     # What derived nodes use.
 

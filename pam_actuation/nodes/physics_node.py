@@ -16,6 +16,7 @@
 
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.timing import Latency
+from pam_actuation.plant_loop import Backlog
 
 MAX_SEED = 2**31 - 1
 
@@ -37,6 +38,7 @@ class PhysicsNode(ManagedNode):
         self.plant.advance_to(self.now_ns())
         self._sampled_steps = None
         self._latency = Latency()
+        self._backlog = Backlog()
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def measured(self, now_ns, arrived):
@@ -53,9 +55,14 @@ class PhysicsNode(ManagedNode):
         Returns
         -------
         dict
-            Messages by topic; empty right after a late tick, when there is nothing new.
+            Messages by topic; empty right after a late tick, when there is nothing new, and for
+            a moment after a standstill.
 
         """
+        if self.simulated_time is None:
+            arrived = self._backlog.take(now_ns, arrived)
+            if arrived is None:
+                return {}
         for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
             self.plant.advance_to(min(plain.stamp_ns, now_ns))
             apply(plain)

@@ -16,7 +16,8 @@
 The access policy of some nodes, for the security tools of ROS 2 (SROS2, policy 0.2.0).
 
 Least rights: each node may publish, subscribe and serve what it does with exactly its
-parameters, and nothing else. One enclave per node, named after it.
+parameters, and nothing else. One enclave per node, named after it; one more for an operator,
+who reads the diagnostics and calls the services the nodes offer, the emergency stop first of all.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -30,6 +31,7 @@ PARAMETER_SERVICES = (
 LIFECYCLE_SERVICES = (
     'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
     'get_transition_graph')
+OPERATOR = 'operator'
 SENT_BY_EVERY_NODE = (*OF_EVERY_NODE, '~/transition_event')
 
 
@@ -47,6 +49,7 @@ def policy(nodes):
     root.append(ElementTree.Comment(
         ' Made from the code, as docs/security.md says; do not edit. '))
     enclaves = ElementTree.SubElement(root, 'enclaves')
+    offered = []
     with Inspector() as inspector:
         for node in nodes:
             # What only matters once it runs is left out: it may not exist here.
@@ -54,6 +57,8 @@ def policy(nodes):
                      if key not in ('output', 'await_subscriber')}
             interface = inspector.interface(node.name, given, node.namespace)
             profile = _profile(enclaves, node.namespace, node.name)
+            offered += [service.replace('~', f'{node.namespace}/{node.name}')
+                        for service in interface.serves]
             _allow(profile, 'topic', 'publish', (*interface.publishes, *SENT_BY_EVERY_NODE))
             _allow(profile, 'topic', 'subscribe', (
                 *interface.subscribes, '/clock', '/parameter_events'))
@@ -64,6 +69,9 @@ def policy(nodes):
     _allow(session, 'topic', 'subscribe', ('/diagnostics',))
     _allow(session, 'service', 'request', [
         f'{node.namespace}/{node.name}/change_state' for node in nodes])
+    operator = _profile(enclaves, '/', OPERATOR)
+    _allow(operator, 'topic', 'subscribe', ('/diagnostics',))
+    _allow(operator, 'service', 'request', offered)
     ElementTree.indent(root)
     return ('<?xml version="1.0" encoding="UTF-8"?>\n'
             + ElementTree.tostring(root, encoding='unicode') + '\n')

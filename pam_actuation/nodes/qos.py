@@ -30,6 +30,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 PUBLISHER_DEPTH = 1000    # a second of a 1 kHz topic is sent again to a receiver that was busy
 CONSUMER_DEPTH = 10       # consumers use the newest message; old ones are stale anyway
+PHYSICS_DEPTH = 1000      # physics that stood still goes through all signals since, not the last
 RECORDER_DEPTH = 5000     # five seconds of a 1 kHz topic may wait for the recorder
 
 
@@ -42,6 +43,7 @@ def reliable(depth):
 
 PUBLISHER = reliable(PUBLISHER_DEPTH)
 CONSUMER = reliable(CONSUMER_DEPTH)
+PHYSICS = reliable(PHYSICS_DEPTH)
 RECORDER = reliable(RECORDER_DEPTH)
 # What is said once, such as a robot description: who comes later hears it too.
 LATCHED = QoSProfile(

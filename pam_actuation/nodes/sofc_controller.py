@@ -36,13 +36,13 @@ class SofcNode(LearningSwitch, ControllerNode):
         NodeParameter(
             'rules_file', '', 'File of the rules: read at configure if it exists, written by '
             'the service save_rules. Empty: start from the rules of the controller file.'),
-        NodeParameter('learning', True, 'Whether the rules change while running.'),
+        NodeParameter(
+            'learning', True, 'Whether the rules change while running.', live=True),
     )
 
     def setup(self):
         """Load the controller and its rules, offer the services for the rules."""
         super().setup()
-        self.learning = self.value('learning')
         if self.value('rules_file') and os.path.exists(self._path()):
             self._load()
         self._rule_services = [
@@ -58,8 +58,12 @@ class SofcNode(LearningSwitch, ControllerNode):
             self.destroy_service(service)
 
     def diagnostic_values(self):
-        """Add whether the rules change."""
-        return (*super().diagnostic_values(), ('learning', self.learning))
+        """Add whether the rules change, and how often learning took changes back."""
+        values = (*super().diagnostic_values(), ('learning', self.learning))
+        if self.state is None:
+            return values
+        internals = dict(zip(self.state.names, self.state.values))
+        return (*values, ('rules_rolled_back', f'{internals["times_rolled_back"]:.0f}'))
 
     def _answered(self, action):
         """

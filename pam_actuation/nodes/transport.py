@@ -32,6 +32,8 @@ from pam_actuation.resources import config_dir
 
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+FURTHER = ('SUBNET', 'SYSTEM_DEFAULT', 'OFF')
 LOOPBACK, NETWORK = 'fastdds_loopback.xml', 'fastdds_network.xml'
 
 
@@ -39,10 +41,10 @@ def prepare_middleware(environment=os.environ):
     """
     Set how participants that are created later in this process talk.
 
-    A profile file of the user's own stays, with all that it leaves to Fast DDS, and so does
-    his choice of transports. Where ROS looks at this machine only, rmw_fastrtps adds shared
-    memory whatever that choice is; the profile then says where to receive.
-    Other middleware ignores both variables.
+    Without a range of discovery they look at this machine only. A profile file of the user's own
+    stays, with all that it leaves to Fast DDS, and so does his choice of transports. Where ROS
+    looks at this machine only, rmw_fastrtps adds shared memory whatever that choice is; the
+    profile then says where to receive. Other middleware ignores profile and transports.
 
     Parameters
     ----------
@@ -55,10 +57,13 @@ def prepare_middleware(environment=os.environ):
         The profiles are missing: the installation is incomplete.
 
     """
+    if not environment.get(RANGE):
+        environment[RANGE] = 'LOCALHOST'
     ours = {name: str(config_dir() / 'middleware' / name) for name in (LOOPBACK, NETWORK)}
     if environment.get(PROFILES, ours[NETWORK]) not in ours.values():
         return
     by_udp = environment.setdefault(TRANSPORTS, 'UDPv4') == 'UDPv4'
-    this_machine_only = (environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
-                         or environment.get('ROS_LOCALHOST_ONLY') == '1')
+    # ROS takes what it does not know for LOCALHOST. Named peers are on other machines.
+    this_machine_only = not environment.get('ROS_STATIC_PEERS') and (
+        environment[RANGE] not in FURTHER or environment.get('ROS_LOCALHOST_ONLY') == '1')
     environment[PROFILES] = ours[LOOPBACK if by_udp and this_machine_only else NETWORK]

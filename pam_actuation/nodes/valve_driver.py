@@ -29,6 +29,7 @@ from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.timing import Latency
 from pam_sim.errors import InputError
 from std_srvs.srv import Trigger
 
@@ -71,6 +72,7 @@ class ValveDriver(ManagedNode):
 
     loop = None
     output = None
+    _stopped = None         # what a latched stop is carried over from
     _safety_services = ()
 
     def check(self):
@@ -101,7 +103,12 @@ class ValveDriver(ManagedNode):
             self.value('backend'), self.value('valve_type'),
             {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
             loop.safe_signal(0).efforts, self.value('device_watchdog_s'))
+        if self._stopped is not None:
+            loop.safety.take_over(self._stopped)
         self.loop = loop
+        self._latencies = {'command': (Latency(), lambda: loop.safety.command_stamp_ns),
+                           'pressure': (Latency(), lambda: loop.safety.pressure.stamp_ns)}
+        self._stamps = {}
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
         self.raw_commands = None
@@ -137,14 +144,18 @@ class ValveDriver(ManagedNode):
             self.destroy_service(service)
         if self.output is not None:
             self.output.close()
+        if self.loop is not None:
+            self._stopped = self.loop.safety
         self.loop = self.output = None
 
     def diagnostic_values(self):
-        """Add what the valve hangs on, how often it refused, how often others vented it."""
+        """Add the valve's device and its refusals, and how old what came in was when used."""
         values = (*super().diagnostic_values(), ('backend', self.value('backend')))
         if self.output is None:
             return values
         values = (*values, ('device_failures', self.output.failures))
+        for name, (latency, _) in self._latencies.items():
+            values = (*values, *latency.values(f'{name}.latency'))
         vents = self.output.watchdog_vents
         return values if vents is None else (*values, ('device_watchdog_vents', vents))
 
@@ -187,6 +198,11 @@ class ValveDriver(ManagedNode):
         problem = self.output.send(signal.efforts)
         self.loop.on_device(problem)
         self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
+        for name, (latency, newest_ns) in self._latencies.items():
+            stamp_ns = newest_ns()
+            if stamp_ns is not None and stamp_ns != self._stamps.get(name):
+                self._stamps[name] = stamp_ns
+                latency.add(now_ns - stamp_ns)
         self.diagnostics.update(status.level, status.message, status.values)
 
     def safe_stop(self, why):

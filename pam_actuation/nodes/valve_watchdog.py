@@ -16,8 +16,8 @@
 
 import sys
 
-from pam_actuation.drivers.watchdog import SignalWatchdog, VENTS
-from pam_actuation.nodes.diagnostics import ERROR, OK
+from pam_actuation.drivers.watchdog import SignalWatchdog, VENTS, WAITING
+from pam_actuation.nodes.diagnostics import ERROR, OK, WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
@@ -36,7 +36,9 @@ class ValveWatchdog(ManagedNode):
     NAME = 'valve_watchdog'
     REALTIME_RANK = 3
     PARAMETERS = (
-        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        NodeParameter(
+            'valve_type', 'ppr', 'Valve of the rig, until a driver is heard: then that of its '
+            'signals.', choices=('ppr', 'hsv')),
         NodeParameter(
             'timeout_s', 0.05, 'Silence of valve_signal from which it vents [s].', 0.02, 1.0),
     )
@@ -61,8 +63,13 @@ class ValveWatchdog(ManagedNode):
         signal = self.watchdog.tick(now_ns)
         if signal is not None:
             self.send('valve_signal', signal)
-        self.diagnostics.update(
-            ERROR if self.watchdog.state == VENTS else OK, self.watchdog.state)
+        level = {VENTS: ERROR, WAITING: WARN}.get(self.watchdog.state, OK)
+        told, heard = self.value('valve_type'), self.watchdog.valve_type
+        text = self.watchdog.state
+        if heard != told:
+            level = max(level, WARN)
+            text += f'; it drives {heard}, this watchdog was told {told}, which is overruled'
+        self.diagnostics.update(level, text)
 
     def diagnostic_values(self):
         """Add how often it has vented."""

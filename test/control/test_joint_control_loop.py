@@ -95,6 +95,27 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
     assert bench.internal('tick') == 21
 
 
+@pytest.mark.parametrize('stops', [FLEXOR, EXTENSOR])
+@pytest.mark.parametrize('reading', [
+    lambda now: Pressure(now, P_ATM_PA + 2e3),          # its driver has vented it
+    lambda now: Pressure(1, P_ATM_PA + 100e3)])         # the readings have stopped
+def test_no_muscle_is_left_alone_under_air(joint, loop, stops, reading):
+    topic = ('flexor/pressure', 'extensor/pressure')[stops]
+    bench, highest, spoiled = Bench(joint, loop), [], {}
+    for k in range(1600):
+        loop.on_joint_reference(AngleReference(bench.now_ns, 0.1, 0.0))
+        if 200 <= k < 1000:
+            spoiled = {topic: reading(bench.now_ns + bench.period_ns)}
+        _, commands = bench.tick(**spoiled)
+        spoiled = {}
+        highest.append(max(command.pressure_pa for command in commands))
+    assert min(highest[50:200]) > P_ATM_PA + 100e3
+    vented = [k for k in range(200, 1000) if highest[k] == P_ATM_PA]
+    assert vented[0] <= 200 + 201           # within a second
+    assert highest[vented[0]:vented[0] + 400] == [P_ATM_PA] * 400
+    assert min(highest[-150:]) > P_ATM_PA + 100e3 and loop.reason == codes.REASONS[codes.OK]
+
+
 def test_a_frozen_encoder_vents_both_muscles_until_the_joint_moves_again(joint, loop):
     bench = Bench(joint, loop)
     held, seen = [], []

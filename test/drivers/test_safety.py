@@ -264,6 +264,32 @@ def test_still_reading_without_flow_is_not_frozen():
     assert decision.state == OK and decision.level == 0
 
 
+def test_reading_that_rests_above_the_atmosphere_while_vented_is_not_frozen():
+    """A quiet sensor with an offset: the air that a vent should still move ends there."""
+    bench = Bench()
+    for k in range(1000):
+        bench.now += 5 * MS
+        bench.safety.on_pressure(bench.now, P_ATM_PA + 5e3)
+        bench.safety.flow(-2e3)         # what the model of the open valve goes on saying
+        decision = bench.safety.tick(bench.now)
+        assert decision.fault == 'no_command'
+    bench.safety.on_command(bench.now, P_ATM_PA + 5e3)
+    assert bench.safety.tick(bench.now + MS).state == OK
+
+
+def test_reading_frozen_under_pressure_is_noticed_while_emptying():
+    """From 200 kPa gauge an open valve takes more than 100 kPa away."""
+    bench = Bench()
+    bench.run(100)
+    for _ in range(100):
+        bench.now += 5 * MS
+        bench.safety.on_pressure(bench.now, P_ATM_PA + 200e3)
+        bench.safety.on_command(bench.now, P_ATM_PA)
+        bench.safety.flow(-3e3)
+        decision = bench.safety.tick(bench.now)
+    assert decision.fault == 'pressure_frozen'
+
+
 def test_supply_loss_warns():
     """Supply below the command: warning with figures; NaN supply: nominal assumed."""
     bench = Bench()
@@ -294,6 +320,18 @@ def test_resumes_without_a_jump():
     assert targets[-1] == bench.command
     bench.command = P_ATM_PA + 100e3       # once resumed, the command acts at once
     assert bench.last(5).pressure_pa == bench.command
+
+
+def test_what_is_latched_is_taken_over():
+    """A driver that is configured anew stays stopped until reset."""
+    bench, anew = Bench(), Bench()
+    bench.run(100)
+    bench.safety.emergency_stop('a test')
+    anew.safety.take_over(bench.safety)
+    decision = anew.last(500)
+    assert decision.state == EMERGENCY_STOP and 'a test' in decision.message
+    assert anew.safety.reset()[0]
+    assert anew.last(50).state == OK
 
 
 def test_pause_and_clock_set_back():

@@ -70,6 +70,15 @@ def test_it_falls_silent_when_the_driver_speaks_again(valve):
     assert watchdog.vents == 2
 
 
+def test_it_vents_the_valve_it_heard_whatever_it_was_told(valve):
+    watchdog = SignalWatchdog({'ppr': 'hsv', 'hsv': 'ppr'}[valve], 0.05)
+    names, filling = FILLING[valve]
+    watchdog.on_signal(ValveSignal(1, names, filling), MS)
+    signal = watchdog.tick(60 * MS)
+    assert (signal.names, signal.efforts) == (names, SAFE[valve])
+    assert watchdog.valve_type == valve
+
+
 def test_a_driver_that_ended_safely_is_left_alone(valve):
     watchdog = driven(valve, 100)
     names, _ = FILLING[valve]

@@ -66,7 +66,12 @@ def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
     assert text == policy(nodes), 'make it anew, see docs/security.md'
     publishers, enclaves = {}, ElementTree.fromstring(text.encode()).findall('.//enclave')
     assert [enclave.get('path') for enclave in enclaves] == [
-        *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session']
+        *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session', '/operator']
+    called = [service.text for service in enclaves[-1].iterfind('.//service')]
+    for node in nodes:
+        if node.name == 'valve_driver':
+            assert {f'{node.namespace}/valve_driver/emergency_stop',
+                    f'{node.namespace}/valve_driver/reset'} <= {*called}
     for profile in ElementTree.fromstring(text.encode()).iter('profile'):
         for topic in profile.findall("topics[@publish='ALLOW']/topic"):
             if not topic.text.startswith(('/', '~')):

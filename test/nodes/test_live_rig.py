@@ -96,6 +96,10 @@ def test_every_node_tells_how_it_is(rig):
         assert times[-1] - times[0] < 4 * 0.7
         assert int(last.values['loop.ticks']) > 100
         assert any(key.startswith('published./muscle/') for key in last.values)
+    driver = rig.health['valve_driver'][-1].values
+    for name in ('command.latency.p99_ms', 'pressure.latency.p99_ms'):
+        assert 0.0 < float(driver[name]) < 100.0
+    assert float(driver['saturated_s']) >= 0.0
 
 
 def test_parameters_are_described_and_guarded(rig):
@@ -144,8 +148,13 @@ def test_learning_can_be_frozen_and_rules_saved_loaded_and_reset(rig, rules_file
     rig.call(Trigger, 'sofc_controller/save_rules')
     assert load_rules(rules_file).digest() == kept.digest()      # frozen, and none was taken
     rules_file.unlink()
-    rig.call(SetBool, 'sofc_controller/freeze_learning', SetBool.Request(data=False))
+    value = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
+    answer = rig.call(SetParameters, 'sofc_controller/set_parameters', SetParameters.Request(
+        parameters=[Parameter(name='learning', value=value)]))
+    assert answer.results[0].successful
     wait_for(lambda: _last_state(rig)['learning'] == 1.0, 3.0, 'learning')
+    last = rig.health['sofc_controller'][-1].values
+    assert int(last['rules_rolled_back']) >= 0 and int(last['lost./muscle/contraction']) >= 0
 
 
 def _last_state(rig):

@@ -20,11 +20,11 @@ import subprocess
 import sys
 
 from pam_actuation.nodes.transport import LOOPBACK, NETWORK, prepare_middleware
-from pam_actuation.nodes.transport import PROFILES, TRANSPORTS
+from pam_actuation.nodes.transport import PROFILES, RANGE, TRANSPORTS
 from pam_actuation.rigging.processes import node_environment
 import pytest
 
-LOCAL = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+LOCAL = {RANGE: 'LOCALHOST'}
 # Prints the shared-memory ports it has opened, and what it has heard, until its input closes.
 PARTICIPANT = """
 import os
@@ -61,15 +61,18 @@ def test_udp_on_this_machine_needs_a_profile():
     assert profile(ROS_LOCALHOST_ONLY='1') == (LOOPBACK, 'UDPv4')
 
 
-def test_udp_in_a_network_needs_none():
-    assert profile() == (NETWORK, 'UDPv4')
-    assert profile(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET') == (NETWORK, 'UDPv4')
+def test_this_machine_unless_asked_to_look_further():
+    assert profile() == profile(**{RANGE: ''}) == (LOOPBACK, 'UDPv4')
+    assert profile(**{RANGE: 'somewhere'}) == (LOOPBACK, 'UDPv4')       # as ROS takes it
+    for further in ('SUBNET', 'SYSTEM_DEFAULT', 'OFF'):
+        assert profile(**{RANGE: further}) == (NETWORK, 'UDPv4')
+    assert profile(**LOCAL, ROS_STATIC_PEERS='192.0.2.7') == (NETWORK, 'UDPv4')
 
 
 def test_child_may_look_less_far_than_its_parent():
-    environment = {}
+    environment = {RANGE: 'SUBNET'}
     prepare_middleware(environment)
-    assert profile(**environment, **LOCAL) == (LOOPBACK, 'UDPv4')
+    assert profile(**{**environment, **LOCAL}) == (LOOPBACK, 'UDPv4')
 
 
 def test_choice_of_the_user_stays():
