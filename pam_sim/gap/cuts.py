@@ -27,7 +27,7 @@ import threading
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.free_run import (
-    FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven)
+    FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven, true_value)
 from pam_sim.gap.noise import noise_of, noise_sd, sensor_floor, SMALLEST, STAMP_SD_S
 from pam_sim.gap.parts import part_of
 from pam_sim.gap.result import FIELD, SIGNALS
@@ -230,13 +230,13 @@ class ValveCut(Cut):
     def _simulate(self, rig, index, numbers):
         recording = self.recordings[index]
         shift = None if self._shift_s is None else self._shift_s[index]
-        x = _true('contraction', rig, *self._motion[index])
+        x = true_value('contraction', rig, *self._motion[index])
         kept = [e for e in rig.effects if acts_on(e.name, 'valve')]
         p = self._start[index]['pressure'] + numbers.get(of_run('start_error', index), 0.0)
         return simulate_driven(
             rig.with_(effects=kept), recording, x,
             recording.valve_signal(numbers[of_run('latency', index)], shift),
-            _true('pressure', rig, p, 0.0))
+            true_value('pressure', rig, p, 0.0))
 
 
 class MechanicsCut(Cut):
@@ -286,12 +286,12 @@ class MechanicsCut(Cut):
         recording = self.recordings[index]
         rig = pressure_driven(rig)
         command = self._command(rig, index, numbers[of_run('pressure_skew', index)])
-        start = max(_true('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
+        start = max(true_value('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
         if recording.driven:
             x = np.interp(recording.grid_s, recording.time_s['contraction'],
                           recording.measured['contraction'])
             return simulate_driven(rig, recording, x, command, start)
-        x = _true('contraction', rig, self._start[index]['contraction'], 0.0)
+        x = true_value('contraction', rig, self._start[index]['contraction'], 0.0)
         return rig.simulate(
             command, external_force_n=recording.external_force_n, initial_pressure_pa=start,
             initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S)
@@ -300,8 +300,8 @@ class MechanicsCut(Cut):
         """Return the voltage at which the stand-in for the valve gives the measured pressure."""
         recording = self.recordings[index]
         time_s, rate = recording.time_s['pressure'], self._pressure[index][1]
-        p = _true('pressure', rig, recording.measured['pressure'] + self._noise_pa[index],
-                  rate)
+        p = true_value(
+            'pressure', rig, recording.measured['pressure'] + self._noise_pa[index], rate)
         # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
         at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
         command = (np.interp(at, time_s, p) - P_ATM_PA) / FAST_GAIN_PA_PER_V
@@ -345,19 +345,3 @@ def _smooth(recording, signal):
     """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
     y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
     return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))
-
-
-def _true(signal, rig, value, rate):
-    """Return what a reading means once the sensor effects of the rig are taken out."""
-    settings = {e.name: e.parameters for e in rig.effects}
-    zero = P_ATM_PA if signal == 'pressure' else 0.0
-    bias = settings.get(f'{signal}_bias')
-    if bias:
-        value = value - next(iter(bias.values()))
-    gain = settings.get(f'{signal}_gain')
-    if gain:
-        value = zero + (value - zero) / (1.0 + gain['gain_error'])
-    lag = settings.get(f'{signal}_lag')
-    if lag:
-        value = value + lag['time_constant_s'] * rate
-    return value

@@ -199,14 +199,44 @@ def pressure_driven(rig):
 
 def simulate(rig, recording, valve_signal, start_error_pa=0.0):
     """Run the rig on the recording's grid from the recorded start; return its Response."""
+    # What the sensors add is not in the muscle: a closed volume would keep it.
+    p = true_value('pressure', rig, recording.start('pressure') + start_error_pa, 0.0)
     if recording.driven:
         x = np.interp(recording.grid_s, recording.time_s['contraction'],
                       recording.measured['contraction'])
-        return simulate_driven(rig, recording, x, valve_signal)
+        return simulate_driven(rig, recording, x, valve_signal, p)
+    x = true_value('contraction', rig, recording.start('contraction'), 0.0)
     return rig.simulate(
         valve_signal, external_force_n=recording.external_force_n,
-        initial_pressure_pa=max(recording.start('pressure') + start_error_pa, P_ATM_PA),
-        initial_contraction_m=max(recording.start('contraction'), 0.0), dt_s=GRID_S)
+        initial_pressure_pa=max(p, P_ATM_PA), initial_contraction_m=max(x, 0.0), dt_s=GRID_S)
+
+
+def true_value(signal, rig, value, rate):
+    """
+    Return what a reading means once the sensor effects of the rig are taken out.
+
+    Parameters
+    ----------
+    signal : {'pressure', 'contraction'}
+        Which reading.
+    rig : pam_sim.Rig
+        Its bias, gain and lag of that sensor count.
+    value, rate : float or numpy.ndarray
+        What is read, and how fast that changes [1/s].
+
+    """
+    settings = {e.name: e.parameters for e in rig.effects}
+    zero = P_ATM_PA if signal == 'pressure' else 0.0
+    bias = settings.get(f'{signal}_bias')
+    if bias:
+        value = value - next(iter(bias.values()))
+    gain = settings.get(f'{signal}_gain')
+    if gain:
+        value = zero + (value - zero) / (1.0 + gain['gain_error'])
+    lag = settings.get(f'{signal}_lag')
+    if lag:
+        value = value + lag['time_constant_s'] * rate
+    return value
 
 
 def held_mean(time_s, value, grid_s, before=None):

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pam_sim.gap.candidates import candidates, LIMITS
 from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
-from pam_sim.gap.cuts import acts_on, LATENCY_SD_S
+from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
 from pam_sim.gap.fit import BOX, Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
@@ -81,11 +81,13 @@ def within_the_chain(found, place):
     """
     Return whether an effect is a time so short that any sensor's filter may be its cause.
 
-    A latency stands for the filters that all sensors share; that leaves a part of them.
+    A latency stands for the filters that all sensors share; that leaves a part of them. What acts
+    in the valve comes before the latency of its signal, and may stand for all of it.
     """
     candidate = found.hypothesis.effects[place]
+    longest_s = LATENCY_SD_S + (LATENCY_PRIOR_S if acts_on(candidate.effect, 'valve') else 0.0)
     return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
-            and found.values()[place][candidate.free[0].name] < LATENCY_SD_S)
+            and found.values()[place][candidate.free[0].name] < longest_s)
 
 
 class Search:
@@ -126,19 +128,9 @@ class Search:
         while len(named) < MAX_EFFECTS and not self.out_of_time():
             open_cuts = [c for c in self.problem.cuts
                          if c.subsystem not in closed and self._is_open(c, current)]
-            if not open_cuts:
-                break
-            rivals = self._rivals(current, open_cuts)
-            self.set_levels(rivals, open_cuts)
-            taken = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
-            if taken is None:
-                taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
-                taken = [w for w in taken if w]
-                closed |= {c.subsystem for c in open_cuts} - {w.subsystem for w in taken}
-            else:
-                taken = [taken]
-            taken = [w for i, w in enumerate(taken)
-                     if w.name not in [o.name for o in taken[:i]]]
+            taken = self._round(current, open_cuts, closed) if open_cuts else []
+            if not taken and named and closed:
+                taken = self._reopened(current, closed)
             if not taken:
                 break
             current = self._other_formulations(self._take(current, taken))
@@ -148,6 +140,37 @@ class Search:
         current, named, explained = self._paired(current, named, explained)
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
                        self.screened)
+
+    def _round(self, current, open_cuts, closed):
+        """Return what is taken in for the open cuts; add those without a winner to ``closed``."""
+        rivals = self._rivals(current, open_cuts)
+        self.set_levels(rivals, open_cuts)
+        joint = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
+        if joint is not None:
+            return [joint]
+        taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
+        taken = [w for w in taken if w]
+        closed |= {c.subsystem for c in open_cuts} - {w.subsystem for w in taken}
+        return [w for i, w in enumerate(taken) if w.name not in [o.name for o in taken[:i]]]
+
+    def _reopened(self, current, closed):
+        """
+        Return what is taken in for a cut that found no winner before others found theirs.
+
+        An effect of a sensor that two cuts share explains neither as long as another effect,
+        too, acts in one of them; beside that one it may.
+        """
+        shared = [c for c in self.pool if all(
+            Hypothesis((c,)).touches(cut) for cut in self.problem.cuts)]
+        for cut in [c for c in self.problem.cuts if c.subsystem in closed]:
+            if len(self.problem.cuts) > 1 and self._is_open(cut, current):
+                rivals = self._rivals(current, [cut], shared)
+                self.set_levels(rivals, [cut])
+                taken = self.choice.winner(rivals, current, cut, self.fitted)
+                if taken is not None:
+                    closed.discard(cut.subsystem)
+                    return [taken]
+        return []
 
     def _finished(self, current, named):
         """Return (fit, what stays named, share explained by cut): only what is needed stays."""
@@ -242,12 +265,12 @@ class Search:
                 if self.first_gap[s] > self.least_gap}
 
     # -- rivals ----------------------------------------------------------------------------
-    def _rivals(self, current, cuts):
-        """Return the fitted hypotheses that add one effect or free one number."""
+    def _rivals(self, current, cuts, pool=None):
+        """Return the fitted hypotheses that add one effect of ``pool`` or free one number."""
         taken = set(current.hypothesis.names)
-        pool = [c for c in self.pool if c.name not in taken]
+        kept = [c for c in self.pool if pool is None or c in pool]
         screened = self.screened if current is self.base else screen(
-            self.problem, current, pool)
+            self.problem, current, [c for c in kept if c.name not in taken])
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
         for cut in cuts:
@@ -412,11 +435,20 @@ class Search:
         return w, without
 
     def _established(self, current, named):
-        """Drop effects whose size does not clearly differ from none, or is the measurement's."""
+        """
+        Drop effects whose size does not clearly differ from none, or is the measurement's.
+
+        One of shapes alone, such as the volume of a reservoir, is none at the end of its range.
+        """
         for w in list(named):
             names = [c.name for c in current.hypothesis.effects]
-            if w.name in names and (within_the_chain(current, names.index(w.name)) or (
-                    self.problem.certainty(current, names.index(w.name)) < CERTAIN_SIZE)):
+            if w.name not in names:
+                continue
+            place = names.index(w.name)
+            of_shapes = all(f.shape for f in current.hypothesis.effects[place].free)
+            if (within_the_chain(current, place)
+                    or (of_shapes and Rival(w.name, current).at_edge)
+                    or self.problem.certainty(current, place) < CERTAIN_SIZE):
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return current, named

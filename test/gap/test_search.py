@@ -55,6 +55,15 @@ def test_an_effect_is_named_with_its_size(formulation, parameters, name, quantit
     assert 'ci95' in added[0].source
 
 
+def test_a_bias_is_found_beside_an_effect_that_first_took_it_in():
+    rig = nominal().with_(effects=[
+        {'name': 'threshold_pressure', 'parameters': {'pressure_pa': 9e3}},
+        {'name': 'pressure_bias', 'parameters': {'bias_pa': 2.6e3}}])
+    result = find_gap(recorded(rig, voltages(20.0)), nominal())
+    assert {e['name'] for e in result.effects} == {'threshold_pressure', 'pressure_bias'}
+    assert result.ambiguity_set == [e['name'] for e in result.effects]
+
+
 def test_a_cause_that_no_effect_explains_stays_unknown():
     run = recorded(nominal(), voltages(20.0))
     at = run.topics['contraction'].time_s(run.start_ns)

@@ -168,6 +168,19 @@ def test_a_free_run_of_the_true_model_follows_the_recording():
     assert np.max(np.abs(simulated['pressure'] - recording.measured['pressure'])) < 50.0
 
 
+def test_a_biased_reading_is_not_in_the_closed_volume_at_the_start():
+    rig = load_rig(NOMINAL, valve='hsv')
+    biased = rig.with_(effects=[
+        {'name': 'pressure_bias', 'parameters': {'bias_pa': -2000.0}}])
+    duty = np.zeros((4000, 2))
+    duty[500:700, 0] = 0.3
+    run = recorded(biased, duty, rate_hz=100, noise=0.0, jitter_s=0.0,
+                   initial_pressure_pa=301_325.0)
+    recording = Recording(run, 'hsv')
+    simulated = free_run(biased, recording)
+    assert np.max(np.abs(simulated['pressure'] - recording.measured['pressure'])) < 300.0
+
+
 def test_mean_of_a_held_signal_is_exact_between_grid_points():
     grid = np.array([0.0, 1.0, 2.0, 3.0])
     mean = held_mean(np.array([0.25, 1.5]), np.array([2.0, 4.0]), grid)
