@@ -33,7 +33,7 @@ import subprocess
 import sys
 import time
 
-from pam_actuation.nodes.transport import prepare_middleware, PROFILES, TRANSPORTS
+from pam_actuation.nodes.transport import prepare_middleware, RANGE, unprepared
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_with_parent
 from tqdm import tqdm
@@ -127,10 +127,8 @@ def main():
         return participant(args.participant)
     lock = DomainLock()
     try:
-        shared = {**os.environ, 'ROS_DOMAIN_ID': str(lock.domain_id),
-                  'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-        for name in (PROFILES, TRANSPORTS):
-            shared.pop(name, None)
+        shared = {**unprepared(os.environ), 'ROS_DOMAIN_ID': str(lock.domain_id),
+                  RANGE: 'LOCALHOST'}
         udp = dict(shared)
         prepare_middleware(udp)
         found = {title: trials(args.times, environment, args.seed, title)

@@ -19,11 +19,11 @@ Do the loops of a live rig keep their periods, and how late is a command?
 
 Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live. Beside them, in the same
 run and with the real-time priority of the plant, a bare echo: one rclpy node with a timer,
-another one with a callback, the message of the valve signal, by what rclpy takes by default,
-97 times per second: rarely
-enough not to load the cores itself, and in no step with the loops. Prints for each loop the ticks that did not run and how irregular the
-others were, and the age of a valve signal when the plant applies it beside that of a message
-in the callback of the echo. A bare loop of 1 kHz without ROS, that does nothing and goes before
+another one with a callback, the message of the valve signal, by what rclpy takes by default, 97
+times per second: rarely enough not to load the cores itself, and in no step with the loops.
+Prints for each loop the ticks that did not run and how irregular the others were, and the age of
+a valve signal when the plant applies it beside that of a message in the callback of the echo. A
+bare loop of 1 kHz without ROS, that does nothing and goes before
 all others, shows what the machine itself allows. Exit code 1 if more than 0.1 % of the ticks of
 plant or controller did not run, or the 99th percentile of the plant is more than twice that of
 the echo.
@@ -41,7 +41,7 @@ import time
 from pam_actuation.nodes.loops import LoopSet
 from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import Latency, LoopTiming
-from pam_actuation.nodes.transport import PROFILES, TRANSPORTS
+from pam_actuation.nodes.transport import unprepared
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT
 from pam_actuation.rigging.processes import end_with_parent
@@ -113,8 +113,7 @@ class Beside:
     """Both nodes of the echo and the bare loop as processes."""
 
     def __init__(self, environment):
-        plain = {name: value for name, value in environment.items()
-                 if name not in (PROFILES, TRANSPORTS)}
+        plain = unprepared(environment)
         self._processes = [
             subprocess.Popen([sys.executable, __file__, '--echo', role], env=plain,
                              stdout=subprocess.PIPE, text=True, start_new_session=True,

@@ -31,6 +31,11 @@ VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
 SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 
 
+def valve_of(names):
+    """Return 'ppr' or 'hsv' by the names of the efforts of a valve signal, '' for others."""
+    return next((valve for valve, own in VALVE_NAMES.items() if {*own} & {*names}), '')
+
+
 @dataclass(frozen=True, slots=True)
 class Pressure:
     """Absolute pressure [Pa]: topics pressure, pressure_command, supply_pressure."""

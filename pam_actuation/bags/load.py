@@ -25,7 +25,7 @@ import numpy as np
 
 from pam_actuation.bags import codecs, series
 from pam_actuation.bags.source import read_bag
-from pam_actuation.messages import VALVE_NAMES
+from pam_actuation.messages import VALVE_NAMES, valve_of
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
 
@@ -60,10 +60,7 @@ class RecordedRun(Run):
     def valve(self):
         """Return 'ppr' or 'hsv' by the valve signal, else by the metadata, else ''."""
         names = self.topics['valve_signal'].values if 'valve_signal' in self.topics else {}
-        for valve, signals in VALVE_NAMES.items():
-            if set(signals) & set(names):
-                return valve
-        return self.metadata.get('valve', '')
+        return valve_of(names) or self.metadata.get('valve', '')
 
 
 def load_run(path, namespace=None, recover=False):

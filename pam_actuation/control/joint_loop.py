@@ -122,8 +122,8 @@ class JointControllerLoop:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
-        for muscle in (self._frozen, *self._slack):
-            muscle.forget()
+        for monitor in (self._frozen, *self._slack):
+            monitor.forget()
         self.follows_torque = False
         self._trajectory = self._angle = None
         self._pressures, self._forces = [None, None], [None, None]
@@ -241,9 +241,9 @@ class JointControllerLoop:
             return reason
         pressures_pa = self._fresh_pressures_pa(now_ns)
         wanted_pa = self._commands_pa or (P_ATM_PA, P_ATM_PA)
-        # Both are asked, each for its own sake.
-        if any([muscle.judge(now_ns, *pair) for muscle, pair in zip(
-                self._slack, zip(wanted_pa, pressures_pa))]):
+        # A list: both are to be asked, also where the first one is slack.
+        if any([muscle.judge(now_ns, *pair) for muscle, *pair in zip(
+                self._slack, wanted_pa, pressures_pa)]):
             return codes.MUSCLE_SLACK
         if self.follows_torque:
             self._frozen.pause()

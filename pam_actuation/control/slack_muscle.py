@@ -21,13 +21,13 @@ gone. The other muscle alone would then pull the limb to its stop.
 
 import math
 
+from pam_actuation.control.frozen import RESUME_NS
 from pam_sim.units import P_ATM_PA
 
 WANTED_PA = P_ATM_PA + 100_000.0    # commanded at least
 SLACK_PA = P_ATM_PA + 30_000.0      # measured at most
 AFTER_NS = 1_000_000_000            # a slow valve fills a large muscle beyond that in this time
 LOST_NS = 300_000_000               # its driver vents after 0.1 s
-RESUME_NS = 2_000_000_000
 
 
 class SlackMuscle:

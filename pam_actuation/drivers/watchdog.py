@@ -19,7 +19,7 @@ For a process of its own, beside the driver: what kills or stops that one does n
 this one. It speaks only while the driver is silent, and says nothing but the safe signal.
 """
 
-from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, ValveSignal
+from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of, ValveSignal
 
 WAITING, HEARS, RESTS, VENTS = (
     'waiting for the first valve signal', 'hears the driver',
@@ -65,9 +65,7 @@ class SignalWatchdog:
             return
         self._heard_ns, self._last = now_ns, message
         # A signal for the other valve would vent nothing, whatever this one was told.
-        for valve_type, names in VALVE_NAMES.items():
-            if set(names) <= {*message.names}:
-                self.valve_type = valve_type
+        self.valve_type = valve_of(message.names) or self.valve_type
 
     def tick(self, now_ns):
         """Return the safe ValveSignal to send, None while there is nothing to say."""

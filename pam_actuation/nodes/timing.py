@@ -28,6 +28,7 @@ class Latency:
         self.count = 0
         self.max_ns = 0
         self._counts = [0] * _BINS
+        self._used_ns = None        # stamp of the input used last
 
     def add(self, latency_ns):
         """Note one; below 0 (clocks of two machines) counts as 0."""
@@ -35,6 +36,12 @@ class Latency:
         self.max_ns = max(self.max_ns, latency_ns)
         ratio = max(latency_ns, _SHORTEST_NS) / _SHORTEST_NS
         self._counts[min(int(math.log(ratio) / _BIN), _BINS - 1)] += 1
+
+    def used(self, stamp_ns, now_ns):
+        """Note the age of an input when it is used first; None for a stamp: there is none."""
+        if stamp_ns is not None and stamp_ns != self._used_ns:
+            self._used_ns = stamp_ns
+            self.add(now_ns - stamp_ns)
 
     def quantile_ns(self, share):
         """Return the latency [ns] that a share of all does not exceed, NaN before the first."""

@@ -67,3 +67,9 @@ def prepare_middleware(environment=os.environ):
     this_machine_only = not environment.get('ROS_STATIC_PEERS') and (
         environment[RANGE] not in FURTHER or environment.get('ROS_LOCALHOST_ONLY') == '1')
     environment[PROFILES] = ours[LOOPBACK if by_udp and this_machine_only else NETWORK]
+
+
+def unprepared(environment):
+    """Return a copy of an environment in which Fast DDS takes its own defaults."""
+    return {name: value for name, value in environment.items()
+            if name not in (PROFILES, TRANSPORTS)}

@@ -106,9 +106,7 @@ class ValveDriver(ManagedNode):
         if self._stopped is not None:
             loop.safety.take_over(self._stopped)
         self.loop = loop
-        self._latencies = {'command': (Latency(), lambda: loop.safety.command_stamp_ns),
-                           'pressure': (Latency(), lambda: loop.safety.pressure.stamp_ns)}
-        self._stamps = {}
+        self._latencies = {'command': Latency(), 'pressure': Latency()}
         self.add_publisher('valve_signal')
         self.commands = self.add_subscription('pressure_command')
         self.raw_commands = None
@@ -154,7 +152,7 @@ class ValveDriver(ManagedNode):
         if self.output is None:
             return values
         values = (*values, ('device_failures', self.output.failures))
-        for name, (latency, _) in self._latencies.items():
+        for name, latency in self._latencies.items():
             values = (*values, *latency.values(f'{name}.latency'))
         vents = self.output.watchdog_vents
         return values if vents is None else (*values, ('device_watchdog_vents', vents))
@@ -198,11 +196,9 @@ class ValveDriver(ManagedNode):
         problem = self.output.send(signal.efforts)
         self.loop.on_device(problem)
         self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
-        for name, (latency, newest_ns) in self._latencies.items():
-            stamp_ns = newest_ns()
-            if stamp_ns is not None and stamp_ns != self._stamps.get(name):
-                self._stamps[name] = stamp_ns
-                latency.add(now_ns - stamp_ns)
+        safety = self.loop.safety
+        self._latencies['command'].used(safety.command_stamp_ns, now_ns)
+        self._latencies['pressure'].used(safety.pressure.stamp_ns, now_ns)
         self.diagnostics.update(status.level, status.message, status.values)
 
     def safe_stop(self, why):

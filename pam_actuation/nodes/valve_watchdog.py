@@ -47,7 +47,8 @@ class ValveWatchdog(ManagedNode):
 
     def setup(self):
         """Create the topic, which it hears and, if need be, speaks on."""
-        self.watchdog = SignalWatchdog(self.value('valve_type'), self.value('timeout_s'))
+        self._told = self.value('valve_type')
+        self.watchdog = SignalWatchdog(self._told, self.value('timeout_s'))
         self.add_publisher('valve_signal')
         self.signals = self.add_subscription('valve_signal')
 
@@ -64,11 +65,11 @@ class ValveWatchdog(ManagedNode):
         if signal is not None:
             self.send('valve_signal', signal)
         level = {VENTS: ERROR, WAITING: WARN}.get(self.watchdog.state, OK)
-        told, heard = self.value('valve_type'), self.watchdog.valve_type
-        text = self.watchdog.state
-        if heard != told:
+        text, heard = self.watchdog.state, self.watchdog.valve_type
+        if heard != self._told:
             level = max(level, WARN)
-            text += f'; it drives {heard}, this watchdog was told {told}, which is overruled'
+            text += (f'; it drives {heard}, this watchdog was told {self._told}, which is '
+                     'overruled')
         self.diagnostics.update(level, text)
 
     def diagnostic_values(self):

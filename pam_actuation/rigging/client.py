@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.transport import prepare_middleware
+from pam_actuation.nodes.transport import prepare_middleware, RANGE
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -38,17 +38,17 @@ TRANSITIONS = {
 def local_context(domain_id, arguments=()):
     """Return an open rclpy context in a ROS domain, looking at this machine only."""
     context = rclpy.Context()
-    before = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    before = os.environ.get(RANGE)
+    os.environ[RANGE] = 'LOCALHOST'
     prepare_middleware()
     try:
         rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
                    signal_handler_options=SignalHandlerOptions.NO)
     finally:
         if before is None:
-            del os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE']
+            del os.environ[RANGE]
         else:
-            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = before
+            os.environ[RANGE] = before
     return context
 
 

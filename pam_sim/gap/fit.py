@@ -263,7 +263,8 @@ class Problem:
         Return by how many standard deviations the size of an effect differs from none.
 
         Its shapes are held: a size that is known only together with a shape is none the less
-        there. Infinite for an effect of shapes alone, of which no value means none.
+        there. Infinite for an effect of shapes alone, of which no value inside its
+        range means none.
         """
         kept = dict(self.slopes)
         self.take_slopes(found.settings(), found.known_z)

@@ -160,10 +160,12 @@ class Search:
         An effect of a sensor that two cuts share explains neither as long as another effect,
         too, acts in one of them; beside that one it may.
         """
-        shared = [c for c in self.pool if all(
-            Hypothesis((c,)).touches(cut) for cut in self.problem.cuts)]
-        for cut in [c for c in self.problem.cuts if c.subsystem in closed]:
-            if len(self.problem.cuts) > 1 and self._is_open(cut, current):
+        cuts = self.problem.cuts
+        if len(cuts) < 2:
+            return []
+        shared = [c for c in self.pool if all(acts_on(c.effect, cut.subsystem) for cut in cuts)]
+        for cut in cuts:
+            if cut.subsystem in closed and self._is_open(cut, current):
                 rivals = self._rivals(current, [cut], shared)
                 self.set_levels(rivals, [cut])
                 taken = self.choice.winner(rivals, current, cut, self.fitted)
@@ -268,9 +270,9 @@ class Search:
     def _rivals(self, current, cuts, pool=None):
         """Return the fitted hypotheses that add one effect of ``pool`` or free one number."""
         taken = set(current.hypothesis.names)
-        kept = [c for c in self.pool if pool is None or c in pool]
+        pool = self.pool if pool is None else pool
         screened = self.screened if current is self.base else screen(
-            self.problem, current, [c for c in kept if c.name not in taken])
+            self.problem, current, [c for c in pool if c.name not in taken])
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
         for cut in cuts:

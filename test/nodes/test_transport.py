@@ -20,7 +20,7 @@ import subprocess
 import sys
 
 from pam_actuation.nodes.transport import LOOPBACK, NETWORK, prepare_middleware
-from pam_actuation.nodes.transport import PROFILES, RANGE, TRANSPORTS
+from pam_actuation.nodes.transport import PROFILES, RANGE, TRANSPORTS, unprepared
 from pam_actuation.rigging.processes import node_environment
 import pytest
 
@@ -91,10 +91,8 @@ def test_participants_open_no_shared_memory_port(tmp_path):
         said = {}
         for name, environment in (
                 ('udp', node_environment(lock.domain_id, tmp_path)),
-                ('plain', {**os.environ, **LOCAL, 'ROS_DOMAIN_ID': str(lock.domain_id)})):
-            if name == 'plain':
-                environment.pop(PROFILES, None)
-                environment.pop(TRANSPORTS, None)
+                ('plain', {**unprepared(os.environ), **LOCAL,
+                           'ROS_DOMAIN_ID': str(lock.domain_id)})):
             said[name] = subprocess.run(
                 [sys.executable, '-c', PARTICIPANT], env=environment, text=True, timeout=60,
                 capture_output=True, check=True).stdout.split()
@@ -110,8 +108,7 @@ def test_node_started_by_hand_opens_none_either(tmp_path):
     from live_rig import LiveRig, wait_for
     rig = LiveRig(tmp_path)
     try:
-        for name in (PROFILES, TRANSPORTS):
-            del rig.environment[name]
+        rig.environment = unprepared(rig.environment)
         rig.start('valve_watchdog', diagnostics_period_s=0.2)
         rig.listen({})
         wait_for(lambda: rig.health['valve_watchdog'], 60.0, 'a status')
