@@ -19,15 +19,23 @@ A frozen sensor goes on sending its last value with new stamps. It is told from 
 rest by the pressure: a value that stays the same to the last bit while the measured pressure
 changes by far more than friction can hold is not what the muscle does; of a joint it is the
 difference of both pressures. At its resting length, or without a force, a muscle may lie on a
-stop, as a joint at the ends of its range, and pressure moves nothing; a sensor that is frozen
-there is not noticed.
+stop, as a joint at the ends of its range, and pressure moves nothing. Where a muscle has left its
+stop before, the pressure at which it did tells how much it may rise there; a force, the ends of a
+joint, and a muscle that has not moved yet are not judged.
 """
 
+from collections import deque
 import math
+from statistics import median
+
+from pam_sim.units import P_ATM_PA
 
 AFTER_NS = 200_000_000
 SWING_PA = 150_000.0         # twice the dry friction of a bad rig holds it over 110 kPa
 JOINT_SWING_PA = 300_000.0   # that of the realistic rigs holds a joint over 100 to 215 kPa
+STOP_SWING_PA = 200_000.0    # beyond the pressure that lifted the load the last times
+LEAST_LIFT_PA = P_ATM_PA + 150_000.0     # below it a hand may have lifted it
+LIFTS = 5
 RESUME_NS = 2_000_000_000
 
 
@@ -45,12 +53,15 @@ class FrozenMeasurement:
         joint may lie on a stop.
     swing_pa : float
         More pressure than friction can hold [Pa].
+    stop_swing_pa : float
+        More pressure, beyond that at which the value rose above ``lowest``, than a muscle stays
+        on its stop with [Pa]; infinite where a stop is not left by pressure alone.
 
     """
 
-    def __init__(self, lowest, highest=math.inf, swing_pa=SWING_PA):
+    def __init__(self, lowest, highest=math.inf, swing_pa=SWING_PA, stop_swing_pa=math.inf):
         self._between = lowest, highest
-        self._swing_pa = swing_pa
+        self._swing_pa, self._stop_swing_pa = swing_pa, stop_swing_pa
         self.forget()
 
     def forget(self):
@@ -60,11 +71,13 @@ class FrozenMeasurement:
         self._since_ns = 0
         self._noticed_ns = 0
         self._changed = False       # since it was noticed
-        self._lowest_pa, self._highest_pa = math.inf, -math.inf
+        self._lifts_pa = deque(maxlen=LIFTS)
+        self.pause()
 
     def pause(self):
         """Forget the pressures, not what was found: what comes now is not compared with them."""
         self._lowest_pa, self._highest_pa = math.inf, -math.inf
+        self._highest_on_stop_pa = -math.inf
 
     def judge(self, now_ns, stamp_ns, value, pressure_pa):
         """
@@ -82,17 +95,35 @@ class FrozenMeasurement:
 
         """
         if value != self._value or stamp_ns < self._since_ns:
+            if self._value <= self._between[0] < value and math.isfinite(pressure_pa):
+                self._lifts_pa.append(pressure_pa)
             self._value, self._since_ns = value, stamp_ns
             self._changed = True
             self.pause()
-        if self._between[0] < value < self._between[1] and math.isfinite(pressure_pa):
-            self._lowest_pa = min(self._lowest_pa, pressure_pa)
-            self._highest_pa = max(self._highest_pa, pressure_pa)
-        if (self._highest_pa - self._lowest_pa > self._swing_pa
-                and stamp_ns - self._since_ns >= AFTER_NS):
+        if math.isfinite(pressure_pa):
+            self._take(value, pressure_pa)
+        if self._moved_without_it() and stamp_ns - self._since_ns >= AFTER_NS:
             self.frozen = True
             self._noticed_ns = now_ns
             self._changed = False
         elif self._changed and now_ns - self._noticed_ns >= RESUME_NS:
             self.frozen = False
         return self.frozen
+
+    def _take(self, value, pressure_pa):
+        lowest, highest = self._between
+        if lowest < value < highest:
+            self._lowest_pa = min(self._lowest_pa, pressure_pa)
+            self._highest_pa = max(self._highest_pa, pressure_pa)
+        elif value <= lowest:
+            self._highest_on_stop_pa = max(self._highest_on_stop_pa, pressure_pa)
+
+    def _moved_without_it(self):
+        """Return whether the pressure changed by more than leaves a value where it was."""
+        if self._highest_pa - self._lowest_pa > self._swing_pa:
+            return True
+        if not self._lifts_pa:
+            return False
+        # Not the last one alone: an obstacle or a fast step may have held one back.
+        lift_pa = max(median(self._lifts_pa), LEAST_LIFT_PA)
+        return self._highest_on_stop_pa - lift_pa > self._stop_swing_pa

@@ -42,7 +42,7 @@ the loop itself stood still over 0.25 s        starts bumplessly
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
-from pam_actuation.control.frozen import FrozenMeasurement
+from pam_actuation.control.frozen import FrozenMeasurement, STOP_SWING_PA
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS, ReferenceBuffer
 from pam_actuation.control.tick import TickCore, TickInputs
@@ -132,7 +132,10 @@ class ControllerLoop:
         self.references = ReferenceBuffer(self.tracked, self._range)
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
-        self._frozen = FrozenMeasurement(_RESTING[self.tracked])
+        # A muscle that has become short enough to be slack may stay without force.
+        self._frozen = FrozenMeasurement(
+            _RESTING[self.tracked],
+            stop_swing_pa=math.inf if self.tracked == FORCE else STOP_SWING_PA)
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None

@@ -263,6 +263,37 @@ def test_a_contraction_that_never_moves_again_stays_frozen():
     assert all('stands still' in reason for _, reason, _ in seen)
 
 
+def lifted(loop, duration_s=1.0):
+    """Let the muscle leave its stop, at 200 kPa gauge, and lie down again; return the time."""
+    swing(loop, START, duration_s, lambda t: max(0.01 * math.sin(2.0 * math.pi * t), 0.0),
+          lambda t: P_ATM_PA + 2e5 * (1.0 + 0.01 * math.sin(2.0 * math.pi * t)))
+    assert loop.reason == 'ok'
+    return START + round(duration_s * 1000) * MS
+
+
+def test_a_contraction_frozen_on_its_stop_is_noticed_where_less_pressure_lifted_the_load():
+    loop = ready()
+    seen = swing(loop, lifted(loop), 2.0, lambda t: 0.001, lambda t: P_ATM_PA + 3e5 * t)
+    at_s, reason, command_pa = next(one for one in seen if one[1] != 'ok')
+    assert at_s == pytest.approx(4.0 / 3.0, abs=0.02) and 'contraction stands still' in reason
+    assert command_pa == P_ATM_PA
+
+
+def test_a_muscle_that_a_hand_lifted_may_lie_on_its_stop():
+    loop = ready()
+    swing(loop, START, 1.0, lambda t: 0.01 * t, lambda t: P_ATM_PA)
+    swing(loop, START + 1000 * MS, 1.0, lambda t: max(0.01 - 0.02 * t, 0.0), lambda t: P_ATM_PA)
+    seen = swing(loop, START + 2000 * MS, 1.0, lambda t: 0.0, lambda t: P_ATM_PA + 3.4e5 * t)
+    assert {reason for _, reason, _ in seen} == {'ok'}
+
+
+def test_a_muscle_with_noise_may_lie_on_its_stop():
+    loop = ready()
+    seen = swing(loop, lifted(loop), 1.8, lambda t: 1e-6 * (round(t / 0.005) % 2),
+                 lambda t: P_ATM_PA + 3e5 * t)
+    assert {reason for _, reason, _ in seen} == {'ok'}
+
+
 @pytest.mark.parametrize('contraction, pressure_pa', [
     (lambda t: 0.01, lambda t: 3e5 + 7e4 * math.sin(20.0 * t)),       # held by friction
     (lambda t: 0.0, lambda t: P_ATM_PA + 3.4e5 * t),                  # on its stop
