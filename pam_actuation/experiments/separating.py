@@ -183,7 +183,7 @@ def separation(run, rig, rivals, with_force):
 def _decided(problem, cut, first, other):
     s = cut.subsystem
     base = problem.base.errors[s]
-    t = preference(cut, base, first.errors[s], other.errors[s])
+    t = np.nan_to_num(preference(cut, base, first.errors[s], other.errors[s]))
     apart = share(cut, base, first.errors[s]) - share(cut, base, other.errors[s])
     return min(t / SURE_T, apart / SURE_SHARE)
 

@@ -45,6 +45,8 @@ class Free:
         Fitted on a logarithmic scale, from several starts.
     starts : tuple of float
         Values the screening tries; ``scale`` by default.
+    ends : tuple of str
+        Of ``lower`` and ``upper`` those at which a shape turns the effect into another one.
 
     """
 
@@ -54,6 +56,7 @@ class Free:
     upper: float
     shape: bool = False
     starts: tuple = ()
+    ends: tuple = ('lower', 'upper')
 
     def value(self, coordinate):
         """Return the value of a normalised coordinate, kept within the range."""
@@ -136,8 +139,8 @@ _TABLE = {
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
               Free('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
-              Free('time_constant_1_s', 1.0, 0.15, 4.0, True),
-              Free('time_constant_2_s', 10.0, 4.0, 100.0, True)),
+              Free('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
+              Free('time_constant_2_s', 10.0, 4.0, 100.0, True, ends=('upper',))),
     'thermal_softening': (Free('gain_loss_at_20mm_per_s', 0.02, -0.2, 0.5),
                           Free('time_constant_s', 60.0, 10.0, 600.0, True)),
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),

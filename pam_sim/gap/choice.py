@@ -24,11 +24,13 @@ from dataclasses import dataclass, field
 from pam_sim.gap.candidates import is_narrow, LIMITS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.parts import FIT
 
 FIRST_STEP = 0.25            # least share of the gap a first effect explains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
+BEHIND_T = 1.5               # with which a rival that explains clearly less is none
 SAME_FORM = 0.002            # of the gap an effect explains; no formulation is that true
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
 UNPOLISHED = 0.5             # of the rest a fit may still be better than it seems
@@ -47,6 +49,7 @@ class Rival:
     share: dict = field(default_factory=dict)
     t: dict = field(default_factory=dict)
     polished: bool = False
+    crossed: Found = None           # fitted to the part that judges
 
     @property
     def at_edge(self):
@@ -58,8 +61,8 @@ class Rival:
         for place, c in enumerate(self.found.hypothesis.effects):
             if c.name == self.name:
                 return is_narrow(c, self.found.values()[place]) or any(
-                    f.shape and min(abs(x - f.coordinate(end)) for end in (
-                        f.lower, f.upper)) < EDGE
+                    f.shape and min(abs(x - f.coordinate(getattr(f, end)))
+                                    for end in f.ends) < EDGE
                     for f, x in zip(c.free, self.found.theta_of(place)))
         return False
 
@@ -143,15 +146,36 @@ class Choice:
         before = share(cut, self.base.errors[s], current.errors[s])
         alike = top - SAME_FORM * max(top - before, 0.0)
         same = {id(r) for r in ranked if r.share[s] >= alike}
-        tied = [r for r in ranked if id(r) in same
-                or (r.t[s] < CERTAIN_T and r.share[s] > RIVAL * top)]
+
+        def is_tied(r):
+            return id(r) in same or (r.share[s] > RIVAL * top and not r.t[s] >= (
+                CERTAIN_T if r.share[s] > top - CLOSE else BEHIND_T))
+
+        tied = [r for r in ranked if is_tied(r)]
+        if len(tied) > 1:
+            self._cross(tied, current, cut)
+            tied = [r for r in tied if is_tied(r)]
         strain = min(self._strain(r.found) for r in tied)
         tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
         names = {r.name for r in tied}
-        as_good = {r.name for r in tied if r.t[s] < BETTER_T or id(r) in same}
+        # A simpler one stands for the other only where it was tested and explains as much.
+        least = top - CLOSE * max(top - before, 0.0)
+        as_good = {r.name for r in tied if id(r) in same
+                   or (r.t[s] < BETTER_T and r.share[s] > least)}
         return [r for r in tied
                 if not any((simple, r.name) in LIMITS for simple in as_good)
                 and SAME_AS.get(r.name) not in names]
+
+    def _cross(self, tied, current, cut):
+        """Compare those that are tied with the first of them once more, on all of the data."""
+        s = cut.subsystem
+        for r in tied:
+            r.crossed = r.crossed or self.problem.crossed(r.found)
+        first = tied[0]
+        for r in tied[1:]:
+            r.t[s] = preference(
+                cut, current.errors[s], first.found.errors[s], r.found.errors[s],
+                crossed=(FIT, first.crossed.errors[s], r.crossed.errors[s]))
 
     def _strain(self, found):
         """Return the squared pulls of all numbers that should have stayed where they were."""
@@ -170,7 +194,7 @@ class Choice:
         least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
         sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s],
                           quiet=True)
-        if gained < least or sure < CERTAIN_T:
+        if gained < least or not sure >= CERTAIN_T:
             return None
         return Named(tied[0].name, s, sorted(
             rivals, key=lambda r: -r.share[s]), tuple(r.name for r in tied),

@@ -22,6 +22,8 @@ let the few blocks with the largest error decide. Blocks in which both say the s
 left out too, or what a second recording tells would drown in the first.
 """
 
+import math
+
 import numpy as np
 from pam_sim.gap.parts import SELECT
 from scipy.stats import norm, t as student, wilcoxon
@@ -32,7 +34,7 @@ OF_MEAN = 0.5                # squared difference of two rivals that are alike e
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
 MIN_BLOCKS, FEW_BLOCKS = 4, 12
 CERTAIN_T = 3.0
-NO_TEST_T = 0.0
+NO_TEST_T = math.nan
 LARGEST_T = 37.0             # beyond it the probability is below what a float holds
 
 
@@ -60,7 +62,7 @@ def block_chi2(cut, errors, part=SELECT):
     return blocks, total / len(cut.signals)
 
 
-def preference(cut, base, better, worse, part=SELECT, quiet=False):
+def preference(cut, base, better, worse, part=SELECT, quiet=False, crossed=None):
     """
     Return by how many deviations the log ratio of squared errors says ``better``.
 
@@ -79,26 +81,35 @@ def preference(cut, base, better, worse, part=SELECT, quiet=False):
     quiet : bool
         Whether blocks with a small gap count, too, where those with a large one are few: many
         that agree may say more.
+    crossed : tuple of (int, numpy.ndarray, numpy.ndarray), optional
+        Another part of the data, with the errors there of both rivals fitted to what judges
+        here: its blocks judge as well.
 
     Returns
     -------
     float
-        0 with fewer than ``MIN_BLOCKS`` active blocks.
+        NaN with fewer than ``MIN_BLOCKS`` active blocks: that says nothing, not that both are as
+        good. 0 where they are the same.
 
     """
-    _, before = block_chi2(cut, base, part)
-    _, apart = block_chi2(cut, better - worse, part)
+    judged = [(part, better, worse)] + ([crossed] if crossed else [])
+    before = np.concatenate([block_chi2(cut, base, p)[1] for p, _, _ in judged])
+    apart = np.concatenate([block_chi2(cut, b - w, p)[1] for p, b, w in judged])
     active = _active(before - cut.level, 1.0) & _active(apart, OF_MEAN)
-    first, second = (block_chi2(cut, e, part)[1] + SOFTEN for e in (better, worse))
-    ratio = np.log(second / first)
+    ratio = np.concatenate([np.log((block_chi2(cut, w, p)[1] + SOFTEN) / (
+        block_chi2(cut, b, p)[1] + SOFTEN)) for p, b, w in judged])
     found = _deviations(ratio[active])
-    return max(found, _deviations(ratio)) if quiet and active.sum() < FEW_BLOCKS else found
+    if quiet and active.sum() < FEW_BLOCKS:
+        return float(np.fmax(found, _deviations(ratio)))
+    return found
 
 
 def _deviations(ratio):
     """Return by how many deviations the log ratios of some blocks differ from none."""
-    if ratio.size < MIN_BLOCKS or not ratio.any():
+    if ratio.size < MIN_BLOCKS:
         return NO_TEST_T
+    if not ratio.any():
+        return 0.0
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
     t = float(np.mean(ratio) / max(spread, 1e-9))
     towards = np.sign(t) * ratio

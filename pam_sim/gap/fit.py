@@ -31,7 +31,7 @@ import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.noise import autocorrelation_time
-from pam_sim.gap.parts import FIT
+from pam_sim.gap.parts import FIT, SELECT
 from scipy.optimize import least_squares
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
@@ -161,15 +161,20 @@ class Problem:
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in cuts})
         self.base = self.fit_base()
 
-    def take_slopes(self, effects, known_z):
-        """Take the slopes of all cuts with respect to their known numbers at a point."""
+    def take_slopes(self, effects, known_z, cuts=None):
+        """Take the slopes of cuts, all by default, for their known numbers at a point."""
         rig = self.with_effects(effects)
-        for cut in self.cuts:
+        for cut in self.cuts if cuts is None else cuts:
             z = known_z[cut.subsystem]
             base = _errors(cut, rig, z)
             self.slopes[cut.subsystem] = np.column_stack([
                 (_errors(cut, rig, z + k.step * unit) - base) / k.step
                 for k, unit in zip(cut.known, np.eye(z.size))])
+
+    def _slopes_at(self, found):
+        """Take the slopes at a fit, of the cuts that fitting it again looks at."""
+        self.take_slopes(found.settings(), found.known_z,
+                         [c for c in self.cuts if found.hypothesis.touches(c)])
 
     @property
     def simulations(self):
@@ -223,7 +228,7 @@ class Problem:
         """Return a fit that went on with slopes taken where it stands, as long as that helps."""
         kept = dict(self.slopes)
         for _ in range(POLISHES):
-            self.take_slopes(found.settings(), found.known_z)
+            self._slopes_at(found)
             again = self.fit(found.hypothesis, found.theta, found)
             before, after = self.cost(found), self.cost(again)
             found = again if after < before else found
@@ -231,6 +236,13 @@ class Problem:
                 break
         self.slopes = kept
         return found
+
+    def crossed(self, found):
+        """Return the same hypothesis fitted to the part of the data that judges, from there."""
+        kept, self.use = self.use, (SELECT,)
+        other = self.fit(found.hypothesis, found.theta, found)
+        self.use = kept
+        return other
 
     def unbent(self, found, box):
         """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""
@@ -247,7 +259,7 @@ class Problem:
     def precision(self, found):
         """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
         kept = dict(self.slopes)
-        self.take_slopes(found.settings(), found.known_z)
+        self._slopes_at(found)
         names, likelihood, blocks = self._covariances(found)
         held = self.fit(found.hypothesis, found.theta, found, hold=True)
         self.slopes = kept
@@ -267,7 +279,7 @@ class Problem:
         range means none.
         """
         kept = dict(self.slopes)
-        self.take_slopes(found.settings(), found.known_z)
+        self._slopes_at(found)
         effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
         held = [first + j for j, f in enumerate(effect.free) if f.shape]
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
@@ -315,6 +327,7 @@ class _Search:
     def __init__(self, problem, hypothesis, cuts, temper, hold=False):
         self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
         self.free = [f for c in hypothesis.effects for f in c.free]
+        self.owner = [c.effect for c in hypothesis.effects for _ in c.free]
         self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
         low = [f.coordinate(f.lower) for f in self.free]
         high = [f.coordinate(f.upper) for f in self.free]
@@ -345,12 +358,20 @@ class _Search:
         """Return the errors of every touched cut, by subsystem."""
         key = x.tobytes()
         if self._last.get('key') != key:
-            theta, known = self.split(x)
-            rig = self.problem.with_effects(Found(
-                self.hypothesis, theta, {}, {}, {}).settings())
-            self._last = {'key': key, 'errors': {
-                s: _errors(cut, rig, z) for cut, (s, z) in zip(self.cuts, known)}}
+            self._last = {'key': key, 'errors': self._simulated(x)}
         return self._last['errors']
+
+    def _simulated(self, x, effect=None):
+        """
+        Return the errors of the cuts, or of those alone in which an effect acts.
+
+        What is read of the contraction, the volume behind the valve is taken from, too.
+        """
+        theta, known = self.split(x)
+        rig = self.problem.with_effects(Found(
+            self.hypothesis, theta, {}, {}, {}).settings())
+        return {s: _errors(cut, rig, z) for cut, (s, z) in zip(self.cuts, known)
+                if effect is None or acts_on(effect, s) or effect.startswith('contraction')}
 
     def residuals(self, x):
         """Return weighted errors, then the priors."""
@@ -360,22 +381,21 @@ class _Search:
 
     def slopes(self, x):
         """Return the derivatives of ``residuals``."""
-        base, count = dict(self.errors(x)), len(self.free)
+        base, count = self.errors(x), len(self.free)
         columns = np.zeros((self.residuals(x).size, x.size))
         rows = columns.shape[0] - self.prior.size
         columns[rows:] = np.diag(1.0 / self.prior)
-        last = self._last
         for j in range(count):
             step = EFFECT_STEP * max(abs(x[j]), 0.3)
             if x[j] + step > self.bounds[1][j]:
                 step = -step
             moved = np.array(x)
             moved[j] += step
-            errors = self.errors(moved)
+            # An effect of one cut leaves the other one as it is.
+            errors = {**base, **self._simulated(moved, self.owner[j])}
             columns[:rows, j] = np.concatenate([
                 self._weighted(c, errors[c.subsystem] - base[c.subsystem])
                 for c in self.cuts]) / step
-        self._last = last
         row, column = 0, count
         for cut in self.cuts:
             slope = self._weighted(cut, self.problem.slopes[cut.subsystem])

@@ -25,7 +25,6 @@ import itertools
 
 import numpy as np
 from pam_sim.errors import InputError
-from pam_sim.gap.candidates import LIMITS
 from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.fit import Hypothesis
@@ -99,7 +98,7 @@ def promising_pairs(problem, base, screened, cut):
     best = {}
     for one, other in itertools.combinations(tried, 2):
         names = (one.candidate.name, other.candidate.name)
-        if names[0] == names[1] or names in LIMITS or names[::-1] in LIMITS:
+        if names[0] == names[1]:
             continue
         factors, left = _joint(one, other, space.left)
         if factors is not None and left < min(most, best.get(names, (np.inf,))[0]):

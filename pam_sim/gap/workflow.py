@@ -173,7 +173,7 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
                           by_name[name].theta) for name in unsure.names]
     result.evidence = [
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
-         't': r.t.get(w.subsystem)} for w in named for r in w.rivals]
+         't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.pull) > BOX]
     left = max((beyond(s.rmse_refit, FLOOR_ERROR * proof.highest_floor[name]) / max(
         proof.noise[name], 1e-12) for name, s in result.signals.items()), default=0.0)
@@ -216,11 +216,17 @@ def _calibrated(problem, found, precision):
     return listed
 
 
+def _tested(rival, subsystem):
+    """Return by how many deviations the best was better, None where no test was possible."""
+    t = rival.t.get(subsystem, math.nan)
+    return t if math.isfinite(t) else None
+
+
 def _confidence(named, outcome):
     """Return how sure a name is, 0 to 1: against its nearest rival, and by what is left."""
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
-    rivals = [r.t[s] for r in named.rivals
-              if r.name not in named.names and s in r.t and r.share.get(s, 0.0) > 0.5 * best]
-    sure = float(norm.cdf(min(rivals, default=6.0) - 1.0))
+    rivals = [_tested(r, s) for r in named.rivals
+              if r.name not in named.names and r.share.get(s, 0.0) > 0.5 * best]
+    sure = float(norm.cdf(min([t for t in rivals if t is not None], default=6.0) - 1.0))
     return round(sure / len(named.names) * math.sqrt(max(outcome.share.get(s, 1.0), 0.0)), 3)
