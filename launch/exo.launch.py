@@ -35,7 +35,7 @@ HANDED_ON = {
     'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
     'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),
     'learning': ('true', 'Whether the rules of the controllers may change.'),
-    'experiment': ('', 'Experiment both knees play; empty: they wait for references.'),
+    'experiment': ('none', 'Experiment both knees play; none: they wait for references.'),
     'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 96; 0: none.'),
 }
 

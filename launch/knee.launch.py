@@ -18,7 +18,7 @@ A joint: simulated limb with two muscles, driver and watchdog for each, a contro
     ros2 launch pam_actuation knee.launch.py valve:=ppr experiment:=joint_sine
 
 Ends by itself when the experiment is over, and when a driver, the joint or the controller ends.
-Without an experiment (experiment:='') it waits for joint_reference or joint_trajectory.
+Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory.
 """
 
 from launch import LaunchDescription
@@ -28,6 +28,7 @@ from launch.actions import RegisterEventHandler
 from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
+from launch.substitutions import AndSubstitution
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import PythonExpression
@@ -57,7 +58,7 @@ def _arguments():
             description='Whether the rules of the controller may change.'),
         DeclareLaunchArgument(
             'experiment', default_value='joint_sine',
-            description='Experiment by name, or path of its file; empty: none.'),
+            description='Experiment by name, or path of its file; none: wait for references.'),
         DeclareLaunchArgument(
             'seed', default_value='0', description='Seed of the simulated sensors.'),
         DeclareLaunchArgument(
@@ -102,7 +103,8 @@ def generate_launch_description():
         'reference_generator',
         {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
          'start_delay_s': 3.0, 'exit_when_finished': True},
-        condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration('experiment'), '')))
+        condition=IfCondition(AndSubstitution(*(
+            NotEqualsSubstitution(LaunchConfiguration('experiment'), no) for no in ('', 'none')))))
     ends = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (

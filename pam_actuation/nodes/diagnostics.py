@@ -16,17 +16,23 @@
 The health of a node on ``/diagnostics``.
 
 One status per node: its name is the full node name, its message the reason for its
-level. It is sent at a steady pace and at once when level or message change. The
+level. It is sent at a steady pace and at once when level or message change, and then stands on
+the terminal, too, where something is wrong or no longer wrong. The
 values hold how many messages each publisher of the node has sent
 (``published.<topic>``), by which a recording proves that it is complete.
 """
 
+import re
+
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Status
+from pam_actuation.nodes.console import Console
 from pam_actuation.nodes.conversions import diagnostic_array
 from pam_actuation.nodes.endpoints import CountedPublisher
 
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
+WORDS = {OK: 'INFO', WARN: 'WARN', ERROR: 'ERROR', STALE: 'WARN'}     # of the logger of ROS
+DIGITS = re.compile('[0-9]+')
 SHORTEST_INTERVAL_NS = 20_000_000    # a message that changes with every tick is not a flood
 
 
@@ -48,6 +54,8 @@ class DiagnosticsReporter:
         self.message = 'starting'
         self.values = ()
         self.silent = True
+        self.console = Console(node.get_fully_qualified_name())
+        self._said = OK, ''
         self._sent = None
         self._sent_ns = 0
 
@@ -69,6 +77,15 @@ class DiagnosticsReporter:
         self.publisher.publish(diagnostic_array(Status(
             now_ns, self.level, self._node.get_fully_qualified_name(), self.message,
             (*self.values, *self._node.diagnostic_values(), *self._counts()))))
+        self._say(now_ns)
+
+    def _say(self, now_ns):
+        """Tell the terminal what is wrong, or no longer wrong; not each number that changes."""
+        said, self._said = self._said, (self.level, DIGITS.sub('', self.message))
+        node = self._node
+        ends = node.stopping or node.exit_code is not None      # the reason is to be the last line
+        if self._said != said and (self.level != OK or said[0] != OK and not ends):
+            self.console.say(WORDS[self.level], now_ns, self.message)
 
     def _counts(self):
         """Return the counts of all publishers; the status being sent counts itself."""

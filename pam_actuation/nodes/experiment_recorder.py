@@ -83,6 +83,7 @@ class ExperimentRecorder(ManagedNode):
     )
 
     core = None
+    _recorded = False           # in this process
 
     def check(self):
         """Refuse topics that are not known."""
@@ -149,8 +150,11 @@ class ExperimentRecorder(ManagedNode):
             max_file_s=self.value('max_bagfile_duration_s'))
         self.core = RecorderCore(writer)
         self.known = set()
-        for source in self.sources.values():
-            source.take()               # what came before belongs to no recording
+        if self._recorded or not self.value('autostart'):
+            for source in self.sources.values():
+                source.take()           # what came before belongs to no recording
+        # Who waited for this node to be there may have begun before it is active.
+        self._recorded = True
         missing = self._wait_for_publishers()
         if missing:
             self.get_logger().warning(f'nobody publishes {", ".join(missing)} yet')

@@ -15,7 +15,7 @@
 """One Markdown page per node: what it is, parameters, topics, services, an example."""
 
 from pam_actuation.models.markdown import escaped, row
-from pam_actuation.nodes.interfaces import Inspector, VARIANTS
+from pam_actuation.nodes.interfaces import Inspector, NEEDED, VARIANTS
 from pam_actuation.nodes.managed import COMMON_PARAMETERS
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import parameter_arguments
@@ -50,8 +50,9 @@ def page(interface, notes):
 def _example(interface):
     node = next((one for one in _EXAMPLES if one.name == interface.name), None)
     namespace = node.namespace if node else '/muscle'
-    given = {key: value for key, value in node.parameters.items()
-             if value != ''} if node else {}
+    given = {key: value for key, value in (node.parameters if node else {}).items()
+             if value != '' and key != 'await_subscriber'}      # there is no recorder here
+    given.update(NEEDED.get(interface.name, {}))
     arguments = ' '.join(parameter_arguments(given))
     lines = [f'    ros2 run pam_actuation {interface.name} --ros-args -r __ns:={namespace} '
              f'{arguments}'.rstrip()]

@@ -142,6 +142,11 @@ def declare(node, parameters):
 
     def check(changes):
         for change in changes:
+            if change.name == 'use_sim_time' and change.value != node.get_parameter(
+                    change.name).value:
+                return SetParametersResult(
+                    successful=False, reason='parameter use_sim_time is read when the node '
+                    'starts; start it again with -p use_sim_time:=true or false')
             known = table.get(change.name)
             problem = known.problem(change.value) if known else ''
             if problem:

@@ -131,6 +131,7 @@ def run(node_class, args=None):
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
         signal.set_wakeup_fd(-1)
+        node.diagnostics.console.close()
         if serving.is_alive():
             # Everything is safe and sent; what is left is memory the system takes back. To
             # destroy the services of a node while another thread waits on them would crash.

@@ -18,8 +18,10 @@ How Fast DDS, below ROS 2, moves the messages of a process: by UDP, not through 
 Fast DDS guards each shared-memory port by a lock that lies in the shared memory itself. A process
 that is killed or stopped while it holds the lock holds up all who send there for 1 s (fixed when
 Fast DDS is built: ``BOOST_INTERPROCESS_TIMEOUT_WHEN_LOCKING_DURATION_MS`` in its
-``boostconfig.hpp``), and one that takes the place of a killed one may never be heard (Fast DDS
-issues 5053, 5469). A driver must not be held up by a node that has died; UDP has no such lock.
+``boostconfig.hpp``), one that only starts may hold them up for a third of a second (until its
+port looks healthy), and one that takes the place of a killed one may never be heard (Fast DDS
+issues 5053, 5469). A driver must not be held up by a node that has died, nor by one that listens;
+UDP has no such lock.
 
 A reliable writer asks its readers from time to time what has arrived, by default every 3 s.
 The answers free all messages of those 3 s at once, up to the depth of the publisher: for 0.5 ms
@@ -33,7 +35,10 @@ from pam_actuation.resources import config_dir
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-FURTHER = ('SUBNET', 'SYSTEM_DEFAULT', 'OFF')
+BY_PROFILE = 'SYSTEM_DEFAULT'        # the range that leaves transports and peers to the profile
+FURTHER = ('SUBNET', BY_PROFILE, 'OFF')
+LOCALHOST_ONLY = 'ROS_LOCALHOST_ONLY'
+FAST_DDS = 'rmw_fastrtps'           # as the names of its implementations begin
 LOOPBACK, NETWORK = 'fastdds_loopback.xml', 'fastdds_network.xml'
 
 
@@ -41,10 +46,11 @@ def prepare_middleware(environment=os.environ):
     """
     Set how participants that are created later in this process talk.
 
-    Without a range of discovery they look at this machine only. A profile file of the user's own
-    stays, with all that it leaves to Fast DDS, and so does his choice of transports. Where ROS
-    looks at this machine only, rmw_fastrtps adds shared memory whatever that choice is; the
-    profile then says where to receive. Other middleware ignores profile and transports.
+    Without a range of discovery they look at this machine only. With that range rmw_fastrtps adds
+    shared memory, whatever transports are chosen; so the range is left to the profile, which
+    looks at this machine only as well, by UDP alone. A profile file of the user's own stays, with
+    all that it leaves to Fast DDS, and so does his choice of transports. Other middleware keeps
+    the range and ignores profile and transports.
 
     Parameters
     ----------
@@ -60,16 +66,28 @@ def prepare_middleware(environment=os.environ):
     if not environment.get(RANGE):
         environment[RANGE] = 'LOCALHOST'
     ours = {name: str(config_dir() / 'middleware' / name) for name in (LOOPBACK, NETWORK)}
-    if environment.get(PROFILES, ours[NETWORK]) not in ours.values():
+    if environment.get(PROFILES, ours[NETWORK]) not in ours.values() or _is_prepared(environment):
         return
     by_udp = environment.setdefault(TRANSPORTS, 'UDPv4') == 'UDPv4'
     # ROS takes what it does not know for LOCALHOST. Named peers are on other machines.
     this_machine_only = not environment.get('ROS_STATIC_PEERS') and (
-        environment[RANGE] not in FURTHER or environment.get('ROS_LOCALHOST_ONLY') == '1')
+        environment[RANGE] not in FURTHER or environment.get(LOCALHOST_ONLY) == '1')
     environment[PROFILES] = ours[LOOPBACK if by_udp and this_machine_only else NETWORK]
+    if environment[PROFILES] == ours[LOOPBACK] and (
+            environment.get('RMW_IMPLEMENTATION') or FAST_DDS).startswith(FAST_DDS):
+        environment[RANGE] = BY_PROFILE
+        environment.pop(LOCALHOST_ONLY, None)       # it would overrule the range
+
+
+def _is_prepared(environment):
+    return (environment.get(PROFILES, '').endswith(LOOPBACK)
+            and environment[RANGE] == BY_PROFILE)
 
 
 def unprepared(environment):
-    """Return a copy of an environment in which Fast DDS takes its own defaults."""
-    return {name: value for name, value in environment.items()
+    """Return a copy of an environment in which ROS and Fast DDS take their own defaults."""
+    left = {name: value for name, value in environment.items()
             if name not in (PROFILES, TRANSPORTS)}
+    if environment.get(RANGE) == BY_PROFILE and _is_prepared(environment):
+        left[RANGE] = 'LOCALHOST'
+    return left

@@ -14,6 +14,7 @@
 
 """Test what activation begins with, and that one broken service takes no other away."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -29,6 +30,8 @@ from live_rig import LiveRig, wait_for                                      # no
 from pam_actuation.messages import Contraction, ReferenceTrajectory         # noqa: E402
 from pam_actuation.nodes.conversions import RosWriter                       # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
+from rcl_interfaces.srv import SetParameters                                # noqa: E402
+from rclpy.parameter import Parameter                                       # noqa: E402
 from std_srvs.srv import Trigger                                            # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -137,3 +140,17 @@ def test_a_broken_service_takes_no_other_with_it(rig, tmp_path):
     finally:
         process.terminate()
         assert process.wait(20.0) == 0
+
+
+def test_the_kind_of_time_is_not_changed_while_running_and_the_terminal_tells_why_it_vents(rig):
+    rig.start('valve_driver')
+    rig.listen()
+    wait_for(lambda: rig.health['valve_driver'], 60.0, 'the driver')
+    assert rig.call(Trigger, 'valve_driver/emergency_stop').success
+    wait_for(lambda: 'emergency stop' in rig.health['valve_driver'][-1].message, 10.0, 'a word')
+    request = SetParameters.Request(parameters=[Parameter(
+        'use_sim_time', value=True).to_parameter_msg()])
+    result, = rig.call(SetParameters, 'valve_driver/set_parameters', request).results
+    assert not result.successful and 'read when the node starts' in result.reason
+    said = rig.processes['valve_driver'].log_file.read_text(encoding='utf-8')
+    assert re.search(r'\[ERROR\] \[.*\] \[muscle.valve_driver\]: .*emergency stop', said), said

@@ -89,6 +89,28 @@ def test_split_files_further_topics_and_changing_publishers(tmp_path):
         assert counts['/muscle/pressure'] == 100 and counts[EXTRA] == 50
 
 
+def test_nodes_that_come_up_with_the_recorder_are_recorded_from_their_first_message(tmp_path):
+    bag, rig = tmp_path / 'bag', LiveRig(tmp_path)
+    waiting = {'await_subscriber': f'/muscle/{RECORDER}', 'await_timeout_s': 60.0}
+    try:
+        for name in ('plant_simulator', 'valve_driver'):        # all at once, as launched
+            rig.start(name, **waiting)
+        rig.start(RECORDER, output=str(bag))
+        rig.listen()
+        wait_for(lambda: len(rig.heard['pressure']) > 200 and rig.heard['valve_signal'], 60.0,
+                 'the rig')
+        for name in ('plant_simulator', 'valve_driver', RECORDER):
+            rig.processes[name].send_signal(2)
+            assert rig.processes[name].wait(20.0)
+    finally:
+        rig.close()
+    info = bag_info(bag)
+    assert info.complete
+    for topic in ('/muscle/pressure', '/muscle/valve_signal', '/diagnostics'):
+        found = info.topic(topic)
+        assert found.count and not (found.lost or found.missed_at_start), (topic, found)
+
+
 def test_a_disk_that_refuses_ends_the_experiment_safely_and_keeps_the_record(tmp_path):
     bag = tmp_path / 'bag'
     plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'ppr', bag)
