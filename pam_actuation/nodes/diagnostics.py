@@ -83,8 +83,9 @@ class DiagnosticsReporter:
         """Tell the terminal what is wrong, or no longer wrong; not each number that changes."""
         said, self._said = self._said, (self.level, DIGITS.sub('', self.message))
         node = self._node
-        ends = node.stopping or node.exit_code is not None      # the reason is to be the last line
-        if self._said != said and (self.level != OK or said[0] != OK and not ends):
+        if node.stopping or node.exit_code is not None or node.input_error is not None:
+            return              # the node logs itself why it ends; that is to be its last line
+        if self._said != said and (self.level != OK or said[0] != OK):
             self.console.say(WORDS[self.level], now_ns, self.message)
 
     def _counts(self):

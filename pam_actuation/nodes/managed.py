@@ -254,8 +254,8 @@ class ManagedNode(LifecycleNode):
         self.get_logger().error(f'{why}\n{details}' if details else why)
         self._make_safe(why)
         self._end_loops()
-        self.diagnostics.update(ERROR, why)
         self.exit_code = 1
+        self.diagnostics.update(ERROR, why)
 
     def _make_safe(self, why):
         """Call ``safe_stop``; a fault in it must not stop the way out."""
@@ -346,8 +346,8 @@ class ManagedNode(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         except InputError as error:
             self.get_logger().error(f'cannot {word}: {error}')
-            self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             self.input_error = error
+            self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             if action == self._configure:
                 self._undo_setup()
             return TransitionCallbackReturn.FAILURE
