@@ -28,7 +28,7 @@ from pam_sim.gap.candidates import candidates, LIMITS
 from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
-from pam_sim.gap.fit import BOX, Found, Hypothesis
+from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
@@ -40,6 +40,7 @@ MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 IN_FULL = 3                  # of those that promise most with all errors at full weight
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+PULLED = 1.0                 # prior deviations of a number; from there on it may be wrong
 BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
 UNBENT = 0.98                # share of the gap
@@ -278,7 +279,7 @@ class Search:
         for cut in cuts:
             for known in cut.known:
                 z = current.known_z[cut.subsystem][cut.known.index(known)]
-                if known.of_rig and abs(z) > 0.5 * BOX and known.name not in taken:
+                if known.of_rig and abs(z) > PULLED and known.name not in taken:
                     rivals.append(self._rival(self.problem.fit(Hypothesis(
                         current.hypothesis.effects, (*current.hypothesis.freed, known.name)),
                         current.theta, current), known.name))
