@@ -35,7 +35,7 @@ import time
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import MESSAGE_TYPES
 from pam_actuation.nodes.endpoints import PolledSubscription
-from pam_actuation.rigging.client import RigClient
+from pam_actuation.rigging.client import NAME, RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 
@@ -113,6 +113,9 @@ def run_once(arguments):
     with tempfile.TemporaryDirectory() as folder:
         environment = node_environment(lock.domain_id, folder)
         wanted = parameters_of(arguments.valve, arguments.experiment, arguments.rig)
+        if not arguments.silent:        # or the first messages may go by before all is heard
+            for parameters in wanted.values():
+                parameters['await_subscriber'] = f'/{NAME}'
         nodes = {name: NodeProcess(name, NAMESPACE, parameters, environment, folder)
                  for name, parameters in wanted.items()}
         try:
