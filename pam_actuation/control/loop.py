@@ -60,6 +60,8 @@ _REASONS = {
             codes.FORCE_IMPLAUSIBLE)}
 _FROZEN = {CONTRACTION: codes.CONTRACTION_FROZEN, FORCE: codes.FORCE_FROZEN}
 _RESTING = {CONTRACTION: 0.002, FORCE: 5.0}     # m, N: up to there it may lie on a stop
+# A muscle that has become short enough to be slack may stay without force.
+_STOP_SWING_PA = {CONTRACTION: STOP_SWING_PA, FORCE: math.inf}
 
 REFERENCE_REASONS = {
     reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
@@ -132,10 +134,8 @@ class ControllerLoop:
         self.references = ReferenceBuffer(self.tracked, self._range)
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
-        # A muscle that has become short enough to be slack may stay without force.
         self._frozen = FrozenMeasurement(
-            _RESTING[self.tracked],
-            stop_swing_pa=math.inf if self.tracked == FORCE else STOP_SWING_PA)
+            _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None

@@ -80,14 +80,15 @@ def prepare_middleware(environment=os.environ):
 
 
 def _is_prepared(environment):
+    """Return whether the range was left to the profile for this machine."""
     return (environment.get(PROFILES, '').endswith(LOOPBACK)
-            and environment[RANGE] == BY_PROFILE)
+            and environment.get(RANGE) == BY_PROFILE)
 
 
 def unprepared(environment):
     """Return a copy of an environment in which ROS and Fast DDS take their own defaults."""
     left = {name: value for name, value in environment.items()
             if name not in (PROFILES, TRANSPORTS)}
-    if environment.get(RANGE) == BY_PROFILE and _is_prepared(environment):
+    if _is_prepared(environment):
         left[RANGE] = 'LOCALHOST'
     return left

@@ -21,7 +21,7 @@ import numpy as np
 from pam_actuation.experiments.separating import separation
 from pam_sim.gap.candidates import candidates
 from pam_sim.gap.choice import Choice, Named, Rival
-from pam_sim.gap.compare import CERTAIN_T, preference
+from pam_sim.gap.compare import CERTAIN_T, MIN_BLOCKS, preference
 from pam_sim.gap.cuts import Cut, Known
 from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.free_run import Recording
@@ -61,6 +61,7 @@ def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, sa
     found = preference(cut, base, better, worse)
     assert (found > CERTAIN_T) == says
     assert preference(cut, base, worse, better) == pytest.approx(-found, nan_ok=True)
+    assert math.isnan(found) == (telling < MIN_BLOCKS)
 
 
 @pytest.mark.parametrize('agree, says', [(1.0, True), (0.5, False)])
@@ -71,7 +72,7 @@ def test_many_quiet_blocks_that_agree_count_where_loud_ones_are_few(agree, says)
     after = np.where(place < 6, np.where(place % 2, 0.0, 2.8),
                      np.where(place % 10 < 10 * agree, 0.0, 0.65))
     base, better = errors(cut, 0, before), errors(cut, 0, after)
-    assert not preference(cut, base, better, base) >= CERTAIN_T
+    assert math.isnan(preference(cut, base, better, base))      # three blocks are no test
     assert (preference(cut, base, better, base, quiet=True) > CERTAIN_T) == says
 
 
