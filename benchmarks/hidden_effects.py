@@ -30,6 +30,7 @@ Exit code 1 when a bar is missed, 3 when the minutes were over before all was an
 
 import argparse
 import json
+import os
 from pathlib import Path
 import platform
 import shutil
@@ -66,6 +67,8 @@ def main():
     parser.add_argument('--number', type=int, default=330, help='cases (default: 330)')
     parser.add_argument('--seed', type=int, default=2026, help='of the examination')
     parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
+    parser.add_argument('--together', type=int, metavar='N', help='records that are answered at '
+                        'the same time (default: --jobs); 1 times a record on all cores')
     parser.add_argument('--kinds', help=f'only these, of {", ".join(truth_cases.SHARES)}')
     parser.add_argument('--rivals', type=int, default=0, metavar='N',
                         help='answer the first N cases by the other methods, too')
@@ -79,6 +82,7 @@ def main():
                         help='with --work: begin no case after N minutes; start again to go on')
     parser.add_argument('--out', type=Path, help='write the report here as well')
     args = parser.parse_args()
+    args.together = args.together or args.jobs
     args.until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.number, args.seed)
     if args.kinds:
@@ -97,7 +101,7 @@ def main():
 def examine(cases, work, args):
     """Run the four phases; return the exit code."""
     if not (work / 'sealed.json').exists():
-        keys = each(args, 'recording', record, [(c, work) for c in cases])
+        keys = each(args, 'recording', record, [(c, work) for c in cases], args.jobs)
         (work / 'orders.json').write_text(json.dumps({
             c.name: SMALL if 0.0 < max(key['gap_sigma'].values()) < 1.0 else 1.0
             for c, key in zip(cases, keys)}), encoding='utf-8')
@@ -127,7 +131,8 @@ def examine(cases, work, args):
     others = {name: [scored(keys[case], one) for case, one in given]
               for name, given in rivals.items()}
     text = '\n'.join([
-        f'{len(cases)} cases, seed {args.seed}, {args.jobs} processes on {platform.machine()}, '
+        f'{len(cases)} cases, seed {args.seed}, {args.together} at a time on '
+        f'{os.cpu_count()} cores ({platform.machine()}), '
         f'{sum(a["wall_s"] for a in answers.values()) / 60.0:.0f} min of answers.', '',
         report(found, FAMILIES, others), ''])
     print(text)
@@ -136,13 +141,13 @@ def examine(cases, work, args):
     return int(any(row.met is False for row in table(found, FAMILIES)))
 
 
-def each(args, what, function, arguments):
+def each(args, what, function, arguments, jobs=None):
     """
-    Return function(*a) of all arguments, in order, on some processes, with a progress bar.
+    Return function(*a) of all arguments, in order, on ``jobs`` processes, with a progress bar.
 
     Raises OutOfMinutes where some were not begun in time.
     """
-    results = Parallel(n_jobs=args.jobs, return_as='generator')(
+    results = Parallel(n_jobs=jobs or args.together, return_as='generator')(
         delayed(in_time)(args.until, function, a) for a in arguments)
     found = list(tqdm(results, total=len(arguments), desc=what, disable=None))
     done = sum(begun for begun, _ in found)

@@ -24,7 +24,8 @@ from dataclasses import dataclass, field
 from pam_sim.gap.candidates import is_narrow, LIMITS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.fit import Found, Hypothesis
-from pam_sim.gap.parts import FIT
+from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.side_by_side import side_by_side
 
 FIRST_STEP = 0.25            # least share of the gap a first effect explains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
@@ -131,11 +132,10 @@ class Choice:
         top = max((r.share[s] for r in ranked), default=0.0)
         # The worse the best explains, the further a fit may be from where it will end.
         near = top - max(CLOSE, UNPOLISHED * (1.0 - top))
-        for r in ranked:
-            if not r.polished and r.share[s] > near and gap(
-                    cut, r.found.errors[s]) > self.seen_gap:
-                r.found, r.polished = self.problem.polish(r.found), True
-                r.share = self.shares(r.found)
+        rough = [r for r in ranked if not r.polished and r.share[s] > near and gap(
+            cut, r.found.errors[s]) > self.seen_gap]
+        for r, found in zip(rough, side_by_side(self.problem.polish, [r.found for r in rough])):
+            r.found, r.polished, r.crossed, r.share = found, True, None, self.shares(found)
         ranked = without_limits(ranked, current, s)
         if not ranked:
             return []
@@ -154,7 +154,7 @@ class Choice:
         tied = [r for r in ranked if is_tied(r)]
         if len(tied) > 1:
             self._cross(tied, current, cut)
-            tied = [r for r in tied if is_tied(r)]
+            tied = self._elsewhere([r for r in tied if is_tied(r)], current, cut)
         strain = min(self._strain(r.found) for r in tied)
         tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
         names = {r.name for r in tied}
@@ -169,13 +169,33 @@ class Choice:
     def _cross(self, tied, current, cut):
         """Compare those that are tied with the first of them once more, on all of the data."""
         s = cut.subsystem
-        for r in tied:
-            r.crossed = r.crossed or self.problem.crossed(r.found)
+        fresh = [r for r in tied if r.crossed is None]
+        for r, found in zip(fresh, side_by_side(
+                self.problem.crossed, [r.found for r in fresh])):
+            r.crossed = found
         first = tied[0]
         for r in tied[1:]:
             r.t[s] = preference(
                 cut, current.errors[s], first.found.errors[s], r.found.errors[s],
                 crossed=(FIT, first.crossed.errors[s], r.crossed.errors[s]))
+
+    def _elsewhere(self, tied, current, cut):
+        """
+        Return the rivals that do not leave a cut without a gap clearly worse than the others do.
+
+        A bias of a sensor moves the cut before it, too, where a threshold of the same size does
+        not; where something else is still missing that could be either's doing.
+        """
+        for other in self.problem.cuts:
+            s = other.subsystem
+            if (other is cut or len(tied) < 2 or gap(other, current.errors[s]) > self.seen_gap
+                    or not any(self._touches(r, current, other) for r in tied)):
+                continue
+            best = min(tied, key=lambda r: other.chi2(r.found.errors[s], SELECT))
+            tied = [r for r in tied if r is best or not preference(
+                other, self.base.errors[s], best.found.errors[s], r.found.errors[s], quiet=True,
+                crossed=(FIT, best.crossed.errors[s], r.crossed.errors[s])) >= BETTER_T]
+        return tied
 
     def _strain(self, found):
         """Return the squared pulls of all numbers that should have stayed where they were."""

@@ -25,13 +25,15 @@ Slopes with respect to the known numbers are taken once for all rivals of a step
 change little, and each iteration costs only the parameters of the effects.
 """
 
-from dataclasses import dataclass
+import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.noise import autocorrelation_time
 from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.side_by_side import side_by_side
 from scipy.optimize import least_squares
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
@@ -46,6 +48,7 @@ POLISHES = 4
 WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
 SETTLED = 0.3                # relative change of the weights that ends the rounds
 EVALUATIONS = 12
+FTOL, XTOL = 1e-3, 1e-2      # slopes of known numbers are from elsewhere; polishing does the rest
 SCORE_BLOCKS = 4             # test blocks whose scores are summed
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
@@ -167,9 +170,17 @@ class Problem:
         for cut in self.cuts if cuts is None else cuts:
             z = known_z[cut.subsystem]
             base = _errors(cut, rig, z)
-            self.slopes[cut.subsystem] = np.column_stack([
-                (_errors(cut, rig, z + k.step * unit) - base) / k.step
-                for k, unit in zip(cut.known, np.eye(z.size))])
+            self.slopes[cut.subsystem] = np.column_stack(side_by_side(
+                lambda j, cut=cut, z=z, base=base: (_errors(cut, rig, z + cut.known[j].step * (
+                    np.arange(z.size) == j)) - base) / cut.known[j].step, range(z.size)))
+
+    def _own(self, **changed):
+        """Return a copy whose slopes and settings are its own; the cuts are the same."""
+        own = copy.copy(self)
+        own.slopes = dict(self.slopes)
+        for name, value in changed.items():
+            setattr(own, name, value)
+        return own
 
     def _slopes_at(self, found):
         """Take the slopes at a fit, of the cuts that fitting it again looks at."""
@@ -226,30 +237,24 @@ class Problem:
 
     def polish(self, found):
         """Return a fit that went on with slopes taken where it stands, as long as that helps."""
-        kept = dict(self.slopes)
+        own = self._own()
         for _ in range(POLISHES):
-            self._slopes_at(found)
-            again = self.fit(found.hypothesis, found.theta, found)
+            own._slopes_at(found)
+            again = own.fit(found.hypothesis, found.theta, found)
             before, after = self.cost(found), self.cost(again)
             found = again if after < before else found
             if after > WORTH_POLISHING * before:
                 break
-        self.slopes = kept
         return found
 
     def crossed(self, found):
         """Return the same hypothesis fitted to the part of the data that judges, from there."""
-        kept, self.use = self.use, (SELECT,)
-        other = self.fit(found.hypothesis, found.theta, found)
-        self.use = kept
-        return other
+        return self._own(use=(SELECT,)).fit(found.hypothesis, found.theta, found)
 
     def unbent(self, found, box):
         """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""
-        kept, self.box = self.box, box
-        held = self.polish(self.fit(found.hypothesis, found.theta, found))
-        self.box = kept
-        return held
+        own = self._own(box=box)
+        return own.polish(own.fit(found.hypothesis, found.theta, found))
 
     def cost(self, found):
         """Return the mean squared error over the fitted parts, in floors squared, all cuts."""
@@ -258,15 +263,14 @@ class Problem:
 
     def precision(self, found):
         """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
-        kept = dict(self.slopes)
-        self._slopes_at(found)
-        names, likelihood, blocks = self._covariances(found)
-        held = self.fit(found.hypothesis, found.theta, found, hold=True)
-        self.slopes = kept
+        own = self._own()
+        own._slopes_at(found)
+        touched = [c for c in self.cuts if found.hypothesis.touches(c)]
+        names, likelihood, blocks = own._covariances(found, touched)
+        held = own.fit(found.hypothesis, found.theta, found, hold=True)
         count = len(found.theta)
         chosen = [*range(count), *(names.index(n) for n in found.hypothesis.freed)]
-        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in self.cuts
-                                           if found.hypothesis.touches(c)])
+        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in touched])
         pick = np.ix_(chosen, chosen)
         return Precision(likelihood[pick], blocks[pick], z[chosen])
 
@@ -278,26 +282,50 @@ class Problem:
         there. Infinite for an effect of shapes alone, of which no value inside its
         range means none.
         """
-        kept = dict(self.slopes)
-        self._slopes_at(found)
+        own = self._own()
+        own._slopes_at(found)
         effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
         held = [first + j for j, f in enumerate(effect.free) if f.shape]
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
-        _, *covariances = self._covariances(found, held)
-        self.slopes = kept
+        touched = [c for c in self.cuts if found.hypothesis.touches(c)]
+        _, *covariances = own._covariances(found, touched, held)
         theta = found.theta[size]
         return min((float(np.sqrt(theta @ np.linalg.pinv(c[np.ix_(size, size)]) @ theta))
                     for c in covariances if size), default=np.inf)
 
-    def _covariances(self, found, held=()):
+    def spread(self, found):
+        """
+        Return how uncertain a fit is: its parameters, then the known numbers of every cut.
+
+        Returns
+        -------
+        covariances : list of numpy.ndarray, shape (K, K)
+            By likelihood and by blocks, as of ``Precision``.
+        at : callable
+            ``at(j, step)``: the fit with number ``j`` moved by ``step``, not fitted again.
+
+        """
+        own = self._own()
+        own.take_slopes(found.settings(), found.known_z)
+        _, *covariances = own._covariances(found, self.cuts)
+        search = _Search(self, found.hypothesis, self.cuts, dict(found.temper))
+        x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in self.cuts])
+
+        def at(j, step):
+            theta, known_z = search.split(x + step * (np.arange(x.size) == j))
+            return replace(found, theta=theta, known_z=dict(known_z))
+
+        return covariances, at
+
+    def _covariances(self, found, cuts, held=()):
         """
         Return (names of all numbers, None for theta; covariance by likelihood; by blocks).
 
-        ``held`` are places that do not move.
+        Of the fit's own parameters and the numbers of ``cuts``; ``held`` are places that do not
+        move.
         """
-        touched = [c for c in self.cuts if found.hypothesis.touches(c)]
-        search = _Search(self, found.hypothesis, touched, dict(found.temper))
-        x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in touched])
+        search = _Search(self, found.hypothesis, cuts, dict(found.temper))
+        x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in cuts])
         slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
         slope[:, list(held)] = 0.0
         # What the data do not touch is unknown, not certain.
@@ -306,7 +334,7 @@ class Problem:
         np.add.at(scores, blocks, slope[:blocks.size] * residuals[:blocks.size, np.newaxis])
         priors = slope[blocks.size:]
         between = scores.T @ scores + priors.T @ priors
-        names = [None] * len(found.theta) + [k.name for c in touched for k in c.known]
+        names = [None] * len(found.theta) + [k.name for c in cuts for k in c.known]
         return names, whole, whole @ between @ whole
 
     def fit_base(self):
@@ -419,7 +447,7 @@ class _Search:
         margin = 1e-6 * (high - low)
         start = np.clip(x, low + margin, high - margin)
         return least_squares(self.residuals, start, self.slopes, (low, high), x_scale='jac',
-                             ftol=1e-5, xtol=1e-4, max_nfev=EVALUATIONS).x
+                             ftol=FTOL, xtol=XTOL, max_nfev=EVALUATIONS).x
 
     def settle(self, x):
         """Return (solution, errors by subsystem) once weights and errors agree."""

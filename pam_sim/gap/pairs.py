@@ -29,6 +29,7 @@ from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.fit import Hypothesis
 from pam_sim.gap.screen import AMPLITUDE_RANGE, flat_spaces_of, free_signature
+from pam_sim.gap.side_by_side import side_by_side
 
 FITTED = 4                   # of the most promising pairs
 PROMISED = 0.8               # share of the gap; what is in no library promises less
@@ -137,13 +138,17 @@ def pair_of(search, cut):
         Where there is a gap.
 
     """
-    s, rivals = cut.subsystem, []
-    for candidates, start in promising_pairs(search.problem, search.base, search.screened, cut):
+    def fitted(pair):
         if search.out_of_time():
             return None
-        found = search.problem.fit(Hypothesis(candidates), start)
-        rivals.append(Rival(' + '.join(c.name for c in candidates), found,
-                            search.choice.shares(found)))
+        found = search.problem.fit(Hypothesis(pair[0]), pair[1])
+        return Rival(' + '.join(c.name for c in pair[0]), found, search.choice.shares(found))
+
+    s = cut.subsystem
+    rivals = side_by_side(fitted, promising_pairs(
+        search.problem, search.base, search.screened, cut))
+    if None in rivals:
+        return None
     rivals = [r for r in rivals if not any(
         Rival(c.name, r.found).at_edge for c in r.found.hypothesis.effects)]
     if not rivals:

@@ -24,9 +24,9 @@ nothing.
 from dataclasses import replace
 import math
 
+from pam_sim.gap.finish import NAMED
 from pam_sim.gap.fit import Hypothesis
 from pam_sim.gap.prove import held_without, VISIBLE
-from pam_sim.gap.search import NAMED
 
 REFUTED = 0.5                # of what two are apart, squared; 1 if the better one is true
 

@@ -20,7 +20,6 @@ known numbers can do within their priors; what is left is the effect's signature
 its projection on the remaining errors gives amplitude and promise in closed form.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,7 +27,7 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.gap.candidates import Candidate
 from pam_sim.gap.cuts import acts_on
-from pam_sim.rollout.batch import default_workers
+from pam_sim.gap.side_by_side import side_by_side
 
 AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a fit
 
@@ -72,8 +71,7 @@ def screen(problem, near, found):
 
     """
     spaces, flat = spaces_of(problem, near), flat_spaces_of(problem, near)
-    with ThreadPoolExecutor(default_workers()) as pool:
-        return list(pool.map(lambda c: _screened(problem, near, c, spaces, flat), found))
+    return side_by_side(lambda c: _screened(problem, near, c, spaces, flat), found)
 
 
 def spaces_of(problem, near):

@@ -21,34 +21,26 @@ cannot be told apart they stay together as a set. At the end every effect must b
 missed when it is left out.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from pam_sim.gap.candidates import candidates, LIMITS
-from pam_sim.gap.choice import ALMOST, Choice, CLOSE, LATER_STEP, Named, RIVAL, Rival
-from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
-from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Choice, CLOSE, Rival
+from pam_sim.gap.compare import gap
+from pam_sim.gap.cuts import acts_on
+from pam_sim.gap.finish import Finish
 from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.screen import screen
-from pam_sim.rollout.batch import default_workers
+from pam_sim.gap.side_by_side import side_by_side
 
 MAX_EFFECTS = 3
 PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 IN_FULL = 3                  # of those that promise most with all errors at full weight
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
-NAMED = 0.9                  # least share of the gap that all effects of a cut explain
 PULLED = 1.0                 # prior deviations of a number; from there on it may be wrong
-BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
-STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
-UNBENT = 0.98                # share of the gap
-NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
-CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
-DONE = 0.01                  # rest of the gap that formulations may leave
-TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
-RIVALS = 4                   # that are ranked again when further effects are in
+DONE = 0.02                  # rest of the gap that formulations may leave
 
 
 @dataclass
@@ -78,20 +70,7 @@ class Outcome:
     screened: list = field(default_factory=list)
 
 
-def within_the_chain(found, place):
-    """
-    Return whether an effect is a time so short that any sensor's filter may be its cause.
-
-    A latency stands for the filters that all sensors share; that leaves a part of them. What acts
-    in the valve comes before the latency of its signal, and may stand for all of it.
-    """
-    candidate = found.hypothesis.effects[place]
-    longest_s = LATENCY_SD_S + (LATENCY_PRIOR_S if acts_on(candidate.effect, 'valve') else 0.0)
-    return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
-            and found.values()[place][candidate.free[0].name] < longest_s)
-
-
-class Search:
+class Search(Finish):
     """
     Search for the missing effects.
 
@@ -125,7 +104,7 @@ class Search:
 
     def run(self):
         """Return the Outcome."""
-        current, named, closed = self.base, [], set()
+        current, named, closed = self.base, [], {}
         while len(named) < MAX_EFFECTS and not self.out_of_time():
             open_cuts = [c for c in self.problem.cuts
                          if c.subsystem not in closed and self._is_open(c, current)]
@@ -139,11 +118,12 @@ class Search:
             self.problem.take_slopes(current.settings(), current.known_z)
         current, named, explained = self._finished(current, named)
         current, named, explained = self._paired(current, named, explained)
+        current, named, explained = self._wrong_numbers(current, named, explained)
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
                        self.screened)
 
     def _round(self, current, open_cuts, closed):
-        """Return what is taken in for the open cuts; add those without a winner to ``closed``."""
+        """Return what is taken in for the open cuts; ``closed`` tells at which fit one was not."""
         rivals = self._rivals(current, open_cuts)
         self.set_levels(rivals, open_cuts)
         joint = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
@@ -151,7 +131,8 @@ class Search:
             return [joint]
         taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
         taken = [w for w in taken if w]
-        closed |= {c.subsystem for c in open_cuts} - {w.subsystem for w in taken}
+        won = {w.subsystem for w in taken}
+        closed.update((c.subsystem, current) for c in open_cuts if c.subsystem not in won)
         return [w for i, w in enumerate(taken) if w.name not in [o.name for o in taken[:i]]]
 
     def _reopened(self, current, closed):
@@ -166,25 +147,14 @@ class Search:
             return []
         shared = [c for c in self.pool if all(acts_on(c.effect, cut.subsystem) for cut in cuts)]
         for cut in cuts:
-            if cut.subsystem in closed and self._is_open(cut, current):
+            if closed.get(cut.subsystem, current) is not current and self._is_open(cut, current):
                 rivals = self._rivals(current, [cut], shared)
                 self.set_levels(rivals, [cut])
                 taken = self.choice.winner(rivals, current, cut, self.fitted)
                 if taken is not None:
-                    closed.discard(cut.subsystem)
+                    del closed[cut.subsystem]
                     return [taken]
         return []
-
-    def _finished(self, current, named):
-        """Return (fit, what stays named, share explained by cut): only what is needed stays."""
-        current, named = self._eliminate(current, named)
-        current, named = self._established(*self._resolve(current, named))
-        current = self._straightened(current)
-        explained = self._explained(current)
-        poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
-        for w in [w for w in named if w.subsystem in poor]:
-            current = self._swapped(current, w.name)
-        return current, [w for w in named if w.subsystem not in poor], explained
 
     def _paired(self, current, named, explained):
         """
@@ -217,7 +187,9 @@ class Search:
         seen = min(gap(cut, self.base.errors[s], part) for part in (FIT, SELECT))
         if seen > self.seen_gap:
             return seen
-        promise = max((p.promise.get(s, 0.0) for p in self.screened), default=0.0)
+        # What drifts slowly has no weight against its own memory, whatever explains it.
+        promise = max((p.promise.get(s, 0.0) for q in self.screened for p in (q, q.flat)),
+                      default=0.0)
         return promise * cut.chi2(self.base.errors[s], FIT)
 
     def set_levels(self, rivals, cuts):
@@ -238,31 +210,6 @@ class Search:
             return first > self.least_gap
         return left > max(self.seen_gap, DONE * first)
 
-    def _is_poor(self, cut, current, explained):
-        """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
-        s = cut.subsystem
-        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
-        return self._is_bent(cut, current) or explained.get(s, 0.0) < least
-
-    @staticmethod
-    def _is_bent(cut, current):
-        return any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
-                   for known, z in zip(cut.known, current.known_z[cut.subsystem]))
-
-    def _straightened(self, current):
-        """
-        Return the fit with its numbers near their priors, where it does not need them bent.
-
-        A small misfit of the form can pull a number far, and a fit can stop beside its best.
-        """
-        bent = [c.subsystem for c in self.problem.cuts if current.hypothesis.touches(c)
-                and self._is_bent(c, current)]
-        if not bent:
-            return current
-        held = self.problem.unbent(current, STRAIGHT)
-        shares = self.choice.shares(held)
-        return held if all(shares[s] > UNBENT for s in bent) else current
-
     def _explained(self, current):
         return {s: explained for s, explained in self.choice.shares(current).items()
                 if self.first_gap[s] > self.least_gap}
@@ -276,23 +223,26 @@ class Search:
             self.problem, current, [c for c in pool if c.name not in taken])
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
-        for cut in cuts:
-            for known in cut.known:
-                z = current.known_z[cut.subsystem][cut.known.index(known)]
-                if known.of_rig and abs(z) > PULLED and known.name not in taken:
-                    rivals.append(self._rival(self.problem.fit(Hypothesis(
-                        current.hypothesis.effects, (*current.hypothesis.freed, known.name)),
-                        current.theta, current), known.name))
-        best = {c.subsystem: max((r.share[c.subsystem] for r in rivals), default=0.0)
-                for c in cuts}
-        contending = {r.name for r in rivals for s, top in best.items()
-                      if r.share[s] > top - CONTENDS and r.share[s] > 0.0}
+        pulled = [known.name for cut in cuts
+                  for known, z in zip(cut.known, current.known_z[cut.subsystem])
+                  if known.of_rig and abs(z) > PULLED and known.name not in taken]
+        rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
+            current.hypothesis.effects, (*current.hypothesis.freed, name)),
+            current.theta, current), name), pulled)
+        contending = set().union(*(self._contending(rivals, current, c) for c in cuts))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
             s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
         self.fitted = rivals
         return self._best_of_name(rivals)
+
+    def _contending(self, rivals, current, cut):
+        """Return the names of which a formulation is near enough to the best in a cut."""
+        s = cut.subsystem
+        top = max((r.share[s] for r in rivals), default=0.0)
+        least = top - CONTENDS * (1.0 - self.choice.shares(current)[s])
+        return {r.name for r in rivals if r.share[s] > max(least, 0.0)}
 
     def _promising(self, screened, cuts):
         """Return the best formulation of every name that promises something."""
@@ -317,9 +267,8 @@ class Search:
 
     def _fit_all(self, current, screened):
         """Return the rivals of screened candidates; the simulations hold no lock."""
-        with ThreadPoolExecutor(default_workers()) as pool:
-            return [r for r in pool.map(lambda s: self._fit(current, s), screened)
-                    if r is not None]
+        return [r for r in side_by_side(lambda s: self._fit(current, s), screened)
+                if r is not None]
 
     def _fit(self, current, screened):
         if self.out_of_time():
@@ -362,14 +311,12 @@ class Search:
             h = current.hypothesis
             old = h.effects[place]
             rows = h.rows(place)
-            tried = [current]
-            for c in self.pool:
-                if c.name != old.name or c == old or len(h.effects) < 2:
-                    continue
-                theta = [*current.theta[:rows.start], *(f.coordinate(f.scale) for f in c.free),
-                         *current.theta[rows.stop:]]
-                effects = (*h.effects[:place], c, *h.effects[place + 1:])
-                tried.append(self.problem.fit(Hypothesis(effects, h.freed), theta, current))
+            others = [c for c in self.pool
+                      if c.name == old.name and c != old and len(h.effects) > 1]
+            tried = [current, *side_by_side(lambda c, place=place, rows=rows: self.problem.fit(
+                Hypothesis((*h.effects[:place], c, *h.effects[place + 1:]), h.freed),
+                [*current.theta[:rows.start], *(f.coordinate(f.scale) for f in c.free),
+                 *current.theta[rows.stop:]], current), others)]
             current = max(tried, key=lambda f: sum(self._explained(f).values()))
         return current
 
@@ -393,105 +340,3 @@ class Search:
                 effects.append(added.effects[-1])
                 theta += list(put.found.theta_of(len(added.effects) - 1))
         return self.problem.fit(Hypothesis(tuple(effects), tuple(freed)), theta, current)
-
-    def _eliminate(self, current, named):
-        """Drop what is not missed when it is left out, once there are several."""
-        for w in list(named):
-            if len(named) < 2:
-                break
-            if w not in named:
-                continue
-            without = self._swapped(current, w.name)
-            missed = any(self._is_missed(cut, current, without) for cut in self.problem.cuts)
-            if not missed or not self.matters(current, without):
-                w, without = self._simpler(current, w, without, named)
-                current, named = without, [o for o in named if o is not w]
-        return current, named
-
-    def _is_missed(self, cut, current, without):
-        """
-        Return whether a cut is explained clearly worse without an effect.
-
-        That may be another cut than its own: what takes its place there may do harm here.
-        """
-        s = cut.subsystem
-        if self.first_gap[s] <= self.least_gap:
-            return False
-        base = self.base.errors[s]
-        rest = 1.0 - share(cut, base, without.errors[s])
-        gained = rest - (1.0 - share(cut, base, current.errors[s]))
-        return (gained > 0.0 and gained >= LATER_STEP * rest and preference(
-            cut, base, current.errors[s], without.errors[s]) >= CERTAIN_T)
-
-    def _simpler(self, current, w, without, named):
-        """
-        Return (which effect goes, the fit without it) where ``w`` is not missed.
-
-        The other one goes where, without ``w``, it turns into that, its limit, and ``w`` alone
-        explains almost as much as both.
-        """
-        for other in named:
-            if (w.name, other.name) in LIMITS and Rival(other.name, without).at_edge:
-                alone, s = self._swapped(current, other.name), w.subsystem
-                if self.choice.shares(alone)[s] > ALMOST * self.choice.shares(current)[s]:
-                    return other, alone
-        return w, without
-
-    def _established(self, current, named):
-        """
-        Drop effects whose size does not clearly differ from none, or is the measurement's.
-
-        One of shapes alone, such as the volume of a reservoir, is none at the end of its range.
-        """
-        for w in list(named):
-            names = [c.name for c in current.hypothesis.effects]
-            if w.name not in names:
-                continue
-            place = names.index(w.name)
-            of_shapes = all(f.shape for f in current.hypothesis.effects[place].free)
-            if (within_the_chain(current, place)
-                    or (of_shapes and Rival(w.name, current).at_edge)
-                    or self.problem.certainty(current, place) < CERTAIN_SIZE):
-                current = self._swapped(current, w.name)
-                named = [o for o in named if o is not w]
-        return current, named
-
-    def _resolve(self, current, named):
-        """Rank again the rivals of each effect now that the others are in the model."""
-        found = []
-        for w in named:
-            others = set(current.hypothesis.names) - {w.name}
-            rivals = [r for r in w.rivals if r.name != w.name and r.name not in others]
-            # What the effect took in later replaced may have been ranked before it.
-            beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS] if any(
-                o is not w and o.subsystem == w.subsystem for o in named) else []
-            near = beside or self._across(rivals, w, named)
-            if not near:
-                found.append(w)
-                continue
-            swapped = [Rival(w.name, current)] + [
-                Rival(r.name, self._swapped(current, w.name, r)) for r in near]
-            for r in swapped:
-                r.share = self.choice.shares(r.found)
-            tied = self.choice.tied(
-                swapped, self._swapped(current, w.name), self._cut(w.subsystem))
-            if not beside and w.name not in [r.name for r in tied]:
-                found.append(w)
-            elif tied:
-                current = tied[0].found
-                found.append(Named(tied[0].name, w.subsystem, swapped,
-                                   tuple(r.name for r in tied), w.formulations))
-        return current, found
-
-    @staticmethod
-    def _across(rivals, w, named):
-        """
-        Return the rivals that had to explain alone what two effects of two cuts do.
-
-        They act in both and explain the other; beside it they may do as well as this one.
-        """
-        elsewhere = {o.subsystem for o in named if o.subsystem != w.subsystem}
-        return [r for r in rivals if any(r.share.get(s, 0.0) > RIVAL for s in elsewhere) and any(
-            c.name == r.name and acts_on(c.effect, w.subsystem)
-            and any(acts_on(c.effect, s) for s in elsewhere)
-            for c in r.found.hypothesis.effects)]

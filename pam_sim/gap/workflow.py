@@ -20,6 +20,7 @@ import time
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.doubt import is_contradicted
 from pam_sim.gap.fingerprint import fingerprint
 from pam_sim.gap.fit import BOX, Problem
 from pam_sim.gap.free_run import Recording
@@ -39,7 +40,6 @@ from scipy.stats import norm
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
-CONFIRMED = 0.3              # of what an effect moves; the truth takes all of it out of the errors
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -111,7 +111,7 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     if final is not first:
         proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
-    while outcome.named and proof.confirmed() < CONFIRMED:
+    while outcome.named and is_contradicted(proof, problem, final, certify is not None, seed):
         name, final = least_confirmed(
             outcome.named, problem, base, final, proof, certify is not None)
         result.remarks.append(f'What {name} would explain of the recordings is not found '

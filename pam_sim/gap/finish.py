@@ -1,0 +1,223 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What of the effects that were taken in stays: each must be missed when it is left out.
+
+It must also be ranked first beside the others, have a size that differs from none, and explain
+its cut without numbers that are bent for it.
+"""
+
+from pam_sim.gap.candidates import LIMITS
+from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
+from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
+from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
+from pam_sim.gap.fit import Hypothesis
+from pam_sim.gap.parts import SELECT
+from pam_sim.gap.side_by_side import side_by_side
+
+NAMED = 0.9                  # least share of the gap that all effects of a cut explain
+BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
+STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
+UNBENT = 0.98                # share of the gap
+NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
+CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
+TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
+RIVALS = 4                   # that are ranked again when further effects are in
+
+
+def within_the_chain(found, place):
+    """
+    Return whether an effect is a time so short that any sensor's filter may be its cause.
+
+    A latency stands for the filters that all sensors share; that leaves a part of them. What acts
+    in the valve comes before the latency of its signal, and may stand for all of it.
+    """
+    candidate = found.hypothesis.effects[place]
+    longest_s = LATENCY_SD_S + (LATENCY_PRIOR_S if acts_on(candidate.effect, 'valve') else 0.0)
+    return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
+            and found.values()[place][candidate.free[0].name] < longest_s)
+
+
+class Finish:
+    """
+    The last stage of a search; a part of ``Search``, with its fits, gaps and choice.
+
+    It needs ``problem``, ``choice``, ``base``, ``seen_gap``, ``first_gap``, ``least_gap``,
+    ``matters``, ``_swapped``, ``_explained`` and ``_cut`` of it.
+    """
+
+    def _finished(self, current, named):
+        """Return (fit, what stays named, share explained by cut): only what is needed stays."""
+        current, named = self._eliminate(current, named)
+        current, named = self._established(*self._resolve(current, named))
+        current = self._straightened(current)
+        explained = self._explained(current)
+        poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
+        for w in [w for w in named if w.subsystem in poor]:
+            current = self._swapped(current, w.name)
+        return current, [w for w in named if w.subsystem not in poor], explained
+
+    def _eliminate(self, current, named):
+        """Drop what is not missed when it is left out, once there are several."""
+        for w in list(named):
+            if len(named) < 2:
+                break
+            if w not in named:
+                continue
+            without = self._swapped(current, w.name)
+            missed = any(self._is_missed(cut, current, without) for cut in self.problem.cuts)
+            if not missed or not self.matters(current, without):
+                w, without = self._simpler(current, w, without, named)
+                current, named = without, [o for o in named if o is not w]
+        return current, named
+
+    def _is_missed(self, cut, current, without):
+        """
+        Return whether a cut is explained clearly worse without an effect.
+
+        That may be another cut than its own: what takes its place there may do harm here.
+        """
+        s = cut.subsystem
+        if self.first_gap[s] <= self.least_gap:
+            return False
+        base = self.base.errors[s]
+        rest = 1.0 - share(cut, base, without.errors[s])
+        gained = rest - (1.0 - share(cut, base, current.errors[s]))
+        return (gained > 0.0 and gained >= LATER_STEP * rest and preference(
+            cut, base, current.errors[s], without.errors[s]) >= CERTAIN_T)
+
+    def _simpler(self, current, w, without, named):
+        """
+        Return (which effect goes, the fit without it) where ``w`` is not missed.
+
+        The other one goes where, without ``w``, it turns into that, its limit, and ``w`` alone
+        explains almost as much as both.
+        """
+        for other in named:
+            if (w.name, other.name) in LIMITS and Rival(other.name, without).at_edge:
+                alone, s = self._swapped(current, other.name), w.subsystem
+                if self.choice.shares(alone)[s] > ALMOST * self.choice.shares(current)[s]:
+                    return other, alone
+        return w, without
+
+    def _established(self, current, named):
+        """
+        Drop effects whose size does not clearly differ from none, or is the measurement's.
+
+        One of shapes alone, such as the volume of a reservoir, is none at the end of its range.
+        """
+        for w in list(named):
+            names = [c.name for c in current.hypothesis.effects]
+            if w.name not in names:
+                continue
+            place = names.index(w.name)
+            of_shapes = all(f.shape for f in current.hypothesis.effects[place].free)
+            if (within_the_chain(current, place)
+                    or (of_shapes and Rival(w.name, current).at_edge)
+                    or self.problem.certainty(current, place) < CERTAIN_SIZE):
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
+        return current, named
+
+    def _resolve(self, current, named):
+        """Rank again the rivals of each effect now that the others are in the model."""
+        found = []
+        for w in named:
+            others = set(current.hypothesis.names) - {w.name}
+            rivals = [r for r in w.rivals if r.name != w.name and r.name not in others]
+            # What the effect took in later replaced may have been ranked before it.
+            beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RIVALS] if any(
+                o is not w and o.subsystem == w.subsystem for o in named) else []
+            near = beside or self._across(rivals, w, named)
+            if not near:
+                found.append(w)
+                continue
+            swapped = [Rival(w.name, current)] + side_by_side(
+                lambda r, name=w.name, kept=current: Rival(
+                    r.name, self._swapped(kept, name, r)), near)
+            for r in swapped:
+                r.share = self.choice.shares(r.found)
+            tied = self.choice.tied(
+                swapped, self._swapped(current, w.name), self._cut(w.subsystem))
+            if not beside and w.name not in [r.name for r in tied]:
+                found.append(w)
+            elif tied:
+                current = tied[0].found
+                found.append(Named(tied[0].name, w.subsystem, swapped,
+                                   tuple(r.name for r in tied), w.formulations))
+        return current, found
+
+    @staticmethod
+    def _across(rivals, w, named):
+        """
+        Return the rivals that had to explain alone what two effects of two cuts do.
+
+        They act in both and explain the other; beside it they may do as well as this one.
+        """
+        elsewhere = {o.subsystem for o in named if o.subsystem != w.subsystem}
+        return [r for r in rivals if any(r.share.get(s, 0.0) > RIVAL for s in elsewhere) and any(
+            c.name == r.name and acts_on(c.effect, w.subsystem)
+            and any(acts_on(c.effect, s) for s in elsewhere)
+            for c in r.found.hypothesis.effects)]
+
+    def _is_poor(self, cut, current, explained):
+        """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
+        s = cut.subsystem
+        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
+        return self._is_bent(cut, current) or explained.get(s, 0.0) < least
+
+    @staticmethod
+    def _is_bent(cut, current):
+        return any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
+                   for known, z in zip(cut.known, current.known_z[cut.subsystem]))
+
+    def _straightened(self, current):
+        """
+        Return the fit with its numbers near their priors, where it does not need them bent.
+
+        A small misfit of the form can pull a number far, and a fit can stop beside its best.
+        """
+        bent = [c.subsystem for c in self.problem.cuts if current.hypothesis.touches(c)
+                and self._is_bent(c, current)]
+        if not bent:
+            return current
+        held = self.problem.unbent(current, STRAIGHT)
+        shares = self.choice.shares(held)
+        return held if all(shares[s] > UNBENT for s in bent) else current
+
+    def _wrong_numbers(self, current, named, explained):
+        """
+        Return the same with numbers named that hide a gap by themselves.
+
+        A cut without a gap has none to explain; where that takes a number far from its prior, the
+        number is what is wrong.
+        """
+        for cut in self.problem.cuts:
+            s = cut.subsystem
+            if (any(w.subsystem == s for w in named)
+                    or cut.chi2(self.base.errors[s], SELECT) > 1.0 + self.seen_gap):
+                continue
+            for known, z in zip(cut.known, self.base.known_z[s]):
+                if not known.of_rig or abs(z) < BENT:
+                    continue
+                h = current.hypothesis
+                freed = self.problem.polish(self.problem.fit(
+                    Hypothesis(h.effects, (*h.freed, known.name)), current.theta, current))
+                if abs(freed.known_z[s][cut.known.index(known)]) > BENT:
+                    rival = Rival(known.name, freed, self.choice.shares(freed))
+                    current, named = freed, [*named, Named(
+                        known.name, s, [rival], (known.name,), [rival])]
+                    explained = {**explained, s: rival.share[s]}
+        return current, named, explained

@@ -1,0 +1,126 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the certify data can say at all, and what the other cut says of a tie."""
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_sim.gap import doubt as doubts
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.choice import Choice, Rival
+from pam_sim.gap.cuts import Cut, cuts_of
+from pam_sim.gap.doubt import doubt, is_contradicted
+from pam_sim.gap.fit import Found, Hypothesis, Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.parts import SELECT
+from pam_sim.gap.prove import Proof
+from pam_sim.gap.side_by_side import side_by_side
+import pytest
+
+TIME_S = np.arange(4000) * 0.005
+EFFECT_M = 2e-5 * np.sin(TIME_S)
+
+
+class Given(Proof):
+    """Two models that are apart by ``EFFECT_M``; one number moves the first like ``form``."""
+
+    def __init__(self, measured_m, form):
+        class recording:
+            signals, measured, messages = ('contraction',), {'contraction': measured_m}, 1
+
+        self.recording, self.form, self.simulations = recording, form, 0
+        self.part = {'contraction': np.ones(TIME_S.size, dtype=bool)}
+        self.noise = {'contraction': 1e-5}
+        self.refit, self.after = ({'contraction': x} for x in (0.0 * EFFECT_M, EFFECT_M))
+
+    def run(self, found, whole, stamp_shift_s=None, start_error_pa=0.0):
+        """Return the final model with its number moved; stamps do nothing here."""
+        off = 0.0 if stamp_shift_s is not None else found
+        return {'contraction': EFFECT_M + off * self.form}
+
+    @staticmethod
+    def spread(found):
+        """Stand for a problem with one number, known within 1."""
+        return [np.eye(1), np.eye(1)], lambda j, step: step
+
+
+@pytest.mark.parametrize('form, contradicted', [
+    (1e-7 * np.cos(TIME_S), True), (1e-5 * np.cos(3.0 * TIME_S), True),
+    (2e-5 * np.sin(TIME_S), False)])
+def test_what_a_number_may_be_off_contradicts_nothing(monkeypatch, form, contradicted):
+    monkeypatch.setattr(doubts, 'start_error_sd', lambda recording: 0.0)
+    noise = 1e-5 * np.random.default_rng(2).standard_normal(TIME_S.size)
+    # The effect is not there; only what looks like it could have hidden it.
+    proof = Given(noise, form)
+    assert proof.confirmed() == pytest.approx(-1.0, abs=0.1)
+    assert is_contradicted(proof, Given, None, True) == contradicted
+    assert not is_contradicted(Given(noise + EFFECT_M, 1e-7 * form), Given, None, True)
+    # Twice what the number does in the direction in which the models are apart.
+    expected = 2.0 * abs(np.mean(form * EFFECT_M)) / np.mean(EFFECT_M ** 2)
+    assert doubt(proof, Given, None, True) == pytest.approx(expected, rel=1e-6)
+
+
+class Blocks(Cut):
+    """Sixty blocks of one signal that judge; nothing is simulated."""
+
+    known, level = [], 1.0
+
+    def __init__(self, subsystem, signal):
+        self.subsystem, self.signals = subsystem, (signal,)
+        self.block = np.repeat(np.arange(60), 100)
+        self.part = np.full(self.block.size, SELECT)
+        self.signal = np.zeros(self.block.size, dtype=int)
+
+
+@pytest.mark.parametrize('in_valve, before, names', [
+    (0.4, 0.0, ['threshold_pressure']), (0.0, 0.0, ['threshold_pressure', 'pressure_bias']),
+    (0.05, 3.0, ['threshold_pressure', 'pressure_bias'])])
+def test_a_tie_is_decided_where_one_of_the_two_does_harm(in_valve, before, names):
+    cuts = [Blocks('valve', 'pressure'), Blocks('muscle', 'contraction')]
+    pool = {c.name: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    noise = np.random.default_rng(1).standard_normal(6000)
+
+    def found(name, valve, muscle):
+        effects = (pool[name],) if name else ()
+        return Found(Hypothesis(effects), np.full(len(effects), 0.5),
+                     {'valve': np.zeros(0), 'muscle': np.zeros(0)},
+                     {'valve': noise + valve, 'muscle': noise + muscle}, {})
+
+    class Tied:
+        base = found(None, before, 5.0)
+        crossed = polish = staticmethod(lambda found: found)
+
+    Tied.cuts = cuts
+    choice = Choice(Tied, Tied.base, 0.05)
+    rivals = [Rival(name, found(name, valve, 0.0)) for name, valve in (
+        ('threshold_pressure', before), ('pressure_bias', before + in_valve))]
+    for r in rivals:
+        r.share = choice.shares(r.found)
+    tied = choice.tied(rivals, Tied.base, cuts[1])
+    assert sorted(r.name for r in tied) == sorted(names)
+
+
+def test_fits_side_by_side_are_those_one_after_another():
+    problem = Problem(nominal(), cuts_of(nominal(), [Recording(recorded(
+        nominal().with_(effects=[{'name': 'parallel_spring', 'parameters': {}}]),
+        voltages(12.0)), 'ppr')]))
+    slopes = {s: of.copy() for s, of in problem.slopes.items()}
+    pool = [c for c in candidates(nominal(), ('contraction',))
+            if c.name in ('parallel_spring', 'bladder_stiffness', 'end_taper')]
+    fits = [problem.fit(Hypothesis((c,)), [0.5]) for c in pool]
+    alone = [problem.polish(f) for f in fits]
+    for one, other in zip(alone, side_by_side(problem.polish, fits)):
+        assert np.array_equal(one.theta, other.theta)
+        assert all(np.array_equal(one.errors[s], other.errors[s]) for s in one.errors)
+    assert all(np.array_equal(problem.slopes[s], slopes[s]) for s in slopes)
