@@ -14,6 +14,8 @@
 
 """Naming: one effect of every kind, rivals that stay together, abstention."""
 
+import types
+
 from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
@@ -28,6 +30,8 @@ from pam_sim.gap.fit import Found, Hypothesis, Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.look_alikes import look_alikes
 from pam_sim.gap.parts import SELECT
+from pam_sim.gap.screen import Screened
+from pam_sim.gap.search import Search
 import pytest
 
 
@@ -73,6 +77,25 @@ def test_a_cause_that_no_effect_explains_stays_unknown():
     assert result.verdict == 'unknown' and result.effects == []
     assert result.unexplained_fraction == 1.0
     assert load_rig(result.model_yaml).effects == []
+
+
+@pytest.mark.parametrize('too_large', [1.075, 1.1])
+def test_a_number_that_hides_the_gap_from_far_off_is_what_is_wrong(too_large):
+    true = nominal().parameters['damping_n_s_per_m'] * too_large
+    rig = nominal().with_(parameters={'damping_n_s_per_m': true})
+    result = find_gap(recorded(rig, voltages(20.0)), nominal())
+    assert result.verdict == 'parameter' and result.effects == []
+    (found,) = result.parameters
+    assert found.name == 'damping_n_s_per_m' and found.value == pytest.approx(true, rel=0.005)
+
+
+@pytest.mark.parametrize('promise, flat, first', [(0.1, 0.02, 0.08), (0.001, 0.2, 0.16)])
+def test_what_drifts_slowly_opens_a_cut_at_full_weight(promise, flat, first):
+    cut = types.SimpleNamespace(subsystem='muscle', level=1.0, chi2=lambda errors, part: 0.8)
+    given = types.SimpleNamespace(
+        base=types.SimpleNamespace(errors={'muscle': None}), seen_gap=0.05, screened=[Screened(
+            None, (), {'muscle': promise}, flat=Screened(None, (), {'muscle': flat}))])
+    assert Search._first_gap(given, cut) == pytest.approx(first)
 
 
 def test_names_can_be_limited():
