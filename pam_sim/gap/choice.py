@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 from pam_sim.gap.candidates import is_narrow, LIMITS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
-from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.side_by_side import side_by_side
 

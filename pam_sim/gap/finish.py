@@ -23,7 +23,7 @@ from pam_sim.gap.candidates import LIMITS
 from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
-from pam_sim.gap.fit import Hypothesis
+from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.side_by_side import side_by_side
 

@@ -26,122 +26,20 @@ change little, and each iteration costs only the parameters of the effects.
 """
 
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from pam_sim.errors import InputError
-from pam_sim.gap.cuts import acts_on
-from pam_sim.gap.noise import autocorrelation_time
+from pam_sim.gap.hypothesis import Found, Hypothesis, Precision
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.side_by_side import side_by_side
-from scipy.optimize import least_squares
+from pam_sim.gap.solver import cut_errors, ROUNDS, shows, Solver, within_reach
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
-FREE_BOX = 60.0
-HELD_BOX = 1e-3
-SHAPE_SD = 2.0               # of the logarithm of a shape; where data say nothing, it is typical
-FREE_SD = 30.0               # factor on the deviation of the prior of a freed number
-EFFECT_STEP = 0.01           # of a parameter of an effect, relative
-ROUNDS = 4
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
 POLISHES = 4
 WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
-SETTLED = 0.3                # relative change of the weights that ends the rounds
-EVALUATIONS = 12
-FTOL, XTOL = 1e-3, 1e-2      # slopes of known numbers are from elsewhere; polishing does the rest
-SCORE_BLOCKS = 4             # test blocks whose scores are summed
+ROUGH = 2                    # rounds of a fit that only has to be compared
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
-REFUSED = 1e3                # error of a model that cannot be simulated, in floors
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """``effects``: tuple of Candidate; ``freed``: names of numbers without their prior."""
-
-    effects: tuple = ()
-    freed: tuple = ()
-
-    @property
-    def names(self):
-        """Return what a result calls it: effects, then numbers."""
-        return tuple(c.name for c in self.effects) + self.freed
-
-    @property
-    def size(self):
-        """Return how many numbers it adds to the fit."""
-        return sum(len(c.free) for c in self.effects) + len(self.freed)
-
-    def rows(self, place):
-        """Return which of the normalised parameters are those of one effect, as a slice."""
-        first = sum(len(c.free) for c in self.effects[:place])
-        return slice(first, first + len(self.effects[place].free))
-
-    def touches(self, cut):
-        """Return whether it can change the errors of a cut."""
-        return (any(acts_on(c.effect, cut.subsystem) for c in self.effects)
-                or any(k.name in self.freed for k in cut.known))
-
-
-@dataclass
-class Found:
-    """
-    A fitted hypothesis.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-    theta : numpy.ndarray
-        Normalised parameters of its effects, in order.
-    known_z : dict of str -> numpy.ndarray
-        Normalised known numbers, by subsystem of the cut.
-    errors : dict of str -> numpy.ndarray
-        Errors of all samples in floors, by subsystem.
-    temper : dict of str -> numpy.ndarray
-        By how much the weight of each signal is lowered, by subsystem.
-
-    """
-
-    hypothesis: Hypothesis
-    theta: np.ndarray
-    known_z: dict
-    errors: dict
-    temper: dict
-
-    def values(self):
-        """Return the parameters of each effect, in the order of the hypothesis."""
-        return [{f.name: f.value(t) for f, t in zip(c.free, self.theta_of(place))}
-                for place, c in enumerate(self.hypothesis.effects)]
-
-    def theta_of(self, place):
-        """Return the normalised parameters of one effect of the hypothesis."""
-        return self.theta[self.hypothesis.rows(place)]
-
-    def settings(self):
-        """Return the effects as entries of a model file."""
-        return [c.setting(v) for c, v in zip(self.hypothesis.effects, self.values())]
-
-
-@dataclass(frozen=True)
-class Precision:
-    """
-    How well what a hypothesis adds is known: theta, then freed numbers in deviations.
-
-    Attributes
-    ----------
-    likelihood : numpy.ndarray, shape (K, K)
-        Covariance by the tempered likelihood and the priors.
-    blocks : numpy.ndarray, shape (K, K)
-        Covariance by how much the scores of time blocks differ: errors that last through a
-        block count once (White 1980, for clusters).
-    held : numpy.ndarray, shape (K,)
-        Solution with latency and skew of the measurement at their prior. What they took
-        up of a delay may have been the effect's own.
-
-    """
-
-    likelihood: np.ndarray
-    blocks: np.ndarray
-    held: np.ndarray
 
 
 class Problem:
@@ -169,9 +67,9 @@ class Problem:
         rig = self.with_effects(effects)
         for cut in self.cuts if cuts is None else cuts:
             z = known_z[cut.subsystem]
-            base = _errors(cut, rig, z)
+            base = cut_errors(cut, rig, z)
             self.slopes[cut.subsystem] = np.column_stack(side_by_side(
-                lambda j, cut=cut, z=z, base=base: (_errors(cut, rig, z + cut.known[j].step * (
+                lambda j, cut=cut, z=z, base=base: (cut_errors(cut, rig, z + cut.known[j].step * (
                     np.arange(z.size) == j)) - base) / cut.known[j].step, range(z.size)))
 
     def _own(self, **changed):
@@ -196,7 +94,7 @@ class Problem:
         """Return the given model with entries of a model file added."""
         return self.rig.with_(effects=[*self.rig.effects, *effects])
 
-    def fit(self, hypothesis, theta=(), near=None, hold=False):
+    def fit(self, hypothesis, theta=(), near=None, hold=False, whole=True, rounds=ROUNDS):
         """
         Fit a hypothesis.
 
@@ -210,6 +108,11 @@ class Problem:
             Where known numbers, weights and untouched cuts start; the baseline by default.
         hold : bool
             Whether latency and skew of the measurement stay at their prior.
+        whole : bool
+            False to leave the cuts as ``near`` has them in which nothing shows that it does not
+            have, too.
+        rounds : int
+            At most so many times weights are set after the errors.
 
         Returns
         -------
@@ -218,21 +121,28 @@ class Problem:
         """
         near = near or self.base
         touched = [cut for cut in self.cuts if hypothesis.touches(cut)]
+        fitted = touched if whole else within_reach(hypothesis, near.hypothesis, touched)
+        theta = np.array(theta, dtype=float)
+        rows = [hypothesis.rows(i) for i, c in enumerate(hypothesis.effects)
+                if any(shows(c.effect, cut) for cut in fitted)]
+        part = Hypothesis(tuple(c for c in hypothesis.effects
+                                if any(shows(c.effect, cut) for cut in fitted)), hypothesis.freed)
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
-        search = _Search(self, hypothesis, touched, {
-            c.subsystem: np.ones(len(c.signals)) for c in touched}, hold)
+        search = Solver(self, part, fitted, {
+            c.subsystem: np.ones(len(c.signals)) for c in fitted}, hold)
         # The baseline's numbers are bent by what is missing; a better model starts unbent.
         bent = near is self.base
-        x = np.concatenate([np.asarray(theta, float)] + [
-            (0.0 if bent else 1.0) * near.known_z[cut.subsystem] for cut in touched])
-        x, errors = search.settle(x)
-        theta, known_z = search.split(x)
+        x = np.concatenate([np.zeros(0)] + [theta[r] for r in rows] + [
+            (0.0 if bent else 1.0) * near.known_z[cut.subsystem] for cut in fitted])
+        x, errors = search.settle(x, rounds)
+        found, known_z = search.split(x)
         known_z, temper = dict(known_z), search.temper
+        for r in rows:
+            theta[r], found = found[:r.stop - r.start], found[r.stop - r.start:]
         for cut in self.cuts:
-            if cut not in touched:      # as it is without any effect
-                s = cut.subsystem
-                known_z[s], errors[s] = self.base.known_z[s], self.base.errors[s]
-                temper[s] = self.base.temper[s]
+            if cut not in fitted:       # untouched ones are as without any effect
+                s, kept = cut.subsystem, near if cut in touched else self.base
+                known_z[s], errors[s], temper[s] = kept.known_z[s], kept.errors[s], kept.temper[s]
         return Found(hypothesis, theta, known_z, errors, temper)
 
     def polish(self, found):
@@ -249,7 +159,8 @@ class Problem:
 
     def crossed(self, found):
         """Return the same hypothesis fitted to the part of the data that judges, from there."""
-        return self._own(use=(SELECT,)).fit(found.hypothesis, found.theta, found)
+        return self._own(use=(SELECT,)).fit(
+            found.hypothesis, found.theta, found, rounds=ROUGH)
 
     def unbent(self, found, box):
         """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""
@@ -308,7 +219,7 @@ class Problem:
         own = self._own()
         own.take_slopes(found.settings(), found.known_z)
         _, *covariances = own._covariances(found, self.cuts)
-        search = _Search(self, found.hypothesis, self.cuts, dict(found.temper))
+        search = Solver(self, found.hypothesis, self.cuts, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in self.cuts])
 
         def at(j, step):
@@ -324,7 +235,7 @@ class Problem:
         Of the fit's own parameters and the numbers of ``cuts``; ``held`` are places that do not
         move.
         """
-        search = _Search(self, found.hypothesis, cuts, dict(found.temper))
+        search = Solver(self, found.hypothesis, cuts, dict(found.temper))
         x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in cuts])
         slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
         slope[:, list(held)] = 0.0
@@ -342,150 +253,8 @@ class Problem:
         known = {c.subsystem: np.zeros(len(c.known)) for c in self.cuts}
         temper = {c.subsystem: np.ones(len(c.signals)) for c in self.cuts}
         for _ in range(BASE_PASSES):
-            search = _Search(self, Hypothesis(), self.cuts, dict(temper))
+            search = Solver(self, Hypothesis(), self.cuts, dict(temper))
             x, errors = search.settle(np.concatenate([known[c.subsystem] for c in self.cuts]))
             known, temper = dict(search.split(x)[1]), search.temper
             self.take_slopes([], known)
         return Found(Hypothesis(), np.zeros(0), known, errors, temper)
-
-
-class _Search:
-    """One least-squares problem; x holds the effects' parameters, then each cut's numbers."""
-
-    def __init__(self, problem, hypothesis, cuts, temper, hold=False):
-        self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
-        self.free = [f for c in hypothesis.effects for f in c.free]
-        self.owner = [c.effect for c in hypothesis.effects for _ in c.free]
-        self.masks = {c.subsystem: np.isin(c.part, problem.use) for c in cuts}
-        low = [f.coordinate(f.lower) for f in self.free]
-        high = [f.coordinate(f.upper) for f in self.free]
-        self.prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
-        for cut in cuts:
-            lowest, highest = cut.bounds()
-            for k, at_least, at_most in zip(cut.known, lowest, highest):
-                freed = k.name in hypothesis.freed
-                box = FREE_BOX if freed or not k.of_rig else problem.box
-                if hold and k.unit == 's' and not k.of_rig:
-                    box = HELD_BOX
-                low.append(max(at_least, -box))
-                high.append(min(at_most, box))
-                self.prior.append(FREE_SD if freed else 1.0)
-        self.bounds = (np.array(low, float), np.array(high, float))
-        self.prior = np.array(self.prior)
-        self._last = {}
-
-    def split(self, x):
-        """Return (parameters of the effects, [(subsystem, known numbers)])."""
-        first, found = len(self.free), []
-        for cut in self.cuts:
-            found.append((cut.subsystem, x[first:first + len(cut.known)]))
-            first += len(cut.known)
-        return x[:len(self.free)], found
-
-    def errors(self, x):
-        """Return the errors of every touched cut, by subsystem."""
-        key = x.tobytes()
-        if self._last.get('key') != key:
-            self._last = {'key': key, 'errors': self._simulated(x)}
-        return self._last['errors']
-
-    def _simulated(self, x, effect=None):
-        """
-        Return the errors of the cuts, or of those alone in which an effect acts.
-
-        What is read of the contraction, the volume behind the valve is taken from, too.
-        """
-        theta, known = self.split(x)
-        rig = self.problem.with_effects(Found(
-            self.hypothesis, theta, {}, {}, {}).settings())
-        return {s: _errors(cut, rig, z) for cut, (s, z) in zip(self.cuts, known)
-                if effect is None or acts_on(effect, s) or effect.startswith('contraction')}
-
-    def residuals(self, x):
-        """Return weighted errors, then the priors."""
-        errors = self.errors(x)
-        return np.concatenate([self._weighted(c, errors[c.subsystem]) for c in self.cuts]
-                              + [x / self.prior])
-
-    def slopes(self, x):
-        """Return the derivatives of ``residuals``."""
-        base, count = self.errors(x), len(self.free)
-        columns = np.zeros((self.residuals(x).size, x.size))
-        rows = columns.shape[0] - self.prior.size
-        columns[rows:] = np.diag(1.0 / self.prior)
-        for j in range(count):
-            step = EFFECT_STEP * max(abs(x[j]), 0.3)
-            if x[j] + step > self.bounds[1][j]:
-                step = -step
-            moved = np.array(x)
-            moved[j] += step
-            # An effect of one cut leaves the other one as it is.
-            errors = {**base, **self._simulated(moved, self.owner[j])}
-            columns[:rows, j] = np.concatenate([
-                self._weighted(c, errors[c.subsystem] - base[c.subsystem])
-                for c in self.cuts]) / step
-        row, column = 0, count
-        for cut in self.cuts:
-            slope = self._weighted(cut, self.problem.slopes[cut.subsystem])
-            columns[row:row + len(slope), column:column + len(cut.known)] = slope
-            row, column = row + len(slope), column + len(cut.known)
-        return columns
-
-    def blocks(self):
-        """Return the number of the block of every weighted error, rising, cut by cut."""
-        found, first = [np.zeros(0, int)], 0
-        for cut in self.cuts:
-            found.append(first + cut.block[self.masks[cut.subsystem]] // SCORE_BLOCKS)
-            first = int(found[-1].max()) + 1
-        return np.concatenate(found)
-
-    def run(self, x):
-        """Return the solution from a start."""
-        low, high = self.bounds
-        if not x.size:
-            return x
-        margin = 1e-6 * (high - low)
-        start = np.clip(x, low + margin, high - margin)
-        return least_squares(self.residuals, start, self.slopes, (low, high), x_scale='jac',
-                             ftol=FTOL, xtol=XTOL, max_nfev=EVALUATIONS).x
-
-    def settle(self, x):
-        """Return (solution, errors by subsystem) once weights and errors agree."""
-        for _ in range(ROUNDS):
-            x = self.run(x)
-            errors = dict(self.errors(x))
-            if self.retemper(errors):
-                break
-        return x, errors
-
-    def retemper(self, errors):
-        """Set the weights after the errors; return whether they had settled."""
-        settled = True
-        for cut in self.cuts:
-            fresh = tempering(cut, errors[cut.subsystem], self.problem.use)
-            old = self.temper[cut.subsystem]
-            settled = settled and bool(np.all(np.abs(fresh / old - 1.0) < SETTLED))
-            self.temper[cut.subsystem] = fresh
-        return settled
-
-    def _weighted(self, cut, errors):
-        mask = self.masks[cut.subsystem]
-        weight = 1.0 / np.sqrt(self.temper[cut.subsystem][cut.signal[mask]])
-        return errors[mask] * (weight if errors.ndim == 1 else weight[:, np.newaxis])
-
-
-def tempering(cut, errors, use):
-    """Return by signal by how much its weight must fall: misfit times memory."""
-    found = []
-    for s in range(len(cut.signals)):
-        chosen = errors[np.isin(cut.part, use) & (cut.signal == s)]
-        found.append(max(float(np.mean(chosen ** 2)), 1.0) * autocorrelation_time(chosen))
-    return np.array(found)
-
-
-def _errors(cut, rig, known_z):
-    """Return the errors of a cut; far off where the numbers cannot be simulated."""
-    try:
-        return cut.errors(rig, known_z)
-    except InputError:
-        return np.full(cut.part.size, REFUSED)

@@ -27,7 +27,7 @@ import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.cuts import acts_on
-from pam_sim.gap.fit import Hypothesis
+from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.screen import AMPLITUDE_RANGE, flat_spaces_of, free_signature
 from pam_sim.gap.side_by_side import side_by_side
 

@@ -24,8 +24,8 @@ import math
 
 import numpy as np
 from pam_sim.gap.cuts import SKEW_MAX_S
-from pam_sim.gap.fit import Hypothesis
 from pam_sim.gap.free_run import free_run, START_S
+from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.parts import CERTIFY, part_of, SETTLE_S
 from pam_sim.gap.result import SignalGap, Trace, UNIT

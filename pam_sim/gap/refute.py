@@ -25,7 +25,7 @@ from dataclasses import replace
 import math
 
 from pam_sim.gap.finish import NAMED
-from pam_sim.gap.fit import Hypothesis
+from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.prove import held_without, VISIBLE
 
 REFUTED = 0.5                # of what two are apart, squared; 1 if the better one is true

@@ -24,8 +24,8 @@ from pam_sim.gap.choice import Choice, Named, Rival
 from pam_sim.gap.compare import CERTAIN_T, MIN_BLOCKS, preference
 from pam_sim.gap.cuts import Cut, Known
 from pam_sim.gap.finish import within_the_chain
-from pam_sim.gap.fit import Found, Hypothesis
 from pam_sim.gap.free_run import Recording
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import Proof, start_error_sd
 from pam_sim.gap.search import Search

@@ -21,8 +21,9 @@ from pam_sim.gap.candidates import candidates
 from pam_sim.gap.choice import Choice, Rival
 from pam_sim.gap.cuts import Cut, cuts_of
 from pam_sim.gap.doubt import doubt, is_contradicted
-from pam_sim.gap.fit import Found, Hypothesis, Problem
+from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.prove import Proof
 from pam_sim.gap.side_by_side import side_by_side

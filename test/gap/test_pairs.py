@@ -26,7 +26,7 @@ import pytest
 CREEP = {'name': 'creep', 'parameters': {
     'stiffness_1_n_per_m': 43.0, 'stiffness_2_n_per_m': 47.0, 'time_constant_1_s': 0.9,
     'time_constant_2_s': 14.0}}
-BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': 3.8e-4}}
+BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': -3.8e-4}}
 LOOK_ALIKES = ['creep', 'contraction_bias', 'bladder_stiffness', 'end_taper']
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from pam_sim.gap.candidates import candidates, is_narrow
 from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.cuts import SKEW_MAX_S
-from pam_sim.gap.fit import Found, Hypothesis
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.prove import held_without, is_material, Proof
 from pam_sim.gap.refute import least_confirmed, refute

@@ -26,8 +26,9 @@ from pam_sim.gap.choice import Rival, without_limits
 from pam_sim.gap.compare import preference, share
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.finish import CERTAIN_SIZE
-from pam_sim.gap.fit import Found, Hypothesis, Problem
+from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.look_alikes import look_alikes
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.screen import Screened
