@@ -38,7 +38,7 @@ BOX = 3.5                    # prior deviations; beyond it a number is wrong, no
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
 POLISHES = 4
 WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
-ROUGH = 2                    # rounds of a fit that only has to be compared
+CROSSED_ROUNDS = 2           # they begin at a solution
 UNTOUCHED = 1e-6             # inverse variance of a normalised number that nothing depends on
 
 
@@ -160,7 +160,7 @@ class Problem:
     def crossed(self, found):
         """Return the same hypothesis fitted to the part of the data that judges, from there."""
         return self._own(use=(SELECT,)).fit(
-            found.hypothesis, found.theta, found, rounds=ROUGH)
+            found.hypothesis, found.theta, found, rounds=CROSSED_ROUNDS)
 
     def unbent(self, found, box):
         """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""

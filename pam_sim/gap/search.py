@@ -28,7 +28,6 @@ from pam_sim.gap.choice import Choice, CLOSE, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.finish import Finish
-from pam_sim.gap.fit import ROUGH
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
@@ -229,7 +228,7 @@ class Search(Finish):
                   if known.of_rig and abs(z) > PULLED and known.name not in taken]
         rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
             current.hypothesis.effects, (*current.hypothesis.freed, name)),
-            current.theta, current, whole=False, rounds=ROUGH), name), pulled)
+            current.theta, current, whole=False), name), pulled)
         contending = set().union(*(self._contending(rivals, current, c) for c in cuts))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
@@ -277,7 +276,7 @@ class Search(Finish):
         hypothesis = Hypothesis((*current.hypothesis.effects, screened.candidate),
                                 current.hypothesis.freed)
         return self._rival(self.problem.fit(
-            hypothesis, (*current.theta, *screened.start), current, whole=False, rounds=ROUGH),
+            hypothesis, (*current.theta, *screened.start), current, whole=False),
             screened.candidate.name)
 
     def _rival(self, found, name):
