@@ -18,11 +18,13 @@ Find the gap between recordings and a model, name what is missing, add it and pr
 The files in reading order: ``health`` (can these data be used), ``noise`` (what
 sensors and stamps explain), ``parts`` (what is fitted, what judges, what proves),
 ``free_run`` (the model on the recorded valve signal), ``cuts`` (each subsystem on its
-measured input), ``candidates`` (what may be missing), ``fit`` (one hypothesis),
-``screen`` (which are worth a fit), ``compare`` (which one the data prefer), ``choice``
-(which rival wins), ``search`` (one effect after another), ``pairs`` (two at once, where that
-fails), ``uncertainty`` (how well its numbers are known), ``prove`` (free runs on data kept
-aside), ``refute`` (which names those contradict), ``locate`` (where the gap sits),
+measured input), ``candidates`` (what may be missing), ``hypothesis`` (what a model may have
+beyond the given one), ``solver`` (one least-squares problem), ``fit`` (hypotheses fitted),
+``side_by_side`` (several at once), ``screen`` (which are worth a fit), ``compare`` (which one
+the data prefer), ``choice`` (which rival wins), ``search`` (one effect after another),
+``pairs`` (two at once, where that fails), ``finish`` (what of them stays), ``uncertainty`` (how
+well its numbers are known), ``prove`` (free runs on data kept aside), ``doubt`` (how much these
+can tell), ``refute`` (which names they contradict), ``locate`` (where the gap sits),
 ``workflow`` (all of it in order, and the verdict), ``words`` (the verdict in sentences),
 ``result`` (what gap.json holds).
 A witness without a model of what is missing: ``fingerprint``. Before anything is measured:

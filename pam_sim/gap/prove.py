@@ -214,6 +214,12 @@ class Proof:
             apart += float(np.mean((first - last) ** 2)) / variance
         return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
 
+    def left(self):
+        """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
+        return math.sqrt(sum(
+            max(self._rms(self.after, s) ** 2 - self.floor[s] ** 2, 0.0) / max(
+                self.noise[s], 1e-12) ** 2 for s in self.recording.signals))
+
     def unexplained(self):
         """
         Return the share of the squared gap left after calibration that is still there.

@@ -28,6 +28,7 @@ from pam_sim.gap.finish import NAMED
 from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.prove import held_without, VISIBLE
 
+CONFIRMED = 0.0              # as far from the 1 of a true effect as from the -1 of none
 REFUTED = 0.5                # of what two are apart, squared; 1 if the better one is true
 
 
@@ -73,9 +74,9 @@ def refute(named, problem, base, final, proof, whole):
     return kept, final
 
 
-def least_confirmed(named, problem, base, final, proof, whole):
+def unconfirmed(named, problem, base, final, proof, whole):
     """
-    Return the name that the certify data confirm least, and the fit without it.
+    Return the name that the certify data speak against most, and the fit without it.
 
     Parameters
     ----------
@@ -84,13 +85,23 @@ def least_confirmed(named, problem, base, final, proof, whole):
 
     Returns
     -------
-    name : str
+    name : str or None
+        None where the squared errors fall with every name by more than ``CONFIRMED`` of what it
+        moves, the other names in the model. One that moves nothing that could be seen there, or
+        less than what all of them leave, is not judged.
     without : Found
-        The other names, everything refitted.
+        The other names, everything refitted; the final model where there is no such name.
 
     """
     fits = {w.name: _less(w.name, problem, base, final) for w in named}
-    name = min(fits, key=lambda name: proof.fall(proof.run(fits[name], whole), proof.after)[0])
+    told = {name: proof.fall(proof.run(fit, whole), proof.after) for name, fit in fits.items()}
+    # Beside a large effect whose form leaves more than that, a small one cannot be judged.
+    least = max(VISIBLE, proof.left() if len(named) > 1 else 0.0)
+    against = {name: fell for name, (fell, apart) in told.items()
+               if fell < CONFIRMED and apart > least}
+    if not against:
+        return None, final
+    name = min(against, key=against.get)
     return name, fits[name]
 
 

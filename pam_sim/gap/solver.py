@@ -50,9 +50,9 @@ def shows(effect, cut):
 
 def within_reach(hypothesis, known, cuts):
     """
-    Return the cuts in which something is different, with two hypotheses, or can be by that.
+    Return the cuts in which two hypotheses differ, or may be fitted otherwise because of that.
 
-    An effect that shows in two cuts may be fitted otherwise in both. All, where nothing is.
+    An effect that shows in two cuts may be fitted otherwise in both. All, where nothing differs.
     """
     differ = Hypothesis(tuple(set(hypothesis.effects) ^ set(known.effects)),
                         tuple(set(hypothesis.freed) ^ set(known.freed)))

@@ -20,7 +20,7 @@ import time
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.doubt import is_contradicted
+from pam_sim.gap.doubt import spread_of_numbers
 from pam_sim.gap.fingerprint import fingerprint
 from pam_sim.gap.fit import BOX, Problem
 from pam_sim.gap.free_run import Recording
@@ -29,7 +29,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
     FLOOR_ERROR, free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
-from pam_sim.gap.refute import least_confirmed, refute
+from pam_sim.gap.refute import refute, unconfirmed
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
@@ -103,7 +103,8 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
                      lambda: time.perf_counter() > deadline, matters).run()
     progress(0.8)
     problem.use = (FIT, SELECT)
-    final, base = problem.polish(outcome.final), problem.fit_base()
+    base = problem.fit_base()
+    final = problem.polish(outcome.final) if outcome.final.hypothesis.names else base
     proof = Proof(witness, certify is not None, problem, base, final, seed)
     first = final
     outcome.named, final = refute(
@@ -111,9 +112,10 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
     if final is not first:
         proof = Proof(witness, certify is not None, problem, base, final, seed)
     result = GapResult('unknown', '', remarks=remarks)
-    while outcome.named and is_contradicted(proof, problem, final, certify is not None, seed):
-        name, final = least_confirmed(
-            outcome.named, problem, base, final, proof, certify is not None)
+    while outcome.named:
+        name, final = unconfirmed(outcome.named, problem, base, final, proof, certify is not None)
+        if name is None:
+            break
         result.remarks.append(f'What {name} would explain of the recordings is not found '
                               'again in the certify data, so it is not named.')
         outcome.named = [w for w in outcome.named if w.name != name]
@@ -175,10 +177,8 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.pull) > BOX]
-    left = max((beyond(s.rmse_refit, FLOOR_ERROR * proof.highest_floor[name]) / max(
-        proof.noise[name], 1e-12) for name, s in result.signals.items()), default=0.0)
     if not outcome.share or (not material and not wrong and (
-            named or left <= UNNAMED * materiality)):
+            named or not _is_left(result, problem, proof, base, UNNAMED * materiality, whole))):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
         return
     result.unexplained_fraction = proof.unexplained()
@@ -190,6 +190,16 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
         result.verdict = 'ambiguous'
     else:
         result.verdict = 'effects' if result.effects else 'parameter'
+
+
+def _is_left(result, problem, proof, base, least, whole):
+    """Return whether calibration leaves more than noise and the doubt about the numbers do."""
+    def left(spread):
+        return max((beyond(s.rmse_refit, math.hypot(
+            FLOOR_ERROR * proof.highest_floor[name], spread.get(name, 0.0))) / max(
+                proof.noise[name], 1e-12) for name, s in result.signals.items()), default=0.0)
+
+    return left({}) > least and left(spread_of_numbers(proof, problem, base, whole)) > least
 
 
 def beyond(value, floor):

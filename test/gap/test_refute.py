@@ -22,7 +22,7 @@ from pam_sim.gap.cuts import SKEW_MAX_S
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.prove import held_without, is_material, Proof
-from pam_sim.gap.refute import least_confirmed, refute
+from pam_sim.gap.refute import refute, unconfirmed
 from pam_sim.gap.search import Search
 import pytest
 
@@ -81,14 +81,26 @@ def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
         fit = staticmethod(lambda left, theta, near: found_of(*left.names))
 
     proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
-    proof.noise = {'contraction': 1.0}
+    proof.noise = proof.floor = {'contraction': 1.0}
     proof.run = lambda found, whole: {
         'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
     proof.after = proof.run(found_of(*NAMES), True)
     named = [Named(n, 'muscle', [], (n,)) for n in NAMES]
-    name, left = least_confirmed(named, Refitted(), found_of(), found_of(*NAMES), proof, True)
+    final = found_of(*NAMES)
+    name, left = unconfirmed(named, Refitted(), found_of(), final, proof, True)
     assert name == spurious
     assert left.hypothesis.names == tuple(n for n in NAMES if n != spurious)
+    # Beside what leaves far more, a small one is not judged.
+    Given.measured = {'contraction': truth + noise + 50.0 * np.sin(7.0 * time_s)}
+    assert unconfirmed(named, Refitted(), found_of(), final, proof, True) == (None, final)
+    Given.measured = {'contraction': truth + noise}
+    # What is true stays; of what moves nothing that could be seen there, nothing is said.
+    proof.after = proof.run(left, True)
+    true = [w for w in named if w.name != spurious]
+    assert unconfirmed(true, Refitted(), found_of(), left, proof, True) == (None, left)
+    moves[true[0].name] = -0.01 * truth
+    proof.after = proof.run(left, True)
+    assert unconfirmed(true, Refitted(), found_of(), left, proof, True) == (None, left)
 
 
 @pytest.mark.parametrize('skew_s, left_s', [

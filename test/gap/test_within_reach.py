@@ -1,0 +1,64 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A cut in which nothing changes keeps its fit."""
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_sim.gap.candidates import candidates
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.hypothesis import Hypothesis
+from pam_sim.gap.solver import within_reach
+import pytest
+
+BY_NAME = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
+
+
+@pytest.fixture(scope='module')
+def problem():
+    rig = nominal().with_(effects=[
+        {'name': 'tube_lag', 'parameters': {'time_constant_s': 0.015}},
+        {'name': 'end_taper', 'parameters': {'k_minus_1': 0.06}}])
+    return Problem(nominal(), cuts_of(nominal(), [
+        Recording(recorded(rig, voltages(12.0)), 'ppr')]))
+
+
+@pytest.mark.parametrize('known, names, freed, reached', [
+    (['tube_lag'], ['tube_lag', 'end_taper'], (), ['muscle']),
+    (['tube_lag', 'end_taper'], ['end_taper'], (), ['valve']),
+    (['tube_lag'], ['tube_lag', 'pressure_bias'], (), ['valve', 'muscle']),
+    (['pressure_bias'], ['pressure_bias', 'end_taper'], (), ['valve', 'muscle']),
+    (['contraction_bias'], ['contraction_bias', 'tube_lag'], (), ['valve', 'muscle']),
+    (['tube_lag'], ['tube_lag'], ('mass_kg',), ['muscle']),
+    (['tube_lag'], ['tube_lag'], (), ['valve', 'muscle'])])
+def test_only_what_can_change_is_fitted_again(problem, known, names, freed, reached):
+    now, before = (Hypothesis(tuple(BY_NAME[n] for n in of), f)
+                   for of, f in ((names, freed), (known, ())))
+    assert [c.subsystem for c in within_reach(now, before, problem.cuts)] == reached
+
+
+def test_the_other_cut_stays_as_it_was_and_the_fit_is_the_same(problem):
+    lag, taper = BY_NAME['tube_lag'], BY_NAME['end_taper']
+    one = problem.fit(Hypothesis((lag,)), [1.0])
+    made = problem.simulations
+    part = problem.fit(Hypothesis((lag, taper)), [*one.theta, 0.5], one, whole=False)
+    fewer = problem.simulations - made
+    whole = problem.fit(Hypothesis((lag, taper)), [*one.theta, 0.5], one)
+    assert fewer < 0.7 * (problem.simulations - made - fewer)
+    assert np.array_equal(part.errors['valve'], one.errors['valve'])
+    assert part.theta[0] == one.theta[0] and part.known_z['valve'] is one.known_z['valve']
+    assert part.theta == pytest.approx(whole.theta, rel=0.02)
+    assert problem.cost(part) == pytest.approx(problem.cost(whole), rel=0.01)
