@@ -65,7 +65,22 @@ def within_reach(hypothesis, known, cuts):
 
 
 class Solver:
-    """One least-squares problem; x holds the effects' parameters, then each cut's numbers."""
+    """
+    One least-squares problem; x holds the effects' parameters, then each cut's numbers.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the slopes for known numbers, the parts that are fitted and the box of numbers.
+    hypothesis : Hypothesis
+    cuts : list of Cut
+        That are fitted.
+    temper : dict of str -> numpy.ndarray
+        By how much the weight of each signal is lowered at first, by subsystem.
+    hold : bool
+        Whether latency and skew of the measurement stay at their prior.
+
+    """
 
     def __init__(self, problem, hypothesis, cuts, temper, hold=False):
         self.problem, self.hypothesis, self.cuts, self.temper = problem, hypothesis, cuts, temper
