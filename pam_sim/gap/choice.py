@@ -199,9 +199,7 @@ class Choice:
 
     def _strain(self, found):
         """Return the squared pulls of all numbers that should have stayed where they were."""
-        return sum(float(z) ** 2 for cut in self.problem.cuts
-                   for known, z in zip(cut.known, found.known_z[cut.subsystem])
-                   if known.of_rig and known.name not in found.hypothesis.freed)
+        return sum(z ** 2 for cut in self.problem.cuts for z in found.pulls(cut).values())
 
     def winner(self, rivals, current, cut, fitted):
         """Return the rival that a cut takes in as Named, None where none explains enough."""

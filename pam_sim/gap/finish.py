@@ -180,8 +180,7 @@ class Finish:
 
     @staticmethod
     def _is_bent(cut, current):
-        return any(known.of_rig and known.name not in current.hypothesis.freed and abs(z) > BENT
-                   for known, z in zip(cut.known, current.known_z[cut.subsystem]))
+        return any(abs(z) > BENT for z in current.pulls(cut).values())
 
     def _straightened(self, current):
         """
@@ -209,13 +208,13 @@ class Finish:
             if (any(w.subsystem == s for w in named)
                     or cut.chi2(self.base.errors[s], SELECT) > 1.0 + self.seen_gap):
                 continue
-            for known, z in zip(cut.known, self.base.known_z[s]):
-                if not known.of_rig or abs(z) < BENT:
+            for place, known in enumerate(cut.known):
+                if abs(self.base.pulls(cut).get(known.name, 0.0)) <= BENT:
                     continue
                 h = current.hypothesis
                 freed = self.problem.polish(self.problem.fit(
                     Hypothesis(h.effects, (*h.freed, known.name)), current.theta, current))
-                if abs(freed.known_z[s][cut.known.index(known)]) > BENT:
+                if abs(freed.known_z[s][place]) > BENT:
                     rival = Rival(known.name, freed, self.choice.shares(freed))
                     current, named = freed, [*named, Named(
                         known.name, s, [rival], (known.name,), [rival])]

@@ -27,6 +27,7 @@ change little, and each iteration costs only the parameters of the effects.
 
 import copy
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 from pam_sim.gap.hypothesis import Found, Hypothesis, Precision
@@ -82,8 +83,10 @@ class Problem:
 
     def _slopes_at(self, found):
         """Take the slopes at a fit, of the cuts that fitting it again looks at."""
-        self.take_slopes(found.settings(), found.known_z,
-                         [c for c in self.cuts if found.hypothesis.touches(c)])
+        self.take_slopes(found.settings(), found.known_z, self._touched(found.hypothesis))
+
+    def _touched(self, hypothesis):
+        return [cut for cut in self.cuts if hypothesis.touches(cut)]
 
     @property
     def simulations(self):
@@ -120,25 +123,21 @@ class Problem:
 
         """
         near = near or self.base
-        touched = [cut for cut in self.cuts if hypothesis.touches(cut)]
+        touched = self._touched(hypothesis)
         fitted = touched if whole else within_reach(hypothesis, near.hypothesis, touched)
         theta = np.array(theta, dtype=float)
-        rows = [hypothesis.rows(i) for i, c in enumerate(hypothesis.effects)
-                if any(shows(c.effect, cut) for cut in fitted)]
-        part = Hypothesis(tuple(c for c in hypothesis.effects
-                                if any(shows(c.effect, cut) for cut in fitted)), hypothesis.freed)
+        moves = [any(shows(c.effect, cut) for cut in fitted) for c in hypothesis.effects]
+        part = Hypothesis(tuple(compress(hypothesis.effects, moves)), hypothesis.freed)
+        free = np.array([m for c, m in zip(hypothesis.effects, moves) for _ in c.free], bool)
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
         search = Solver(self, part, fitted, {
             c.subsystem: np.ones(len(c.signals)) for c in fitted}, hold)
         # The baseline's numbers are bent by what is missing; a better model starts unbent.
         bent = near is self.base
-        x = np.concatenate([np.zeros(0)] + [theta[r] for r in rows] + [
-            (0.0 if bent else 1.0) * near.known_z[cut.subsystem] for cut in fitted])
-        x, errors = search.settle(x, rounds)
-        found, known_z = search.split(x)
+        x, errors = search.settle(search.join(theta[free], {
+            s: (0.0 if bent else 1.0) * z for s, z in near.known_z.items()}), rounds)
+        theta[free], known_z = search.split(x)
         known_z, temper = dict(known_z), search.temper
-        for r in rows:
-            theta[r], found = found[:r.stop - r.start], found[r.stop - r.start:]
         for cut in self.cuts:
             if cut not in fitted:       # untouched ones are as without any effect
                 s, kept = cut.subsystem, near if cut in touched else self.base
@@ -176,7 +175,7 @@ class Problem:
         """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
         own = self._own()
         own._slopes_at(found)
-        touched = [c for c in self.cuts if found.hypothesis.touches(c)]
+        touched = self._touched(found.hypothesis)
         names, likelihood, blocks = own._covariances(found, touched)
         held = own.fit(found.hypothesis, found.theta, found, hold=True)
         count = len(found.theta)
@@ -198,8 +197,7 @@ class Problem:
         effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
         held = [first + j for j, f in enumerate(effect.free) if f.shape]
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
-        touched = [c for c in self.cuts if found.hypothesis.touches(c)]
-        _, *covariances = own._covariances(found, touched, held)
+        _, *covariances = own._covariances(found, self._touched(found.hypothesis), held)
         theta = found.theta[size]
         return min((float(np.sqrt(theta @ np.linalg.pinv(c[np.ix_(size, size)]) @ theta))
                     for c in covariances if size), default=np.inf)
@@ -220,7 +218,7 @@ class Problem:
         own.take_slopes(found.settings(), found.known_z)
         _, *covariances = own._covariances(found, self.cuts)
         search = Solver(self, found.hypothesis, self.cuts, dict(found.temper))
-        x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in self.cuts])
+        x = search.join(found.theta, found.known_z)
 
         def at(j, step):
             theta, known_z = search.split(x + step * (np.arange(x.size) == j))
@@ -236,7 +234,7 @@ class Problem:
         move.
         """
         search = Solver(self, found.hypothesis, cuts, dict(found.temper))
-        x = np.concatenate([found.theta] + [found.known_z[c.subsystem] for c in cuts])
+        x = search.join(found.theta, found.known_z)
         slope, residuals, blocks = search.slopes(x), search.residuals(x), search.blocks()
         slope[:, list(held)] = 0.0
         # What the data do not touch is unknown, not certain.
@@ -254,7 +252,7 @@ class Problem:
         temper = {c.subsystem: np.ones(len(c.signals)) for c in self.cuts}
         for _ in range(BASE_PASSES):
             search = Solver(self, Hypothesis(), self.cuts, dict(temper))
-            x, errors = search.settle(np.concatenate([known[c.subsystem] for c in self.cuts]))
+            x, errors = search.settle(search.join(np.zeros(0), known))
             known, temper = dict(search.split(x)[1]), search.temper
             self.take_slopes([], known)
         return Found(Hypothesis(), np.zeros(0), known, errors, temper)

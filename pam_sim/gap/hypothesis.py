@@ -82,6 +82,11 @@ class Found:
         """Return the normalised parameters of one effect of the hypothesis."""
         return self.theta[self.hypothesis.rows(place)]
 
+    def pulls(self, cut):
+        """Return by name the normalised numbers of the rig in a cut that keep their prior."""
+        return {known.name: float(z) for known, z in zip(cut.known, self.known_z[cut.subsystem])
+                if known.of_rig and known.name not in self.hypothesis.freed}
+
     def settings(self):
         """Return the effects as entries of a model file."""
         return [c.setting(v) for c, v in zip(self.hypothesis.effects, self.values())]

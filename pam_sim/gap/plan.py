@@ -22,7 +22,6 @@ is left once a rival has done its best too, from which size on it can be named. 
 products are kept, so protocols made of the same pieces are joined by adding them.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 import math
 
@@ -33,7 +32,7 @@ from pam_sim.gap.candidates import candidates, LIMITS
 from pam_sim.gap.cuts import acts_on, cuts_of
 from pam_sim.gap.fit import BOX
 from pam_sim.gap.parts import UNUSED
-from pam_sim.rollout.batch import default_workers
+from pam_sim.gap.side_by_side import side_by_side
 
 APART = 0.3                  # floors (rms) that the best rival must leave in some signal
 LARGE = 10.0                 # times the visible size; rivals that need more are called inseparable
@@ -229,8 +228,7 @@ class Sensitivities:
         jobs = [(self.probes[n], sized(self.probes[n], factors[n])) for n in self.probes]
         if with_rivals:
             jobs += [(c, v) for c in self.pool for v in _columns(c, factors[c.name])]
-        with ThreadPoolExecutor(default_workers()) as workers:
-            columns = list(workers.map(lambda job: self.change(*job), jobs))
+        columns = side_by_side(lambda job: self.change(*job), jobs)
         nothing = np.zeros(self._signal.size)
         matrix = np.column_stack([*self._known, *(nothing if c is None else c for c in columns)])
         found = Inner(tuple(self.probes), self.priors)

@@ -193,18 +193,14 @@ class Proof:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
         return moved(self.recording, self.after, self.run(found, whole), self.part)
 
-    def confirmed(self):
+    def fall(self, worse, better):
         """
-        Return by how much the squared errors fall from the calibrated to the final model.
+        Return by how much the squared errors fall from one free run to another.
 
         In what the two are apart, squared; all signals in deviations of their sensors. 1 for a
         true effect, -1 for one that is not there, whatever the noise: the errors of the true
-        model have nothing in common with either.
+        model have nothing in common with either. And how far the two are apart (rms).
         """
-        return self.fall(self.refit, self.after)[0]
-
-    def fall(self, worse, better):
-        """Return (what ``confirmed`` tells of two free runs, how far they are apart, rms)."""
         fell = apart = 0.0
         for s in self.recording.signals:
             chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2

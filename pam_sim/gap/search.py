@@ -223,9 +223,8 @@ class Search(Finish):
             self.problem, current, [c for c in pool if c.name not in taken])
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
-        pulled = [known.name for cut in cuts
-                  for known, z in zip(cut.known, current.known_z[cut.subsystem])
-                  if known.of_rig and abs(z) > PULLED and known.name not in taken]
+        pulled = [name for cut in cuts for name, z in current.pulls(cut).items()
+                  if abs(z) > PULLED]
         rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
             current.hypothesis.effects, (*current.hypothesis.freed, name)),
             current.theta, current, whole=False), name), pulled)

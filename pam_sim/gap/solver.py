@@ -104,6 +104,10 @@ class Solver:
         self.prior = np.array(self.prior)
         self._last = {}
 
+    def join(self, theta, known_z):
+        """Return what ``split`` takes apart."""
+        return np.concatenate([theta] + [known_z[cut.subsystem] for cut in self.cuts])
+
     def split(self, x):
         """Return (parameters of the effects, [(subsystem, known numbers)])."""
         first, found = len(self.free), []
