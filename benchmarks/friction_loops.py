@@ -23,7 +23,8 @@ from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.units import P_ATM_PA
 
-NAMES = ('coulomb_friction', 'pressure_friction', 'braid_contact_friction', 'history_friction',
+NAMES = ('coulomb_friction', 'coulomb_friction_presliding', 'pressure_friction',
+         'pressure_friction_presliding', 'braid_contact_friction', 'history_friction',
          'hysteresis', 'hysteresis_bouc_wen', 'hysteresis_lugre',
          'hysteresis_prandtl_ishlinskii')
 GAUGE_PA = 400e3

@@ -35,6 +35,7 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.loop_level import (
     LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
+from pam_sim.effects.presliding import bent
 from pam_sim.parameters import Parameter
 
 _STIFFNESS, _DAMPING, _EXCESS, _INVERSE_SPEED = range(LEVEL_SLOTS, LEVEL_SLOTS + 4)
@@ -85,15 +86,6 @@ def bending_when_sliding(pressure_pa, velocity_m_per_s, par, k):
     if square < 40.0:           # beyond, less than the last bit
         level *= 1.0 + par[k + _EXCESS] * math.exp(-square)
     return level / par[k + _STIFFNESS]
-
-
-@compiled
-def bent(z_m, dx_m, sliding_m):
-    """Return the bending [m] after a travel ``dx_m``, exact for a constant ``sliding_m``."""
-    if dx_m == 0.0:
-        return z_m
-    end = math.copysign(sliding_m, dx_m)
-    return end + (z_m - end) * math.exp(-abs(dx_m) / sliding_m)
 
 
 @compiled

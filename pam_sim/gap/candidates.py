@@ -113,6 +113,9 @@ def _level_and(shape):
             Free('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)), shape)
 
 
+# Bent by more, it is a loop.
+_BENDING = (Free('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
+            Free('static_excess', 0.05, 0.0, 0.6))
 _RATES = (4e5, 1e6, 2.5e6)
 _TABLE = {
     'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3),),
@@ -128,7 +131,9 @@ _TABLE = {
     'dead_volume': (Free('extra_volume_m3', 2e-6, 0.0, 1e-4),),
     'thermal': (Free('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),),
     'coulomb_friction': (Free('force_n', 1.0, 0.0, 50.0),),
+    'coulomb_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
     'pressure_friction': (Free('force_at_400kpa_n', 1.0, 0.0, 100.0),),
+    'pressure_friction_presliding': (Free('force_at_400kpa_n', 1.0, 0.0, 100.0), *_BENDING),
     'hysteresis': _level_and(Free('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
     'hysteresis_bouc_wen': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
     'hysteresis_lugre': _level_and(Free('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
@@ -137,6 +142,10 @@ _TABLE = {
     'history_friction': _level_and(Free('width_m', 8e-4, 2e-4, 8e-3, True)),
     'braid_contact_friction': (Free('friction_coefficient', 0.3, 0.0, 2.0),),
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
+    'viscous_damping_thinning': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),
+                                 Free('speed_m_per_s', 0.2, 0.02, 5.0, True, ends=())),
+    'bladder_stiffness_progressive': (Free('stiffness_n_per_m', 200.0, -2e3, 1e4),
+                                      Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
               Free('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
               Free('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
@@ -144,6 +153,7 @@ _TABLE = {
     'thermal_softening': (Free('gain_loss_at_20mm_per_s', 0.02, -0.2, 0.5),
                           Free('time_constant_s', 60.0, 10.0, 600.0, True)),
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
+    'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }

@@ -62,9 +62,8 @@ class Rival:
         for place, c in enumerate(self.found.hypothesis.effects):
             if c.name == self.name:
                 return is_narrow(c, self.found.values()[place]) or any(
-                    f.shape and min(abs(x - f.coordinate(getattr(f, end)))
-                                    for end in f.ends) < EDGE
-                    for f, x in zip(c.free, self.found.theta_of(place)))
+                    f.shape and abs(x - f.coordinate(getattr(f, end))) < EDGE
+                    for f, x in zip(c.free, self.found.theta_of(place)) for end in f.ends)
         return False
 
 
@@ -194,7 +193,7 @@ class Choice:
             best = min(tied, key=lambda r: other.chi2(r.found.errors[s], SELECT))
             tied = [r for r in tied if r is best or not preference(
                 other, self.base.errors[s], best.found.errors[s], r.found.errors[s], quiet=True,
-                crossed=(FIT, best.crossed.errors[s], r.crossed.errors[s])) >= BETTER_T]
+                crossed=(FIT, best.crossed.errors[s], r.crossed.errors[s])) >= CERTAIN_T]
         return tied
 
     def _strain(self, found):

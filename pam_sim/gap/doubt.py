@@ -13,16 +13,50 @@
 # limitations under the License.
 
 """
-What the doubt about the numbers of a model leaves on the certify data.
+What the doubt about the numbers of a model leaves: of an effect, and on the certify data.
 
-One motion may hardly show a number that another rests on: a slow one the damping, say.
+Numbers may stand in for an effect as far as their ranges go. And one motion may hardly show a
+number that another rests on: a slow one the damping, say.
 """
 
 import math
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 SMALL_STEP = 0.3             # of a number, in its standard deviation
+FLAT = 1e-12                 # of the largest variance; less is none
+
+
+def distance_to_none(covariance, x, none, low, high):
+    """
+    Return by how many standard deviations a fit differs from the nearest one without an effect.
+
+    Parameters
+    ----------
+    covariance : numpy.ndarray, shape (K, K)
+        Of all that was fitted.
+    x : numpy.ndarray, shape (K,)
+        The fit.
+    none : numpy.ndarray of bool, shape (K,)
+        Which numbers are 0 without the effect.
+    low, high : numpy.ndarray, shape (K,)
+        Ranges, within which the others move to make up for it.
+
+    Returns
+    -------
+    float
+
+    """
+    variance, axes = np.linalg.eigh(covariance)
+    whitened = axes.T / np.sqrt(np.maximum(variance, FLAT * variance.max()))[:, np.newaxis]
+    away = whitened[:, none] @ x[none]
+    if none.all():
+        return float(np.linalg.norm(away))
+    inside, rest = np.clip(x, low, high), ~none
+    nearest = lsq_linear(whitened[:, rest], away, (
+        low[rest] - inside[rest], high[rest] - inside[rest]), method='bvls')
+    return math.sqrt(2.0 * nearest.cost)
 
 
 def spread_of_numbers(proof, problem, base, whole):

@@ -30,6 +30,7 @@ from dataclasses import replace
 from itertools import compress
 
 import numpy as np
+from pam_sim.gap.doubt import distance_to_none
 from pam_sim.gap.hypothesis import Found, Hypothesis, Precision
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.side_by_side import side_by_side
@@ -37,6 +38,7 @@ from pam_sim.gap.solver import cut_errors, ROUNDS, shows, Solver, within_reach
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
+BENT = 2.0                   # prior deviations; a fit starts without what bent the baseline more
 POLISHES = 4
 WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
 CROSSED_ROUNDS = 2           # they begin at a solution
@@ -132,10 +134,10 @@ class Problem:
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
         search = Solver(self, part, fitted, {
             c.subsystem: np.ones(len(c.signals)) for c in fitted}, hold)
-        # The baseline's numbers are bent by what is missing; a better model starts unbent.
-        bent = near is self.base
+        # Numbers of the baseline are bent by what is missing; a better model starts unbent.
         x, errors = search.settle(search.join(theta[free], {
-            s: (0.0 if bent else 1.0) * z for s, z in near.known_z.items()}), rounds)
+            s: np.where((near is self.base) & (np.abs(z) > BENT), 0.0, z)
+            for s, z in near.known_z.items()}), rounds)
         theta[free], known_z = search.split(x)
         known_z, temper = dict(known_z), search.temper
         for cut in self.cuts:
@@ -189,18 +191,25 @@ class Problem:
         Return by how many standard deviations the size of an effect differs from none.
 
         Its shapes are held: a size that is known only together with a shape is none the less
-        there. Infinite for an effect of shapes alone, of which no value inside its
-        range means none.
+        there. The numbers that could stand in for it stay within their ranges: a latency is
+        no longer than the longest. Infinite for an effect of shapes alone, of which no value
+        inside its range means none.
         """
         own = self._own()
         own._slopes_at(found)
         effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
         held = [first + j for j, f in enumerate(effect.free) if f.shape]
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
-        _, *covariances = own._covariances(found, self._touched(found.hypothesis), held)
-        theta = found.theta[size]
-        return min((float(np.sqrt(theta @ np.linalg.pinv(c[np.ix_(size, size)]) @ theta))
-                    for c in covariances if size), default=np.inf)
+        if not size:
+            return np.inf
+        touched = self._touched(found.hypothesis)
+        _, *covariances = own._covariances(found, touched, held)
+        search = Solver(own, found.hypothesis, touched, dict(found.temper))
+        x = search.join(found.theta, found.known_z)
+        low, high = (np.delete(end, held) for end in search.bounds)
+        none = np.isin(np.delete(np.arange(x.size), held), size)
+        return min(distance_to_none(np.delete(np.delete(c, held, 0), held, 1),
+                                    np.delete(x, held), none, low, high) for c in covariances)
 
     def spread(self, found):
         """

@@ -33,6 +33,7 @@ from pam_sim.gap.result import SignalGap, Trace, UNIT
 INPUT_DRAWS = 8
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 VISIBLE = 0.3                # standard deviations of a sensor; less cannot be told from none
+FOUND_AGAIN = 0.2            # where the certify data tell it from none all the same
 MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
 
@@ -59,14 +60,14 @@ def held_without(found, kept=()):
                    theta=np.concatenate([np.zeros(0), *(found.theta_of(i) for i in places)]))
 
 
-def is_material(own, refitted, materiality):
+def is_material(own, refitted, materiality, found_again=False):
     """
     Return whether effects are worth a name.
 
     That is, whether they move a signal by more than ``materiality`` where the numbers of the
     model do what they can to replace them; or while these stay, and still by ``VISIBLE`` where
-    they do not. Numbers that were bent by one motion are wrong in another, though the effect
-    itself may do nothing there.
+    they do not, or by ``FOUND_AGAIN`` if the certify data confirm it. Numbers that were bent by
+    one motion are wrong in another, though the effect itself may do nothing there.
 
     Parameters
     ----------
@@ -74,11 +75,14 @@ def is_material(own, refitted, materiality):
         How far each signal moves, in standard deviations of its sensor.
     materiality : float
         Of a sensor, in its standard deviations.
+    found_again : bool
+        Whether the errors of the certify data fall as those of a true effect do.
 
     """
     left = max(refitted.values(), default=0.0)
     return left > materiality or (
-        max(own.values(), default=0.0) > materiality and left > min(materiality, VISIBLE))
+        max(own.values(), default=0.0) > materiality
+        and left > min(materiality, FOUND_AGAIN if found_again else VISIBLE))
 
 
 def late_by(measurement):

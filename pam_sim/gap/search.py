@@ -21,10 +21,11 @@ cannot be told apart they stay together as a set. At the end every effect must b
 missed when it is left out.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from pam_sim.effects.registry import effects
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, CLOSE, Rival
+from pam_sim.gap.choice import ALMOST, Choice, CLOSE, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.finish import Finish
@@ -40,7 +41,8 @@ MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 IN_FULL = 3                  # of those that promise most with all errors at full weight
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
 PULLED = 1.0                 # prior deviations of a number; from there on it may be wrong
-DONE = 0.02                  # rest of the gap that formulations may leave
+DONE = 0.0035                # rest of the gap that formulations may leave
+FORM = 0.02                  # that they may leave for another effect of their own family
 
 
 @dataclass
@@ -130,10 +132,23 @@ class Search(Finish):
         if joint is not None:
             return [joint]
         taken = [self.choice.winner(rivals, current, c, self.fitted) for c in open_cuts]
-        taken = [w for w in taken if w]
+        taken = [w for w in taken if w and not self._mends_a_form(w, current)]
         won = {w.subsystem for w in taken}
         closed.update((c.subsystem, current) for c in open_cuts if c.subsystem not in won)
         return [w for i, w in enumerate(taken) if w.name not in [o.name for o in taken[:i]]]
+
+    def _mends_a_form(self, winner, current):
+        """
+        Return whether what wins a small rest is of a family that is in.
+
+        Then it mends the formulation of that one: two kinds of friction make a third.
+        """
+        s = winner.subsystem
+        if gap(self._cut(s), current.errors[s]) > FORM * self.first_gap[s]:
+            return False
+        families = {effects()[c.effect].family for c in current.hypothesis.effects
+                    if acts_on(c.effect, s)}
+        return winner.name in effects() and effects()[winner.name].family in families
 
     def _reopened(self, current, closed):
         """
@@ -231,7 +246,7 @@ class Search(Finish):
         contending = set().union(*(self._contending(rivals, current, c) for c in cuts))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
-            s for s in screened
+            from_sibling(s, rivals, len(current.hypothesis.effects)) for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
         self.fitted = rivals
         return self._best_of_name(rivals)
@@ -341,3 +356,20 @@ class Search(Finish):
                 theta += list(put.found.theta_of(len(added.effects) - 1))
         return self.problem.fit(
             Hypothesis(tuple(effects), tuple(freed)), theta, current, whole=False)
+
+
+def from_sibling(screened, rivals, place):
+    """
+    Return a candidate that starts where a formulation of its name ended that explains well.
+
+    ``place`` is that of the added effect in the hypotheses of the rivals.
+    """
+    name = screened.candidate.name
+    sibling = max((r for r in rivals
+                   if r.name == name and len(r.found.hypothesis.effects) > place), key=lambda r: sum(r.share.values()), default=None)
+    if sibling is None or max(sibling.share.values()) < ALMOST:
+        return screened
+    values = sibling.found.values()[place]
+    return replace(screened, start=tuple(
+        f.coordinate(min(max(values[f.name], f.lower), f.upper)) if f.name in values else x
+        for f, x in zip(screened.candidate.free, screened.start)))

@@ -29,7 +29,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
     FLOOR_ERROR, free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
-from pam_sim.gap.refute import refute, unconfirmed
+from pam_sim.gap.refute import refute, REFUTED, unconfirmed
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
@@ -166,7 +166,8 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
     named = outcome.named
     result.moved = proof.moved(base, whole) if named else {}
     own = proof.moved(held_without(final), whole) if named else {}
-    material = is_material(own, result.moved, materiality)
+    material = is_material(own, result.moved, materiality,
+                           proof.fall(proof.refit, proof.after)[0] > REFUTED)
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:
@@ -193,10 +194,10 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
 
 
 def _is_left(result, problem, proof, base, least, whole):
-    """Return whether calibration leaves more than noise and the doubt about the numbers do."""
+    """Return whether calibration leaves more than noise and the doubt about the numbers may."""
     def left(spread):
         return max((beyond(s.rmse_refit, math.hypot(
-            FLOOR_ERROR * proof.highest_floor[name], spread.get(name, 0.0))) / max(
+            FLOOR_ERROR * proof.highest_floor[name], NORMAL_95 * spread.get(name, 0.0))) / max(
                 proof.noise[name], 1e-12) for name, s in result.signals.items()), default=0.0)
 
     return left({}) > least and left(spread_of_numbers(proof, problem, base, whole)) > least

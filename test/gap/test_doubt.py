@@ -19,7 +19,7 @@ import numpy as np
 from pam_sim.gap.candidates import candidates
 from pam_sim.gap.choice import Choice, Rival
 from pam_sim.gap.cuts import Cut, cuts_of
-from pam_sim.gap.doubt import spread_of_numbers
+from pam_sim.gap.doubt import distance_to_none, spread_of_numbers
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -54,6 +54,24 @@ def test_a_number_that_one_motion_hardly_shows_leaves_doubt_in_another():
     # Known within 1, it moves the run by its form; the rms of a cosine.
     spread = spread_of_numbers(proof, Given, None, True)
     assert spread['contraction'] == pytest.approx(3e-5 / np.sqrt(2.0), rel=0.01)
+
+
+@pytest.mark.parametrize('most', [np.inf, 1.0, 3.0])
+def test_a_number_stands_in_for_an_effect_within_its_range_only(most):
+    """Known together far better than each alone: 0.5 their sum, 2 the effect itself."""
+    axes = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2.0)
+    covariance = axes.T @ np.diag([0.5 ** 2, 2.0 * 2.0 ** 2 - 0.5 ** 2]) @ axes
+    x, none = np.array([4.0, 0.0]), np.array([True, False])
+    free = distance_to_none(covariance, x, none, np.full(2, -np.inf), np.full(2, np.inf))
+    assert free == pytest.approx(4.0 / np.sqrt(covariance[0, 0])) == pytest.approx(2.0)
+    bounded = distance_to_none(covariance, x, none, np.zeros(2), np.array([9.0, most]))
+    assert bounded >= free - 1e-9
+    # The other goes where it does most, or as far as it may.
+    best = min(np.sqrt(d @ np.linalg.inv(covariance) @ d) for d in (
+        np.array([-4.0, w]) for w in np.linspace(0.0, min(most, 9.0), 2001)))
+    assert bounded == pytest.approx(best, rel=1e-5)
+    assert distance_to_none(covariance, x, np.array([True, True]), x, x) == pytest.approx(
+        np.sqrt(x @ np.linalg.inv(covariance) @ x))
 
 
 class Blocks(Cut):
@@ -102,7 +120,7 @@ def test_fits_side_by_side_are_those_one_after_another():
         voltages(12.0)), 'ppr')]))
     slopes = {s: of.copy() for s, of in problem.slopes.items()}
     pool = [c for c in candidates(nominal(), ('contraction',))
-            if c.name in ('parallel_spring', 'bladder_stiffness', 'end_taper')]
+            if c.effect in ('parallel_spring', 'bladder_stiffness', 'end_taper')]
     fits = [problem.fit(Hypothesis((c,)), [0.5]) for c in pool]
     alone = [problem.polish(f) for f in fits]
     for one, other in zip(alone, side_by_side(problem.polish, fits)):

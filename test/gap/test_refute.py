@@ -122,14 +122,17 @@ def test_a_run_gets_the_skew_of_the_certify_recording_within_bounds(skew_s, left
     assert float(np.sum(error * slope) / np.sum(slope ** 2)) == pytest.approx(left_s, abs=2e-5)
 
 
-@pytest.mark.parametrize('own, refitted, is_so', [
-    (4.0, 2.0, True),
-    (4.0, 0.5, True),                 # the numbers could hide most of it, but not all
-    (4.0, 0.1, False),
-    (0.1, 4.0, True),                 # another motion; there the numbers it bent are wrong
-    (0.5, 0.5, False)])
-def test_an_effect_matters_by_what_it_moves_itself_or_what_nothing_replaces(own, refitted, is_so):
-    assert is_material({'pressure': own}, {'force': refitted}, 1.0) == is_so
+@pytest.mark.parametrize('own, refitted, found_again, is_so', [
+    (4.0, 2.0, False, True),
+    (4.0, 0.5, False, True),          # the numbers could hide most of it, but not all
+    (4.0, 0.25, False, False),
+    (4.0, 0.25, True, True),          # little is left, but that little is seen
+    (4.0, 0.1, True, False),
+    (0.1, 4.0, False, True),          # another motion; there the numbers it bent are wrong
+    (0.5, 0.5, True, False)])
+def test_an_effect_matters_by_what_it_moves_itself_or_what_nothing_replaces(
+        own, refitted, found_again, is_so):
+    assert is_material({'pressure': own}, {'force': refitted}, 1.0, found_again) == is_so
 
 
 def test_effects_are_taken_out_while_the_numbers_stay():

@@ -32,7 +32,7 @@ from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.look_alikes import look_alikes
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.screen import Screened
-from pam_sim.gap.search import Search
+from pam_sim.gap.search import from_sibling, Search
 import pytest
 
 
@@ -145,6 +145,44 @@ def test_a_loop_that_has_lost_its_width_is_the_simpler_friction(name, kept):
     assert without_limits([near, narrow], bare, 'muscle') == ([narrow] if kept else []) + [near]
     assert without_limits([near, wide], bare, 'muscle') == [wide, near]
     assert without_limits([narrow], near.found, 'muscle') == ([narrow] if kept else [])
+
+
+@pytest.mark.parametrize('winner, rest, mends', [
+    ('pressure_friction', 0.01, True),          # friction made of two kinds
+    ('pressure_friction', 0.03, False),
+    ('end_taper', 0.01, False),                 # another family
+    ('mass_kg', 0.01, False)])
+def test_a_small_rest_is_no_second_effect_of_the_same_family(winner, rest, mends):
+    (friction,) = [c for c in candidates(nominal(), ('contraction',), ['coulomb_friction'])
+                   if c.effect == 'coulomb_friction']
+    cut = types.SimpleNamespace(level=1.0, chi2=lambda errors, part: 1.0 + 100.0 * rest)
+    given = types.SimpleNamespace(_cut=lambda subsystem: cut, first_gap={'muscle': 100.0})
+    current = Found(Hypothesis((friction,)), np.ones(1), {}, {'muscle': None}, {})
+    named = types.SimpleNamespace(name=winner, subsystem='muscle')
+    assert Search._mends_a_form(given, named, current) is mends
+
+
+@pytest.mark.parametrize('share_of_gap, starts_there', [(0.97, True), (0.5, False)])
+def test_a_formulation_begins_where_one_that_explains_well_ended(share_of_gap, starts_there):
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
+    plain, bending = by_name['coulomb_friction'], by_name['coulomb_friction_presliding']
+    found = Found(Hypothesis((by_name['end_taper'], plain)), np.array([0.1, 2.5]), {}, {}, {})
+    own = Screened(bending, (0.4, 0.0, 1.0), {})
+    start = from_sibling(own, [Rival('coulomb_friction', found, {'muscle': share_of_gap})], 1)
+    assert start.start == ((2.5, 0.0, 1.0) if starts_there else own.start)
+    assert from_sibling(own, [], 1) is own
+
+
+def test_friction_that_bends_first_is_named_as_friction():
+    """And leaves nothing that a second effect would have to explain."""
+    rig = nominal().with_(effects=[{'name': 'coulomb_friction_presliding', 'parameters': {
+        'force_n': 2.0, 'presliding_m': 2.5e-5}}])
+    result = find_gap(recorded(rig, voltages(20.0)), nominal())
+    assert result.verdict == 'effects'
+    assert [e['name'] for e in result.effects] == ['coulomb_friction']
+    assert result.effects[0]['formulation'] == 'coulomb_friction_presliding'
+    low, high = result.effects[0]['equivalent']['force_n']['ci95']
+    assert low <= 2.0 <= high
 
 
 def test_an_effect_knows_its_look_alikes_and_its_least_size():

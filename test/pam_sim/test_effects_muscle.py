@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.effects.registry import effects
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 import pytest
 
@@ -72,6 +73,35 @@ def test_bladder_stiffness_takes_its_force():
                        voltage=4.0)
     assert stiff.contraction_m[-1] < soft.contraction_m[-1] - 0.5e-3
     assert stiff.force_n[-1] == pytest.approx(soft.force_n[-1], abs=0.02)   # inside the muscle
+
+
+def test_a_tube_that_stiffens_is_stated_as_its_secant():
+    values = {'stiffness_n_per_m': 150.0, 'hardening_m': 0.03}
+    added = driven().force_n - driven(('bladder_stiffness_progressive', values)).force_n
+    x = TRIANGLE_M
+    assert np.allclose(added, 150.0 * x * (1.0 + x / 0.03), atol=1e-9)
+    effect = effects()['bladder_stiffness_progressive']
+    (secant, unit), = effect.report(effect.values(values), None).values()
+    assert secant == pytest.approx(np.interp(14e-3, x[:501], added[:501]) / 14e-3, rel=1e-3)
+    assert unit == 'N/m'
+    # It stiffens over ever longer ways, until it is the spring.
+    soft = driven(('bladder_stiffness_progressive', values | {'hardening_m': 100.0}))
+    spring = driven(('bladder_stiffness', {'stiffness_n_per_m': 150.0}))
+    assert np.allclose(soft.force_n, spring.force_n, atol=2e-3)
+
+
+@pytest.mark.parametrize('damping', [30.0, -10.0])
+def test_a_damper_that_yields_at_speed(damping):
+    values = {'damping_n_s_per_m': damping, 'speed_m_per_s': 0.01}
+    added = (driven().force_n - driven(('viscous_damping_thinning', values)).force_n)[1:]
+    v = np.diff(TRIANGLE_M) * 1000.0
+    assert np.allclose(added, damping * v / (1.0 + np.abs(v) / 0.01), atol=1e-9)
+    effect = effects()['viscous_damping_thinning']
+    stated = effect.report(effect.values(values), None)['force_at_50mm_per_s_n']
+    assert stated == (pytest.approx(damping * 0.05 / 6.0), 'N')
+    fast = driven(('viscous_damping_thinning', values | {'speed_m_per_s': 100.0}))
+    linear = driven(('viscous_damping', {'damping_n_s_per_m': damping}))
+    assert np.allclose(fast.force_n, linear.force_n, atol=2e-4)
 
 
 def test_thermal_softening_loses_force_with_work():

@@ -36,7 +36,9 @@ valve loss supply_droop reservoir_volume_m3
 valve volume dead_volume extra_volume_m3
 valve volume thermal heat_exchange_time_s
 muscle friction coulomb_friction force_n
+muscle friction coulomb_friction_presliding force_n
 muscle friction pressure_friction force_at_400kpa_n
+muscle friction pressure_friction_presliding force_at_400kpa_n
 muscle friction hysteresis loop_half_width_at_400kpa_n
 muscle friction hysteresis_bouc_wen loop_half_width_at_400kpa_n
 muscle friction hysteresis_prandtl_ishlinskii loop_half_width_at_400kpa_n
@@ -44,12 +46,15 @@ muscle friction hysteresis_lugre loop_half_width_at_400kpa_n
 muscle friction history_friction loop_half_width_at_400kpa_n
 muscle friction braid_contact_friction force_at_400kpa_n
 muscle damping viscous_damping force_at_50mm_per_s_n
+muscle damping viscous_damping_thinning force_at_50mm_per_s_n
 muscle slow creep relaxing_stiffness_n_per_m creep_fraction_at_400kpa
 muscle slow thermal_softening gain_loss_at_20mm_per_s
 muscle static_map threshold_pressure pressure_pa
 muscle static_map end_taper k_minus_1 force_change_at_500kpa_10mm_n
 muscle static_map bladder_stiffness stiffness_n_per_m
+muscle static_map bladder_stiffness_progressive stiffness_n_per_m
 load friction guide_friction force_n
+load friction guide_friction_presliding force_n
 load load parallel_spring stiffness_n_per_m
 sensor sensor pressure_bias bias_pa
 sensor sensor contraction_bias bias_m

@@ -1,0 +1,59 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Dry friction of rail or joint that bends before it slips; the load cell carries it."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.guide_friction import EFFECT as _SIBLING
+from pam_sim.effects.presliding import (
+    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_SLOTS, share_of_sliding, SOURCE)
+
+_LEVEL = PRESLIDING_SLOTS
+
+
+def _pack(values, numbers):
+    return (*pack_presliding(values), values['force_n'])
+
+
+EFFECT = Effect(
+    name='guide_friction_presliding',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    variant_of='guide_friction',
+    sentence='Dry friction of rail or joint gives way by micrometres before it slides.',
+    source=SOURCE,
+    equation='m dv/dt = F - c v - m g - F_ext - F_guide, F_guide = F_c (z + tau w dz/dt) / z_s, '
+             'dz/dt = v - |v| z / (z_s (1 + e w)), w = exp(-(v / v_s)^2); '
+             'F_cell -> F_cell + F_guide',
+    parameters=(*_SIBLING.parameters, *PARAMETERS),
+    amplitude=_SIBLING.amplitude,
+    reported=_SIBLING.reported,
+    states=1,
+    slots=PRESLIDING_SLOTS + 1,
+    pack=_pack,
+)
+
+
+@compiled
+def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Return the force against contraction with the bent contact's added."""
+    return force_n + par[k + _LEVEL] * share_of_sliding(
+        velocity_m_per_s, dx_m, state, i, par, k)
+
+
+@compiled
+def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Advance the bending of the contact."""
+    advance_bending(velocity_m_per_s, dx_m, state, i, par, k)

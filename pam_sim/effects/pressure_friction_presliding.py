@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Dry friction that grows with gauge pressure and bends before it slips."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.presliding import (
+    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_SLOTS, share_of_sliding, SOURCE)
+from pam_sim.effects.pressure_friction import EFFECT as _SIBLING
+
+_LEVEL = PRESLIDING_SLOTS
+
+
+def _pack(values, numbers):
+    return (*pack_presliding(values), *_SIBLING.pack(values, numbers))
+
+
+EFFECT = Effect(
+    name='pressure_friction_presliding',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    variant_of='pressure_friction',
+    sentence='Dry friction inside the muscle grows with pressure and gives way a little before '
+             'it slides.',
+    source=SOURCE,
+    equation='F -= F400 p_g / 400 kPa (z + tau w dz/dt) / z_s, '
+             'dz/dt = v - |v| z / (z_s (1 + e w)), w = exp(-(v / v_s)^2)',
+    parameters=(*_SIBLING.parameters, *PARAMETERS),
+    amplitude=_SIBLING.amplitude,
+    reported=_SIBLING.reported,
+    states=1,
+    slots=PRESLIDING_SLOTS + _SIBLING.slots,
+    pack=_pack,
+)
+
+
+@compiled
+def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
+                 state, i, par, k):
+    """Return the force less that of the bent contact."""
+    level_n = par[k + _LEVEL] * max(pressure_pa - par[k + _LEVEL + 1], 0.0)
+    return force_n - level_n * share_of_sliding(velocity_m_per_s, dx_m, state, i, par, k)
+
+
+@compiled
+def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Advance the bending of the contact."""
+    advance_bending(velocity_m_per_s, dx_m, state, i, par, k)
