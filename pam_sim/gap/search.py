@@ -365,8 +365,8 @@ def from_sibling(screened, rivals, place):
     ``place`` is that of the added effect in the hypotheses of the rivals.
     """
     name = screened.candidate.name
-    sibling = max((r for r in rivals
-                   if r.name == name and len(r.found.hypothesis.effects) > place), key=lambda r: sum(r.share.values()), default=None)
+    siblings = [r for r in rivals if r.name == name and len(r.found.hypothesis.effects) > place]
+    sibling = max(siblings, key=lambda r: sum(r.share.values()), default=None)
     if sibling is None or max(sibling.share.values()) < ALMOST:
         return screened
     values = sibling.found.values()[place]
