@@ -93,6 +93,11 @@ class Candidate:
         return get_effect(self.effect).variant_of or self.effect
 
     @property
+    def refines(self):
+        """Whether it differs little from another formulation, and matters beside that alone."""
+        return self.effect in REFINEMENTS
+
+    @property
     def amplitudes(self):
         """Return the free parameters whose response is about proportional to their value."""
         return [f for f in self.free if not f.shape]
@@ -165,6 +170,9 @@ _HSV = {'valve_dead_zone': _SWITCHING,
         'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3))}
 _OVERLAP = (Free('half_width_pa', 2e3, 0.0, 5e4),)
 _PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
+# Each contains another formulation of its name, adds a few per cent of its gap, and takes long.
+REFINEMENTS = {'coulomb_friction_presliding', 'pressure_friction_presliding',
+               'guide_friction_presliding'}
 # Left is a limit of right: where both explain the data, the simpler one is named.
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}

@@ -21,18 +21,18 @@ cannot be told apart they stay together as a set. At the end every effect must b
 missed when it is left out.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import ALMOST, Choice, CLOSE, Rival
+from pam_sim.gap.choice import Choice, CLOSE, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
-from pam_sim.gap.finish import Finish
+from pam_sim.gap.finish import Finish, NAMED
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
-from pam_sim.gap.screen import screen
+from pam_sim.gap.screen import screen, Screened
 from pam_sim.gap.side_by_side import side_by_side
 
 MAX_EFFECTS = 3
@@ -40,6 +40,7 @@ PROMISING = 0.15             # of the best promise in a cut
 MIN_FITTED, MAX_FITTED = 4, 7    # names that are fitted in each cut
 IN_FULL = 3                  # of those that promise most with all errors at full weight
 CONTENDS = 0.35              # share of the gap a name may stay behind and have variants tried
+REFINABLE = 3.0              # times the least rest; by more a refinement of another cannot win
 PULLED = 1.0                 # prior deviations of a number; from there on it may be wrong
 DONE = 0.0035                # rest of the gap that formulations may leave
 FORM = 0.02                  # that they may leave for another effect of their own family
@@ -101,7 +102,7 @@ class Search(Finish):
         self.base = problem.base
         self.choice = Choice(problem, self.base, seen_gap)
         self.fitted = []
-        self.screened = screen(problem, self.base, self.pool)
+        self.screened = screen(problem, self.base, [c for c in self.pool if not c.refines])
         self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
 
     def run(self):
@@ -234,8 +235,9 @@ class Search(Finish):
         """Return the fitted hypotheses that add one effect of ``pool`` or free one number."""
         taken = set(current.hypothesis.names)
         pool = self.pool if pool is None else pool
+        pool = [c for c in pool if c.name not in taken]
         screened = self.screened if current is self.base else screen(
-            self.problem, current, [c for c in pool if c.name not in taken])
+            self.problem, current, [c for c in pool if not c.refines])
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
         pulled = [name for cut in cuts for name, z in current.pulls(cut).items()
@@ -246,10 +248,33 @@ class Search(Finish):
         contending = set().union(*(self._contending(rivals, current, c) for c in cuts))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
-            from_sibling(s, rivals, len(current.hypothesis.effects)) for s in screened
+            s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
+        rivals += self._fit_all(current, self._refined(
+            rivals, pool, cuts, len(current.hypothesis.effects)))
         self.fitted = rivals
         return self._best_of_name(rivals)
+
+    @staticmethod
+    def _refined(rivals, pool, cuts, place):
+        """
+        Return the refinements of what explains a cut nearly and best, each from where that ended.
+
+        ``place`` is that of the added effect in the hypotheses of the rivals.
+        """
+        chosen = []
+        for s in (cut.subsystem for cut in cuts):
+            least = max([NAMED] + [1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals])
+            chosen += [r for r in rivals if r.share[s] >= least and r not in chosen]
+        found = []
+        for c in (c for c in pool if c.refines):
+            plain = max((r for r in chosen if r.name == c.name), default=None,
+                        key=lambda r: sum(r.share.values()))
+            if plain is not None:
+                values = plain.found.values()[place]
+                found.append(Screened(c, tuple(
+                    f.coordinate(values.get(f.name, f.scale)) for f in c.free), {}))
+        return found
 
     def _contending(self, rivals, current, cut):
         """Return the names of which a formulation is near enough to the best in a cut."""
@@ -356,20 +381,3 @@ class Search(Finish):
                 theta += list(put.found.theta_of(len(added.effects) - 1))
         return self.problem.fit(
             Hypothesis(tuple(effects), tuple(freed)), theta, current, whole=False)
-
-
-def from_sibling(screened, rivals, place):
-    """
-    Return a candidate that starts where a formulation of its name ended that explains well.
-
-    ``place`` is that of the added effect in the hypotheses of the rivals.
-    """
-    name = screened.candidate.name
-    siblings = [r for r in rivals if r.name == name and len(r.found.hypothesis.effects) > place]
-    sibling = max(siblings, key=lambda r: sum(r.share.values()), default=None)
-    if sibling is None or max(sibling.share.values()) < ALMOST:
-        return screened
-    values = sibling.found.values()[place]
-    return replace(screened, start=tuple(
-        f.coordinate(min(max(values[f.name], f.lower), f.upper)) if f.name in values else x
-        for f, x in zip(screened.candidate.free, screened.start)))
