@@ -38,7 +38,7 @@ from pam_sim.gap.solver import cut_errors, ROUNDS, shows, Solver, within_reach
 
 BOX = 3.5                    # prior deviations; beyond it a number is wrong, not inexact
 BASE_PASSES = 2              # of the baseline, the second with slopes where the first ended
-BENT = 2.0                   # prior deviations; a fit starts without what bent the baseline more
+BENT = 1.5                   # prior deviations; a fit starts without what bent the baseline more
 POLISHES = 4
 WORTH_POLISHING = 0.8        # of the cost before; a fit that falls below goes on
 CROSSED_ROUNDS = 2           # they begin at a solution
