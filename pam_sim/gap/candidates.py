@@ -93,11 +93,6 @@ class Candidate:
         return get_effect(self.effect).variant_of or self.effect
 
     @property
-    def refines(self):
-        """Whether it differs little from another formulation, and matters beside that alone."""
-        return self.effect in REFINEMENTS
-
-    @property
     def amplitudes(self):
         """Return the free parameters whose response is about proportional to their value."""
         return [f for f in self.free if not f.shape]
@@ -227,6 +222,18 @@ def candidates(rig, outputs, only=None):
             continue
         found.append(candidate)
     return found
+
+
+def split_refinements(pool):
+    """
+    Return (candidates to begin with, refinements of some of them).
+
+    A refinement differs little from another formulation of its name and is tried after that;
+    where the other is not in the pool, it is one to begin with.
+    """
+    names = {c.name for c in pool if c.effect not in REFINEMENTS}
+    refined = [c for c in pool if c.effect in REFINEMENTS and c.name in names]
+    return [c for c in pool if c not in refined], refined
 
 
 def _plain(effect):

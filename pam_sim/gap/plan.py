@@ -28,7 +28,7 @@ import math
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
-from pam_sim.gap.candidates import candidates, LIMITS
+from pam_sim.gap.candidates import candidates, LIMITS, split_refinements
 from pam_sim.gap.cuts import acts_on, cuts_of
 from pam_sim.gap.fit import BOX
 from pam_sim.gap.parts import UNUSED
@@ -186,7 +186,7 @@ class Sensitivities:
         self.rig = rig
         self.cuts = cuts_of(rig, [recording], own_proof=False)
         self.signals = sum((cut.signals for cut in self.cuts), ())
-        self.pool = candidates(rig, self.signals, only)
+        self.pool, _ = split_refinements(candidates(rig, self.signals, only))
         self.probes = {c.name: c for c in self.pool if c.effect == c.name}
         self._base = [cut.values(rig, np.zeros(len(cut.known))) for cut in self.cuts]
         self._rows = [cut.part != UNUSED for cut in self.cuts]

@@ -24,7 +24,7 @@ missed when it is left out.
 from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
-from pam_sim.gap.candidates import candidates
+from pam_sim.gap.candidates import candidates, split_refinements
 from pam_sim.gap.choice import Choice, CLOSE, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
@@ -102,7 +102,7 @@ class Search(Finish):
         self.base = problem.base
         self.choice = Choice(problem, self.base, seen_gap)
         self.fitted = []
-        self.screened = screen(problem, self.base, [c for c in self.pool if not c.refines])
+        self.screened = screen(problem, self.base, split_refinements(self.pool)[0])
         self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
 
     def run(self):
@@ -235,9 +235,9 @@ class Search(Finish):
         """Return the fitted hypotheses that add one effect of ``pool`` or free one number."""
         taken = set(current.hypothesis.names)
         pool = self.pool if pool is None else pool
-        pool = [c for c in pool if c.name not in taken]
+        plain, refinements = split_refinements([c for c in pool if c.name not in taken])
         screened = self.screened if current is self.base else screen(
-            self.problem, current, [c for c in pool if not c.refines])
+            self.problem, current, plain)
         chosen = self._promising(screened, cuts)
         rivals = self._fit_all(current, chosen)
         pulled = [name for cut in cuts for name, z in current.pulls(cut).items()
@@ -251,12 +251,12 @@ class Search(Finish):
             s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
         rivals += self._fit_all(current, self._refined(
-            rivals, pool, cuts, len(current.hypothesis.effects)))
+            rivals, refinements, cuts, len(current.hypothesis.effects)))
         self.fitted = rivals
         return self._best_of_name(rivals)
 
     @staticmethod
-    def _refined(rivals, pool, cuts, place):
+    def _refined(rivals, refinements, cuts, place):
         """
         Return the refinements of what explains a cut nearly and best, each from where that ended.
 
@@ -267,7 +267,7 @@ class Search(Finish):
             least = max([NAMED] + [1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals])
             chosen += [r for r in rivals if r.share[s] >= least and r not in chosen]
         found = []
-        for c in (c for c in pool if c.refines):
+        for c in refinements:
             plain = max((r for r in chosen if r.name == c.name), default=None,
                         key=lambda r: sum(r.share.values()))
             if plain is not None:

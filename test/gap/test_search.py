@@ -21,7 +21,7 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
-from pam_sim.gap.candidates import candidates
+from pam_sim.gap.candidates import candidates, split_refinements
 from pam_sim.gap.choice import Rival, without_limits
 from pam_sim.gap.compare import preference, share
 from pam_sim.gap.cuts import cuts_of
@@ -170,9 +170,19 @@ def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, t
     cut = types.SimpleNamespace(subsystem='muscle')
     rivals = [Rival('coulomb_friction', found, {'muscle': share_of_gap}),
               Rival('end_taper', found, {'muscle': 0.99})]
-    refined = Search._refined(rivals, [*by_name.values()], [cut], 1)
+    _, refinements = split_refinements([*by_name.values()])
+    refined = Search._refined(rivals, refinements, [cut], 1)
     assert [(s.candidate, s.start) for s in refined] == (
         [(bending, (2.5, 0.0, 1.0))] if tried else [])
+
+
+def test_a_refinement_alone_is_one_to_begin_with():
+    pool = candidates(nominal(), ('contraction',))
+    first, refinements = split_refinements(pool)
+    assert {c.name for c in refinements} == {
+        'coulomb_friction', 'pressure_friction', 'guide_friction'}
+    assert not set(first) & set(refinements) and set(first) | set(refinements) == set(pool)
+    assert split_refinements(refinements) == (refinements, [])
 
 
 def test_friction_that_bends_first_is_named_as_friction():
