@@ -50,10 +50,10 @@ def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, el
                  state, i, par, k):
     """Return the force less that of the bent contact."""
     return force_n - par[k + _LEVEL] * share_of_sliding(
-        velocity_m_per_s, dx_m, state, i, par, k)
+        velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
 
 
 @compiled
 def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
     """Advance the bending of the contact."""
-    advance_bending(velocity_m_per_s, dx_m, state, i, par, k)
+    advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)

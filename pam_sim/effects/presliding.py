@@ -66,6 +66,18 @@ def bent(z_m, dx_m, sliding_m):
 
 
 @compiled
+def bent_there_and_back(z_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m):
+    """Return the same for a travel that may hold a turn: its net length would leave that out."""
+    if elapsed_s <= 0.0:
+        return z_m
+    before = 2.0 * dx_m / elapsed_s - velocity_m_per_s
+    if before * velocity_m_per_s < 0.0:
+        turn_m = 0.5 * elapsed_s * before * before / (before - velocity_m_per_s)
+        return bent(bent(z_m, turn_m, sliding_m), dx_m - turn_m, sliding_m)
+    return bent(z_m, dx_m, sliding_m)
+
+
+@compiled
 def at_rest(velocity_m_per_s, par, k):
     """Return how much a velocity is as rest: 1 at none, 0 far above the Stribeck speed."""
     square = (velocity_m_per_s * par[k + _INVERSE_SPEED]) ** 2
@@ -73,11 +85,11 @@ def at_rest(velocity_m_per_s, par, k):
 
 
 @compiled
-def share_of_sliding(velocity_m_per_s, dx_m, state, i, par, k):
+def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
     """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
     rest = at_rest(velocity_m_per_s, par, k)
     sliding_m = par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest)
-    z = bent(state[i], dx_m, sliding_m)
+    z = bent_there_and_back(state[i], dx_m, velocity_m_per_s, elapsed_s, sliding_m)
     if rest > 0.0:
         rate = velocity_m_per_s - abs(velocity_m_per_s) * z / sliding_m
         z += par[k + _TIME] * rest * rate
@@ -85,7 +97,8 @@ def share_of_sliding(velocity_m_per_s, dx_m, state, i, par, k):
 
 
 @compiled
-def advance_bending(velocity_m_per_s, dx_m, state, i, par, k):
+def advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
     """Advance the bending by the travel of a step."""
     rest = at_rest(velocity_m_per_s, par, k)
-    state[i] = bent(state[i], dx_m, par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest))
+    state[i] = bent_there_and_back(state[i], dx_m, velocity_m_per_s, elapsed_s,
+                                   par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest))

@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.effects.presliding import bent, bent_there_and_back
 from pam_sim.units import P_ATM_PA
 import pytest
 from scipy.integrate import solve_ivp
@@ -73,6 +74,19 @@ def test_breaks_away_above_and_slides_at_the_level(name):
     fast = driven(0.005 + 5e-5 * np.arange(201), name + '_presliding', **given)
     assert slow[-1] == pytest.approx(-3.0, rel=1e-3)      # 0.1 mm/s
     assert fast[-1] == pytest.approx(-2.0, rel=1e-3)      # 50 mm/s
+
+
+@pytest.mark.parametrize('before, after', [(0.01, -0.006), (-0.004, 0.01), (0.01, 0.02)])
+def test_a_turn_inside_a_step_is_travelled_both_ways(before, after):
+    way_m, elapsed_s = 10e-6, 1e-3
+    fine = np.linspace(0.0, elapsed_s, 10_001)
+    path = before * fine + 0.5 * (after - before) / elapsed_s * fine ** 2
+    z = 4e-6
+    for dx in np.diff(path):
+        z = bent(z, dx, way_m)
+    assert bent_there_and_back(4e-6, path[-1], after, elapsed_s, way_m) == pytest.approx(
+        z, abs=1e-9)
+    assert bent_there_and_back(4e-6, 0.0, after, 0.0, way_m) == 4e-6
 
 
 def test_pressure_scales_it():
