@@ -51,7 +51,8 @@ def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, el
                  state, i, par, k):
     """Return the force less that of the bent contact."""
     level_n = par[k + _LEVEL] * max(pressure_pa - par[k + _LEVEL + 1], 0.0)
-    return force_n - level_n * share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+    return force_n - level_n * share_of_sliding(
+        velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
 
 
 @compiled
