@@ -154,6 +154,8 @@ _TABLE = {
                           Free('time_constant_s', 60.0, 10.0, 600.0, True)),
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
+    'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4),
+                                    Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())),
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }

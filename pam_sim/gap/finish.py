@@ -19,6 +19,7 @@ It must also be ranked first beside the others, have a size that differs from no
 its cut without numbers that are bent for it.
 """
 
+import numpy as np
 from pam_sim.gap.candidates import LIMITS
 from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
@@ -117,8 +118,12 @@ class Finish:
         Drop effects whose size does not clearly differ from none, or is the measurement's.
 
         One of shapes alone, such as the volume of a reservoir, is none at the end of its range.
+        A number that was wrong only until something else was found is within its tolerance then.
         """
         for w in list(named):
+            if abs(self._freed_z(current).get(w.name, np.inf)) < STRAIGHT:
+                current = self._swapped(current, w.name)
+                named = [o for o in named if o is not w]
             names = [c.name for c in current.hypothesis.effects]
             if w.name not in names:
                 continue
@@ -130,6 +135,12 @@ class Finish:
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return current, named
+
+    def _freed_z(self, current):
+        """Return by name how far the numbers without a prior are from it, in its deviations."""
+        return {known.name: z for cut in self.problem.cuts
+                for known, z in zip(cut.known, current.known_z[cut.subsystem])
+                if known.name in current.hypothesis.freed}
 
     def _resolve(self, current, named):
         """Rank again the rivals of each effect now that the others are in the model."""

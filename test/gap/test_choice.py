@@ -233,6 +233,28 @@ def test_a_number_that_is_bent_without_need_costs_no_name(within, names_stand):
     assert Given()._straightened(held) is held
 
 
+@pytest.mark.parametrize('z, stays', [(0.6, False), (-1.9, False), (4.0, True), (-9.0, True)])
+def test_a_number_that_came_back_into_its_tolerance_is_not_wrong(z, stays):
+    cut = Blocks(4)
+    cut.known = [Known('V_dead', 'm3', 3e-6, 1e-7, 0.0, 1e-4)]
+    bias = next(c for c in candidates(nominal(), ('contraction',))
+                if c.effect == 'contraction_bias')
+    both = Found(Hypothesis((bias,), ('V_dead',)), np.ones(1), {'muscle': np.array([z])}, {}, {})
+    alone = Found(Hypothesis((bias,)), np.ones(1), {'muscle': np.zeros(1)}, {}, {})
+
+    class Given(Search):
+        class problem:
+            cuts, certainty = [cut], staticmethod(lambda found, place: 99.0)
+
+        def __init__(self):
+            self._swapped = lambda current, out: alone
+
+    named = [Named(n, 'muscle', [], (n,)) for n in ('V_dead', 'contraction_bias')]
+    found, left = Given()._established(both, named)
+    assert [w.name for w in left] == ['V_dead', 'contraction_bias'][not stays:]
+    assert found is (both if stays else alone)
+
+
 @pytest.mark.parametrize('name, size, is_so', [
     ('pressure_lag', 4e-4, True), ('pressure_lag', 4e-3, False), ('valve_dead_time', 8e-4, True),
     ('creep', None, False), ('contraction_bias', 1e-5, False)])

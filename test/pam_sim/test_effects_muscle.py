@@ -90,6 +90,19 @@ def test_a_tube_that_stiffens_is_stated_as_its_secant():
     assert np.allclose(soft.force_n, spring.force_n, atol=2e-3)
 
 
+def test_a_spring_that_stiffens_is_read_by_the_load_cell():
+    values = {'stiffness_n_per_m': 150.0, 'hardening_m': 0.03}
+    rig, response = hanging(('parallel_spring_progressive', values))
+    x = response.contraction_m
+    load = rig.parameters['mass_kg'] * (response.acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+    inside = x > 1e-6
+    assert np.allclose((response.force_n - load)[inside],
+                       (150.0 * x * (1.0 + x / 0.03))[inside], atol=1e-9)
+    effect = effects()['parallel_spring_progressive']
+    (secant, _), = effect.report(effect.values(values), None).values()
+    assert secant == pytest.approx(150.0 * (1.0 + 14.0 / 30.0))
+
+
 @pytest.mark.parametrize('damping', [30.0, -10.0])
 def test_a_damper_that_yields_at_speed(damping):
     values = {'damping_n_s_per_m': damping, 'speed_m_per_s': 0.01}

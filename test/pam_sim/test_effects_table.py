@@ -56,6 +56,7 @@ muscle static_map bladder_stiffness_progressive stiffness_n_per_m
 load friction guide_friction force_n
 load friction guide_friction_presliding force_n
 load load parallel_spring stiffness_n_per_m
+load load parallel_spring_progressive stiffness_n_per_m
 sensor sensor pressure_bias bias_pa
 sensor sensor contraction_bias bias_m
 sensor sensor force_bias bias_n

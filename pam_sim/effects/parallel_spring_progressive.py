@@ -1,0 +1,56 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A spring beside the mass that stiffens: the load pulls with k x (1 + x / x_h) more."""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.parallel_spring import EFFECT as _SIBLING
+from pam_sim.parameters import Parameter
+
+_STIFFNESS, _PER_M = range(2)
+_AT_M = 14e-3               # where the secant is that of a linear spring fitted over the stroke
+
+
+def _pack(values, numbers):
+    return values['stiffness_n_per_m'], 1.0 / values['hardening_m']
+
+
+EFFECT = Effect(
+    name='parallel_spring_progressive',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    variant_of='parallel_spring',
+    sentence='A spring beside the mass stiffens as it is stretched; the load cell reads it.',
+    source='Spring with a linear rise of its secant; form and size: design choice.',
+    equation='m dv/dt = F - c v - m g - F_ext - F_s, F_s = k x (1 + x / x_h), F_cell -> F_cell '
+             '+ F_s; stated as the secant at 14 mm',
+    parameters=(
+        *_SIBLING.parameters,
+        Parameter('hardening_m', 'm', 0.1, 2e-3, 100.0,
+                  description='Contraction x_h at which the secant has doubled.'),
+    ),
+    amplitude=_SIBLING.amplitude,
+    reported=(Reported(
+        'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m'] * (
+            1.0 + _AT_M / values['hardening_m'])),),
+    pack=_pack,
+)
+
+
+@compiled
+def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Return the force against contraction with the spring's added."""
+    return force_n + par[k + _STIFFNESS] * contraction_m * (
+        1.0 + contraction_m * par[k + _PER_M])
