@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
 from pam_sim.gap.candidates import candidates, split_refinements
-from pam_sim.gap.choice import Choice, CLOSE, Rival
+from pam_sim.gap.choice import Choice, CLOSE, RIVAL, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.finish import Finish, NAMED
@@ -251,20 +251,23 @@ class Search(Finish):
             s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
         rivals += self._fit_all(current, self._refined(
-            rivals, refinements, cuts, len(current.hypothesis.effects)))
+            rivals, refinements, {c.subsystem: self.choice.shares(current)[c.subsystem]
+                                  for c in cuts}, len(current.hypothesis.effects)))
         self.fitted = rivals
         return self._best_of_name(rivals)
 
     @staticmethod
-    def _refined(rivals, refinements, cuts, place):
+    def _refined(rivals, refinements, before, place):
         """
         Return the refinements of what explains a cut nearly and best, each from where that ended.
 
-        ``place`` is that of the added effect in the hypotheses of the rivals.
+        ``before`` is the share of the gap of every cut that was explained without, ``place``
+        that of the added effect in the hypotheses of the rivals.
         """
         chosen = []
-        for s in (cut.subsystem for cut in cuts):
-            least = max([NAMED] + [1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals])
+        for s, had in before.items():
+            least = max([NAMED, had + RIVAL * (1.0 - had)] + [
+                1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals])
             chosen += [r for r in rivals if r.share[s] >= least and r not in chosen]
         found = []
         for c in refinements:

@@ -162,16 +162,16 @@ def test_a_small_rest_is_no_second_effect_of_the_same_family(winner, rest, mends
     assert Search._mends_a_form(given, named, current) is mends
 
 
-@pytest.mark.parametrize('share_of_gap, tried', [(0.97, True), (0.8, False)])
-def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, tried):
+@pytest.mark.parametrize('share_of_gap, before, tried', [
+    (0.97, 0.0, True), (0.8, 0.0, False), (0.97, 0.96, False)])
+def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, before, tried):
     by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
     plain, bending = by_name['coulomb_friction'], by_name['coulomb_friction_presliding']
     found = Found(Hypothesis((by_name['end_taper'], plain)), np.array([0.1, 2.5]), {}, {}, {})
-    cut = types.SimpleNamespace(subsystem='muscle')
     rivals = [Rival('coulomb_friction', found, {'muscle': share_of_gap}),
               Rival('end_taper', found, {'muscle': 0.99})]
     _, refinements = split_refinements([*by_name.values()])
-    refined = Search._refined(rivals, refinements, [cut], 1)
+    refined = Search._refined(rivals, refinements, {'muscle': before}, 1)
     assert [(s.candidate, s.start) for s in refined] == (
         [(bending, (2.5, 0.0, 1.0))] if tried else [])
 
