@@ -12,24 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Parallel elastic force of a tube that stiffens: F -> F - k x (1 + x / x_h).
-
-The first term of any hardening law. Rubber between threads stiffens as they crowd.
-"""
+"""Parallel elastic force of a tube that stiffens: F -> F - k x (1 + x / x_h)."""
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.bladder_stiffness import EFFECT as _SIBLING
-from pam_sim.effects.effect import Effect, Reported
-from pam_sim.parameters import Parameter
-
-_STIFFNESS, _PER_M = range(2)
-_AT_M = 14e-3               # where the secant is that of a linear spring fitted over the stroke
-
-
-def _pack(values, numbers):
-    return values['stiffness_n_per_m'], 1.0 / values['hardening_m']
-
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.progressive import (
+    HARDENING, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
 
 EFFECT = Effect(
     name='bladder_stiffness_progressive',
@@ -37,23 +26,16 @@ EFFECT = Effect(
     subsystem=_SIBLING.subsystem,
     variant_of='bladder_stiffness',
     sentence='The rubber tube resists contraction like a spring that stiffens.',
-    source='Spring with a linear rise of its secant; form and size: design choice.',
+    source=SOURCE,
     equation='F -> F - k x (1 + x / x_h); stated as the secant at 14 mm',
-    parameters=(
-        *_SIBLING.parameters,
-        Parameter('hardening_m', 'm', 0.1, 2e-3, 100.0,
-                  description='Contraction x_h at which the secant has doubled.'),
-    ),
+    parameters=(*_SIBLING.parameters, HARDENING),
     amplitude=_SIBLING.amplitude,
-    reported=(Reported(
-        'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m'] * (
-            1.0 + _AT_M / values['hardening_m'])),),
-    pack=_pack,
+    reported=SECANT_REPORTED,
+    pack=pack_progressive,
 )
 
 
 @compiled
 def map_output(tension_n, pressure_pa, contraction_m, state, i, par, k):
     """Return the tension less that of the tube."""
-    return tension_n - par[k + _STIFFNESS] * contraction_m * (
-        1.0 + contraction_m * par[k + _PER_M])
+    return tension_n - spring_n(contraction_m, par, k)

@@ -15,17 +15,10 @@
 """A spring beside the mass that stiffens: the load pulls with k x (1 + x / x_h) more."""
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect
 from pam_sim.effects.parallel_spring import EFFECT as _SIBLING
-from pam_sim.parameters import Parameter
-
-_STIFFNESS, _PER_M = range(2)
-_AT_M = 14e-3               # where the secant is that of a linear spring fitted over the stroke
-
-
-def _pack(values, numbers):
-    return values['stiffness_n_per_m'], 1.0 / values['hardening_m']
-
+from pam_sim.effects.progressive import (
+    HARDENING, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
 
 EFFECT = Effect(
     name='parallel_spring_progressive',
@@ -33,24 +26,17 @@ EFFECT = Effect(
     subsystem=_SIBLING.subsystem,
     variant_of='parallel_spring',
     sentence='A spring beside the mass stiffens as it is stretched; the load cell reads it.',
-    source='Spring with a linear rise of its secant; form and size: design choice.',
+    source=SOURCE,
     equation='m dv/dt = F - c v - m g - F_ext - F_s, F_s = k x (1 + x / x_h), F_cell -> F_cell '
              '+ F_s; stated as the secant at 14 mm',
-    parameters=(
-        *_SIBLING.parameters,
-        Parameter('hardening_m', 'm', 0.1, 2e-3, 100.0,
-                  description='Contraction x_h at which the secant has doubled.'),
-    ),
+    parameters=(*_SIBLING.parameters, HARDENING),
     amplitude=_SIBLING.amplitude,
-    reported=(Reported(
-        'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m'] * (
-            1.0 + _AT_M / values['hardening_m'])),),
-    pack=_pack,
+    reported=SECANT_REPORTED,
+    pack=pack_progressive,
 )
 
 
 @compiled
 def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
     """Return the force against contraction with the spring's added."""
-    return force_n + par[k + _STIFFNESS] * contraction_m * (
-        1.0 + contraction_m * par[k + _PER_M])
+    return force_n + spring_n(contraction_m, par, k)

@@ -24,7 +24,7 @@ from pam_sim.rollout.hooks import HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('effect', 'registry')
-_SHARED = ('lag', 'loop_level', 'presliding')      # compiled code that several effects call
+_SHARED = ('lag', 'loop_level', 'presliding', 'progressive')   # that several effects call
 
 
 def effect_files():
