@@ -14,6 +14,8 @@
 
 """Dry friction of rail or joint that bends before it slips; the load cell carries it."""
 
+from functools import partial
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.guide_friction import EFFECT as _SIBLING
@@ -21,11 +23,6 @@ from pam_sim.effects.presliding import (
     advance_bending, pack_presliding, PARAMETERS, PRESLIDING_SLOTS, share_of_sliding, SOURCE)
 
 _LEVEL = PRESLIDING_SLOTS
-
-
-def _pack(values, numbers):
-    return (*pack_presliding(values), values['force_n'])
-
 
 EFFECT = Effect(
     name='guide_friction_presliding',
@@ -41,8 +38,8 @@ EFFECT = Effect(
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
     states=1,
-    slots=PRESLIDING_SLOTS + 1,
-    pack=_pack,
+    slots=PRESLIDING_SLOTS + _SIBLING.slots,
+    pack=partial(pack_presliding, _SIBLING),
 )
 
 

@@ -48,10 +48,11 @@ _WAY, _TIME, _EXCESS, _INVERSE_SPEED = range(PRESLIDING_SLOTS)
 _SLIDING = 40.0             # square of a relative speed; beyond, less than the last bit
 
 
-def pack_presliding(values):
-    """Return the packed values; they are the first of an effect."""
+def pack_presliding(plain, values, numbers):
+    """Return the packed values: those of presliding, then those of the ``plain`` effect."""
     return (values['presliding_m'], values['bristle_time_s'], values['static_excess'],
-            1.0 / values['stribeck_m_per_s'])
+            1.0 / values['stribeck_m_per_s'],
+            *plain.pack({p.name: values[p.name] for p in plain.parameters}, numbers))
 
 
 @compiled
@@ -85,11 +86,18 @@ def at_rest(velocity_m_per_s, par, k):
 
 
 @compiled
-def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
-    """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
+def bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Return (bending, that in steady sliding [m], how much it is at rest) at travel ``dx_m``."""
     rest = at_rest(velocity_m_per_s, par, k)
     sliding_m = par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest)
     z = bent_there_and_back(state[i], dx_m, velocity_m_per_s, elapsed_s, sliding_m)
+    return z, sliding_m, rest
+
+
+@compiled
+def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+    """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
+    z, sliding_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
     if rest > 0.0:
         rate = velocity_m_per_s - abs(velocity_m_per_s) * z / sliding_m
         z += par[k + _TIME] * rest * rate
@@ -99,6 +107,4 @@ def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
 @compiled
 def advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
     """Advance the bending by the travel of a step."""
-    rest = at_rest(velocity_m_per_s, par, k)
-    state[i] = bent_there_and_back(state[i], dx_m, velocity_m_per_s, elapsed_s,
-                                   par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest))
+    state[i] = bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)[0]

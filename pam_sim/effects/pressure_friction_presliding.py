@@ -14,6 +14,8 @@
 
 """Dry friction that grows with gauge pressure and bends before it slips."""
 
+from functools import partial
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.presliding import (
@@ -21,11 +23,6 @@ from pam_sim.effects.presliding import (
 from pam_sim.effects.pressure_friction import EFFECT as _SIBLING
 
 _LEVEL = PRESLIDING_SLOTS
-
-
-def _pack(values, numbers):
-    return (*pack_presliding(values), *_SIBLING.pack(values, numbers))
-
 
 EFFECT = Effect(
     name='pressure_friction_presliding',
@@ -42,7 +39,7 @@ EFFECT = Effect(
     reported=_SIBLING.reported,
     states=1,
     slots=PRESLIDING_SLOTS + _SIBLING.slots,
-    pack=_pack,
+    pack=partial(pack_presliding, _SIBLING),
 )
 
 

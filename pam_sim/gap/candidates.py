@@ -116,6 +116,7 @@ def _level_and(shape):
 # Bent by more, it is a loop.
 _BENDING = (Free('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
             Free('static_excess', 0.05, 0.0, 0.6))
+_HARDENING = Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())
 _RATES = (4e5, 1e6, 2.5e6)
 _TABLE = {
     'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3),),
@@ -144,8 +145,8 @@ _TABLE = {
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'viscous_damping_thinning': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),
                                  Free('speed_m_per_s', 0.2, 0.02, 5.0, True, ends=())),
-    'bladder_stiffness_progressive': (Free('stiffness_n_per_m', 200.0, -2e3, 1e4),
-                                      Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())),
+    'bladder_stiffness_progressive': (
+        Free('stiffness_n_per_m', 200.0, -2e3, 1e4), _HARDENING),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
               Free('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
               Free('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
@@ -154,8 +155,7 @@ _TABLE = {
                           Free('time_constant_s', 60.0, 10.0, 600.0, True)),
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
-    'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4),
-                                    Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())),
+    'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4), _HARDENING),
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }

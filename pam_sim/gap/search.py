@@ -250,9 +250,10 @@ class Search(Finish):
         rivals += self._fit_all(current, [
             s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
+        had = self.choice.shares(current)
         rivals += self._fit_all(current, self._refined(
-            rivals, refinements, {c.subsystem: self.choice.shares(current)[c.subsystem]
-                                  for c in cuts}, len(current.hypothesis.effects)))
+            rivals, refinements, {c.subsystem: had[c.subsystem] for c in cuts},
+            len(current.hypothesis.effects)))
         self.fitted = rivals
         return self._best_of_name(rivals)
 

@@ -105,10 +105,10 @@ def test_pressure_scales_it():
 def test_is_dry_friction_where_the_way_is_short(name):
     phase = 2.0 * np.pi * np.arange(6000) / 2000
     volts = 4.0 - np.cos(phase)
-    bent = hanging(name + '_presliding', volts, presliding_m=1e-6, **NO_EXCESS)
+    bending = hanging(name + '_presliding', volts, presliding_m=1e-6, **NO_EXCESS)
     dry = hanging(name, volts)
     without = hanging(name, volts, **{MUSCLE.get(name, 'force_n'): 1e-9})
-    apart = np.max(np.abs(bent.contraction_m - dry.contraction_m))
+    apart = np.max(np.abs(bending.contraction_m - dry.contraction_m))
     assert apart < 0.03 * np.max(np.abs(without.contraction_m - dry.contraction_m))
 
 
@@ -117,11 +117,11 @@ def test_gives_way_where_dry_friction_sticks(name):
     """Force short of break-away bends the contact, by less than the way, and it comes back."""
     volts = np.concatenate([np.full(1000, 4.0), np.full(2000, 4.02), np.full(2000, 4.0)])
     given = {'presliding_m': 30e-6, **NO_EXCESS}
-    bent = hanging(name + '_presliding', volts, **given).contraction_m
+    bending = hanging(name + '_presliding', volts, **given).contraction_m
     dry = hanging(name, volts).contraction_m
     assert np.ptp(dry[1000:]) == 0.0
-    assert 1e-6 < bent[2999] - bent[999] < 30e-6
-    assert abs(bent[-1] - bent[999]) < 0.4 * (bent[2999] - bent[999])
+    assert 1e-6 < bending[2999] - bending[999] < 30e-6
+    assert abs(bending[-1] - bending[999]) < 0.4 * (bending[2999] - bending[999])
 
 
 def test_the_cell_carries_the_friction_of_the_guide():
