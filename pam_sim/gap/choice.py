@@ -31,6 +31,7 @@ FIRST_STEP = 0.25            # least share of the gap a first effect explains
 LATER_STEP = 0.7             # least share of what is left that a further effect explains
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
+HALF_SURE_T = 1.0            # from which on all of the data are asked
 BEHIND_T = 1.5               # with which a rival that explains clearly less is none
 SAME_FORM = 0.002            # of the gap an effect explains; no formulation is that true
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
@@ -131,17 +132,48 @@ class Choice:
         top = max((r.share[s] for r in ranked), default=0.0)
         # The worse the best explains, the further a fit may be from where it will end.
         near = top - max(CLOSE, UNPOLISHED * (1.0 - top))
-        rough = [r for r in ranked if not r.polished and r.share[s] > near and gap(
-            cut, r.found.errors[s]) > self.seen_gap]
-        for r, found in zip(rough, side_by_side(self.problem.polish, [r.found for r in rough])):
-            r.found, r.polished, r.crossed, r.share = found, True, None, self.shares(found)
-        ranked = without_limits(ranked, current, s)
+        before = share(cut, self.base.errors[s], current.errors[s])
+        least = before + least_gain(before)
+        near = max(near, 1.0 - (1.0 - least) / UNPOLISHED)      # the others will not win
+        self._polish([r for r in ranked if r.share[s] > near and gap(
+            cut, r.found.errors[s]) > self.seen_gap])
+        ranked, is_tied, same = self._judged(ranked, current, cut)
+        # One within the noise counts as behind only where it would not come nearer.
+        if self._polish([r for r in ranked if r.share[s] > near and not is_tied(r)]):
+            ranked, is_tied, same = self._judged(ranked, current, cut)
         if not ranked:
             return []
-        best = ranked[0].found.errors[s]
-        for r in ranked:
-            r.t[s] = preference(cut, current.errors[s], best, r.found.errors[s])
         top = ranked[0].share[s]
+        tied = [r for r in ranked if is_tied(r)]
+        if len(tied) > 1 and top >= least:
+            self._cross(tied, current, cut)
+            tied = self._elsewhere([r for r in tied if is_tied(r)], current, cut)
+        strain = min(self._strain(r.found) for r in tied)
+        tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
+        names = {r.name for r in tied}
+        # A simpler one stands for the other only where it was tested and explains as much.
+        close = top - CLOSE * max(top - before, 0.0)
+        as_good = {r.name for r in tied if id(r) in same
+                   or (r.t[s] < BETTER_T and r.share[s] > close)}
+        return [r for r in tied
+                if not any((simple, r.name) in LIMITS for simple in as_good)
+                and SAME_AS.get(r.name) not in names]
+
+    def _polish(self, rivals):
+        """Let those go on that have not yet; return whether there were any."""
+        rough = [r for r in rivals if not r.polished]
+        for r, found in zip(rough, side_by_side(self.problem.polish, [r.found for r in rough])):
+            r.found, r.polished, r.crossed, r.share = found, True, None, self.shares(found)
+        return bool(rough)
+
+    def _judged(self, rivals, current, cut):
+        """Return (rivals, best first; whether one is tied with the best; ids of those alike)."""
+        s = cut.subsystem
+        ranked = without_limits(rivals, current, s)
+        for r in ranked:
+            r.t[s] = preference(cut, current.errors[s], ranked[0].found.errors[s],
+                                r.found.errors[s])
+        top = ranked[0].share[s] if ranked else 0.0
         before = share(cut, self.base.errors[s], current.errors[s])
         alike = top - SAME_FORM * max(top - before, 0.0)
         same = {id(r) for r in ranked if r.share[s] >= alike}
@@ -150,20 +182,7 @@ class Choice:
             return id(r) in same or (r.share[s] > RIVAL * top and not r.t[s] >= (
                 CERTAIN_T if r.share[s] > top - CLOSE else BEHIND_T))
 
-        tied = [r for r in ranked if is_tied(r)]
-        if len(tied) > 1:
-            self._cross(tied, current, cut)
-            tied = self._elsewhere([r for r in tied if is_tied(r)], current, cut)
-        strain = min(self._strain(r.found) for r in tied)
-        tied = [r for r in tied if self._strain(r.found) < strain + STRAIN]
-        names = {r.name for r in tied}
-        # A simpler one stands for the other only where it was tested and explains as much.
-        least = top - CLOSE * max(top - before, 0.0)
-        as_good = {r.name for r in tied if id(r) in same
-                   or (r.t[s] < BETTER_T and r.share[s] > least)}
-        return [r for r in tied
-                if not any((simple, r.name) in LIMITS for simple in as_good)
-                and SAME_AS.get(r.name) not in names]
+        return ranked, is_tied, same
 
     def _cross(self, tied, current, cut):
         """Compare those that are tied with the first of them once more, on all of the data."""
@@ -208,14 +227,24 @@ class Choice:
             return None
         before = share(cut, self.base.errors[s], current.errors[s])
         gained = tied[0].share[s] - before
-        least = FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
-        sure = preference(cut, current.errors[s], tied[0].found.errors[s], current.errors[s],
-                          quiet=True)
-        if gained < least or not sure >= CERTAIN_T:
+        if gained < least_gain(before) or not self._is_sure(tied[0], current, cut):
             return None
         return Named(tied[0].name, s, sorted(
             rivals, key=lambda r: -r.share[s]), tuple(r.name for r in tied),
             [r for r in fitted if r.name == tied[0].name])
+
+    def _is_sure(self, rival, current, cut):
+        """Return whether a rival is certainly better than the present fit in a cut."""
+        s = cut.subsystem
+        judged = (cut, current.errors[s], rival.found.errors[s], current.errors[s])
+        sure = preference(*judged, quiet=True)
+        if not HALF_SURE_T <= sure < CERTAIN_T:
+            return sure >= CERTAIN_T
+        if rival.crossed is None:
+            rival.crossed = self.problem.crossed(rival.found)
+        without = self.problem.crossed(current)
+        return preference(*judged, quiet=True, crossed=(
+            FIT, rival.crossed.errors[s], without.errors[s])) >= CERTAIN_T
 
     def joint_winner(self, rivals, current, cuts, fitted):
         """Return a cause that explains several cuts as well as the best in each, or None."""
@@ -234,6 +263,11 @@ class Choice:
                 return Named(r.name, cuts[0].subsystem, rivals, names,
                              [o for o in fitted if o.name == r.name])
         return None
+
+
+def least_gain(before):
+    """Return the least share of the gap a winner adds to what is explained ``before``."""
+    return FIRST_STEP if before == 0.0 else LATER_STEP * (1.0 - before)
 
 
 def without_limits(rivals, current, subsystem):

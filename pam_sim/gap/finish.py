@@ -32,6 +32,8 @@ NAMED = 0.9                  # least share of the gap that all effects of a cut 
 BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
 UNBENT = 0.98                # share of the gap
+NAMED_CLEARLY = 0.95         # where the rest is so clear that its form can be seen
+CLEAR = 25.0                 # floors squared
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
@@ -162,9 +164,9 @@ class Finish:
                 r.share = self.choice.shares(r.found)
             tied = self.choice.tied(
                 swapped, self._swapped(current, w.name), self._cut(w.subsystem))
-            if not beside and w.name not in [r.name for r in tied]:
+            if not tied:
                 found.append(w)
-            elif tied:
+            else:
                 current = tied[0].found
                 found.append(Named(tied[0].name, w.subsystem, swapped,
                                    tuple(r.name for r in tied), w.formulations))
@@ -186,7 +188,8 @@ class Finish:
     def _is_poor(self, cut, current, explained):
         """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
         s = cut.subsystem
-        least = RIVAL if gap(cut, current.errors[s]) < NEAR_FLOOR else NAMED
+        left = gap(cut, current.errors[s])
+        least = RIVAL if left < NEAR_FLOOR else NAMED if left < CLEAR else NAMED_CLEARLY
         return self._is_bent(cut, current) or explained.get(s, 0.0) < least
 
     @staticmethod

@@ -160,8 +160,10 @@ class Problem:
 
     def crossed(self, found):
         """Return the same hypothesis fitted to the part of the data that judges, from there."""
-        return self._own(use=(SELECT,)).fit(
-            found.hypothesis, found.theta, found, rounds=CROSSED_ROUNDS)
+        own = self._own(use=(SELECT,))
+        if not found.hypothesis.names:
+            return own.fit_base()
+        return own.fit(found.hypothesis, found.theta, found, rounds=CROSSED_ROUNDS)
 
     def unbent(self, found, box):
         """Return the best fit of the same hypothesis with numbers within ``box`` deviations."""

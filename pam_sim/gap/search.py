@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
 from pam_sim.gap.candidates import candidates, split_refinements
-from pam_sim.gap.choice import Choice, CLOSE, RIVAL, Rival
+from pam_sim.gap.choice import Choice, CLOSE, least_gain, RIVAL, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.finish import Finish, NAMED
@@ -107,7 +107,23 @@ class Search(Finish):
 
     def run(self):
         """Return the Outcome."""
-        current, named, closed = self.base, [], {}
+        current, taken = self._added(self.base, [])
+        current, named, explained = self._finished(current, taken)
+        gone = {w.name for w in taken} - {w.name for w in named}
+        if named and gone:
+            # What was dropped may have kept its place from another one.
+            self.pool = [c for c in self.pool if c.name not in gone]
+            again, taken = self._added(current, named)
+            if len(taken) > len(named):
+                current, named, explained = self._finished(again, taken)
+        current, named, explained = self._paired(current, named, explained)
+        current, named, explained = self._wrong_numbers(current, named, explained)
+        return Outcome(self.base, current, named, explained, not self.out_of_time(),
+                       self.screened)
+
+    def _added(self, current, named):
+        """Return (fit, list of Named) with further effects, as long as a cut is open for one."""
+        closed = {}
         while len(named) < MAX_EFFECTS and not self.out_of_time():
             open_cuts = [c for c in self.problem.cuts
                          if c.subsystem not in closed and self._is_open(c, current)]
@@ -117,18 +133,13 @@ class Search(Finish):
             if not taken:
                 break
             current = self._other_formulations(self._take(current, taken))
-            named += taken
+            named = [*named, *taken]
             self.problem.take_slopes(current.settings(), current.known_z)
-        current, named, explained = self._finished(current, named)
-        current, named, explained = self._paired(current, named, explained)
-        current, named, explained = self._wrong_numbers(current, named, explained)
-        return Outcome(self.base, current, named, explained, not self.out_of_time(),
-                       self.screened)
+        return current, named
 
     def _round(self, current, open_cuts, closed):
         """Return what is taken in for the open cuts; ``closed`` tells at which fit one was not."""
         rivals = self._rivals(current, open_cuts)
-        self.set_levels(rivals, open_cuts)
         joint = self.choice.joint_winner(rivals, current, open_cuts, self.fitted)
         if joint is not None:
             return [joint]
@@ -165,7 +176,6 @@ class Search(Finish):
         for cut in cuts:
             if closed.get(cut.subsystem, current) is not current and self._is_open(cut, current):
                 rivals = self._rivals(current, [cut], shared)
-                self.set_levels(rivals, [cut])
                 taken = self.choice.winner(rivals, current, cut, self.fitted)
                 if taken is not None:
                     del closed[cut.subsystem]
@@ -232,7 +242,7 @@ class Search(Finish):
 
     # -- rivals ----------------------------------------------------------------------------
     def _rivals(self, current, cuts, pool=None):
-        """Return the fitted hypotheses that add one effect of ``pool`` or free one number."""
+        """Return the best fits with an effect of ``pool`` or a free number more; set levels."""
         taken = set(current.hypothesis.names)
         pool = self.pool if pool is None else pool
         plain, refinements = split_refinements([c for c in pool if c.name not in taken])
@@ -255,6 +265,7 @@ class Search(Finish):
             rivals, refinements, {c.subsystem: had[c.subsystem] for c in cuts},
             len(current.hypothesis.effects)))
         self.fitted = rivals
+        self.set_levels(rivals, cuts)
         return self._best_of_name(rivals)
 
     @staticmethod
@@ -281,10 +292,11 @@ class Search(Finish):
         return found
 
     def _contending(self, rivals, current, cut):
-        """Return the names of which a formulation is near enough to the best in a cut."""
+        """Return the names of which a formulation is near enough to the best, and to winning."""
         s = cut.subsystem
-        top = max((r.share[s] for r in rivals), default=0.0)
-        least = top - CONTENDS * (1.0 - self.choice.shares(current)[s])
+        before = self.choice.shares(current)[s]
+        top = max([before + least_gain(before)] + [r.share[s] for r in rivals])
+        least = top - CONTENDS * (1.0 - before)
         return {r.name for r in rivals if r.share[s] > max(least, 0.0)}
 
     def _promising(self, screened, cuts):
@@ -326,8 +338,16 @@ class Search(Finish):
         return Rival(name, found, self.choice.shares(found))
 
     def _best_of_name(self, rivals):
-        best = {}
-        for r in sorted(rivals, key=lambda r: CLOSE * r.at_edge - sum(r.share.values())):
+        """
+        Return the formulation of every name that leaves least over all cuts, in floors squared.
+
+        Shares would not do: where the gap of a cut is the noise's, they are.
+        """
+        def rest(errors):
+            return sum(c.chi2(errors[c.subsystem], SELECT) for c in self.problem.cuts)
+
+        best, whole = {}, rest(self.base.errors)
+        for r in sorted(rivals, key=lambda r: rest(r.found.errors) + CLOSE * whole * r.at_edge):
             best.setdefault(r.name, r)
         return list(best.values())
 

@@ -26,7 +26,8 @@ import pytest
 CREEP = {'name': 'creep', 'parameters': {
     'stiffness_1_n_per_m': 43.0, 'stiffness_2_n_per_m': 47.0, 'time_constant_1_s': 0.9,
     'time_constant_2_s': 14.0}}
-BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': -3.8e-4}}
+BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': -6e-4}}
+SMALLER = {'name': 'contraction_bias', 'parameters': {'bias_m': -3.8e-4}}
 LOOK_ALIKES = ['creep', 'contraction_bias', 'bladder_stiffness', 'end_taper']
 
 
@@ -51,3 +52,11 @@ def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
     monkeypatch.setattr('pam_sim.gap.search.pair_of', lambda search, cut: None)
     alone = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in alone.effects} != {'creep', 'contraction_bias'}
+
+
+def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
+    """One by one, a third one is taken for both, then one of them; when it goes, the other."""
+    run = recorded(nominal().with_(effects=[CREEP, SMALLER]), voltages(24.0))
+    monkeypatch.setattr('pam_sim.gap.search.pair_of', lambda search, cut: None)
+    found = find_gap(run, nominal(), effects=LOOK_ALIKES)
+    assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}
