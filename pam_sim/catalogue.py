@@ -48,8 +48,8 @@ def catalogue():
         Each with ``kind``, ``name``, ``sentence``, ``equation``, ``source`` (str),
         ``parameters`` (list of dict: name, unit, nominal, lower, upper, description,
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
-        ``subsystem``, ``family``, ``valves``, ``variant_of``, ``reported``; valves
-        ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
+        ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``;
+        valves ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
 
     Raises
     ------
@@ -128,7 +128,8 @@ def _effect(effect):
     return _entry(
         'effect', effect.name, effect.sentence, effect.equation, effect.source,
         effect.parameters, subsystem=effect.subsystem, family=effect.family,
-        valves=list(effect.valves), variant_of=effect.variant_of, reported=reported)
+        valves=list(effect.valves), variant_of=effect.variant_of,
+        relative_of=list(effect.relative_of), reported=reported)
 
 
 def _by_subsystem(found):

@@ -51,6 +51,7 @@ def facts(entry):
         ('subsystem', entry.get('subsystem', '')),
         ('valve types', ', '.join(entry.get('valves', ()))),
         ('another form of', entry.get('variant_of', '')),
+        ('looks like, and is not named', ', '.join(entry.get('relative_of', ()))),
         ('signals', ', '.join(entry.get('signals', ()))),
         ('claims', ' '.join(f'({n}) {rule}' for n, rule in entry.get('claims', {}).items())),
         ('source', entry['source'])) if value]

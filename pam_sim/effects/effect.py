@@ -91,6 +91,8 @@ class Effect:
         What it adds to the nominal rig, one line of plain text.
     variant_of : str
         Name of the effect of which this is another formulation; results name that one.
+    relative_of : tuple of str
+        Names this one could be taken for. Results do not name it, but hold those names against it.
     parameters : tuple of Parameter
         Nominal values are typical sizes, used where a model file gives none.
     amplitude : tuple of str
@@ -123,6 +125,7 @@ class Effect:
     reported: tuple = ()
     equation: str = ''
     variant_of: str = ''
+    relative_of: tuple = ()
     states: int = 0
     slots: int = None
     pack: object = _pack_in_order

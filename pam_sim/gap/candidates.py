@@ -156,6 +156,9 @@ _TABLE = {
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
     'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4), _HARDENING),
+    'smooth_friction': (Free('force_n', 1.0, 0.0, 50.0),
+                        Free('force_at_400kpa_n', 1.0, 0.0, 100.0),
+                        Free('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=())),
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }
@@ -214,6 +217,8 @@ def candidates(rig, outputs, only=None):
     for name, effect in effects().items():
         free = table.get(name) or _plain(effect)
         candidate = Candidate(name, free)
+        if effect.relative_of and name not in (only or ()):
+            continue
         if rig.valve not in effect.valves or rig.effect(name) is not None:
             continue
         if only is not None and name not in only and candidate.name not in only:
@@ -224,6 +229,13 @@ def candidates(rig, outputs, only=None):
             continue
         found.append(candidate)
     return found
+
+
+def relatives(name=None):
+    """Return the candidates that no result names: all, or those that look like a name."""
+    return [Candidate(effect.name, _TABLE.get(effect.name) or _plain(effect))
+            for effect in effects().values()
+            if effect.relative_of and name in (None, *effect.relative_of)]
 
 
 def split_refinements(pool):

@@ -20,7 +20,7 @@ its cut without numbers that are bent for it.
 """
 
 import numpy as np
-from pam_sim.gap.candidates import LIMITS
+from pam_sim.gap.candidates import LIMITS, relatives
 from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
@@ -37,6 +37,9 @@ CLEAR = 25.0                 # floors squared
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
 TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
+HELD = 0.5                   # of what a name leaves; a relative that leaves less is the likelier
+EDGES = ('open_time_s', 'close_time_s')
+ALIKE = 0.02                 # of the later edge; as far apart both are one delay
 RIVALS = 4                   # that are ranked again when further effects are in
 
 
@@ -47,10 +50,14 @@ def within_the_chain(found, place):
     A latency stands for the filters that all sensors share; that leaves a part of them. What acts
     in the valve comes before the latency of its signal, and may stand for all of it.
     """
-    candidate = found.hypothesis.effects[place]
+    candidate, values = found.hypothesis.effects[place], found.values()[place]
     longest_s = LATENCY_SD_S + (LATENCY_PRIOR_S if acts_on(candidate.effect, 'valve') else 0.0)
-    return (len(candidate.free) == 1 and candidate.free[0].name in TIMES
-            and found.values()[place][candidate.free[0].name] < longest_s)
+    if len(candidate.free) == 1 and candidate.free[0].name in TIMES:
+        return values[candidate.free[0].name] < longest_s
+    # A switching valve that opens as late as it closes delays, and swallows the shortest pulses.
+    edges = [values[name] for name in EDGES if name in values]
+    return (len(edges) == len(EDGES) and max(edges) < LATENCY_SD_S
+            and max(edges) - min(edges) <= ALIKE * max(edges))
 
 
 class Finish:
@@ -58,7 +65,8 @@ class Finish:
     The last stage of a search; a part of ``Search``, with its fits, gaps and choice.
 
     It needs ``problem``, ``choice``, ``base``, ``seen_gap``, ``first_gap``, ``least_gap``,
-    ``matters``, ``_swapped``, ``_explained`` and ``_cut`` of it.
+    ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and ``_cut`` of it; ``mistaken``
+    gets the relatives that fit better than a name.
     """
 
     def _finished(self, current, named):
@@ -68,9 +76,34 @@ class Finish:
         current = self._straightened(current)
         explained = self._explained(current)
         poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}
+        for w in [w for w in named if w.subsystem not in poor]:
+            relative = self._likelier_relative(current, w)
+            if relative is not None:
+                self.mistaken[w.name] = relative
+                poor.add(w.subsystem)
         for w in [w for w in named if w.subsystem in poor]:
             current = self._swapped(current, w.name)
         return current, [w for w in named if w.subsystem not in poor], explained
+
+    def _likelier_relative(self, current, w):
+        """
+        Return the effect outside of the names that explains a cut clearly better than ``w``.
+
+        None where ``w`` leaves no more than a formulation may.
+        """
+        cut, s = self._cut(w.subsystem), w.subsystem
+        if not self._is_open(cut, current):
+            return None
+        for c in relatives(w.name):
+            theta = [f.coordinate(f.scale) for f in c.free]
+            bare = self._swapped(current, w.name)
+            found = self.problem.polish(self.problem.fit(
+                Hypothesis((*bare.hypothesis.effects, c), bare.hypothesis.freed),
+                (*bare.theta, *theta), current))
+            if gap(cut, found.errors[s]) < HELD * gap(cut, current.errors[s]) and preference(
+                    cut, self.base.errors[s], found.errors[s], current.errors[s]) >= CERTAIN_T:
+                return c.effect
+        return None
 
     def _eliminate(self, current, named):
         """Drop what is not missed when it is left out, once there are several."""

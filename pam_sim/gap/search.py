@@ -62,6 +62,8 @@ class Outcome:
         False if the time ran out.
     screened : list of Screened
         All candidates at the baseline.
+    mistaken : dict of str -> str
+        Names that were dropped for an effect that explains more and is none of them.
 
     """
 
@@ -71,6 +73,7 @@ class Outcome:
     share: dict
     complete: bool = True
     screened: list = field(default_factory=list)
+    mistaken: dict = field(default_factory=dict)
 
 
 class Search(Finish):
@@ -101,7 +104,7 @@ class Search(Finish):
         self.pool = candidates(problem.rig, outputs, only)
         self.base = problem.base
         self.choice = Choice(problem, self.base, seen_gap)
-        self.fitted = []
+        self.fitted, self.mistaken = [], {}
         self.screened = screen(problem, self.base, split_refinements(self.pool)[0])
         self.first_gap = {c.subsystem: self._first_gap(c) for c in problem.cuts}
 
@@ -119,7 +122,7 @@ class Search(Finish):
         current, named, explained = self._paired(current, named, explained)
         current, named, explained = self._wrong_numbers(current, named, explained)
         return Outcome(self.base, current, named, explained, not self.out_of_time(),
-                       self.screened)
+                       self.screened, self.mistaken)
 
     def _added(self, current, named):
         """Return (fit, list of Named) with further effects, as long as a cut is open for one."""
@@ -190,7 +193,7 @@ class Search(Finish):
         """
         cut = max((c for c in self.problem.cuts if self.first_gap[c.subsystem] > self.seen_gap),
                   key=lambda c: self.first_gap[c.subsystem], default=None)
-        if named or cut is None or self.out_of_time():
+        if named or cut is None or self.mistaken or self.out_of_time():
             return current, named, explained
         level, slopes = cut.level, dict(self.problem.slopes)
         found = pair_of(self, cut)

@@ -28,7 +28,7 @@ def explain(result, outcome):
     if result.verdict == 'unknown':
         missed = _sizes(result.signals, 'rmse_refit')
         return (f'The calibrated model misses {missed} and no known effect explains it'
-                f'{_nearest(outcome)}.')
+                f'{_nearest(outcome)}.{_mistaken(outcome)}')
     parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}).'
              for e in result.effects]
     if result.parameters:
@@ -77,6 +77,12 @@ def _sizes(signals, name):
     return join([f'{getattr(s, name) * READABLE[k][0]:.3g} {READABLE[k][1]} of {k}'
                  for k, s in signals.items() if getattr(s, name) > 1.1 * s.noise_floor]
                 or ['little'])
+
+
+def _mistaken(outcome):
+    return ''.join(f' It looks like {name}, but {relative} fits better: '
+                   f'{_sentence(relative)[:1].lower()}{_sentence(relative)[1:]}.'
+                   for name, relative in outcome.mistaken.items())
 
 
 def _nearest(outcome):

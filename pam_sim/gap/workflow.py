@@ -40,6 +40,7 @@ from scipy.stats import norm
 SEEN_GAP = 0.05              # floors squared; smaller ones are within the error of the floor
 LEAST_GAP = 0.01             # that an effect must promise to be tried where no gap is seen
 UNNAMED = 2.0                # times the materiality: a gap without a name worth a verdict
+LEAST_UNNAMED = 1.5          # deviations of a sensor, however little matters
 
 
 def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1.0, seed=0,
@@ -179,7 +180,8 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.pull) > BOX]
     if not outcome.share or (not material and not wrong and (
-            named or not _is_left(result, problem, proof, base, UNNAMED * materiality, whole))):
+            named or not _is_left(result, problem, proof, base, max(
+                UNNAMED * materiality, LEAST_UNNAMED), whole))):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
         return
     result.unexplained_fraction = proof.unexplained()

@@ -16,13 +16,14 @@
 
 import math
 
+from gap_rivals import Blocks, errors, Tied
 from gap_runs import nominal, recorded
 import numpy as np
 from pam_actuation.experiments.separating import separation
 from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, Named, Rival
+from pam_sim.gap.choice import Named
 from pam_sim.gap.compare import CERTAIN_T, MIN_BLOCKS, preference
-from pam_sim.gap.cuts import Cut, Known
+from pam_sim.gap.cuts import Known
 from pam_sim.gap.finish import within_the_chain
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -30,26 +31,6 @@ from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import Proof, start_error_sd
 from pam_sim.gap.search import Search
 import pytest
-
-SAMPLES = 100                # of a block
-
-
-class Blocks(Cut):
-    """Time blocks of one signal that judge; nothing is simulated."""
-
-    subsystem, signals, known = 'muscle', ('contraction',), []
-
-    def __init__(self, count):
-        self.block = np.repeat(np.arange(count), SAMPLES)
-        self.part = np.full(self.block.size, SELECT)
-        self.signal = np.zeros(self.block.size, dtype=int)
-        self.level = 1.0
-
-
-def errors(cut, seed, off):
-    """Return noise, the same for all rivals of a seed, plus what a rival is off by block."""
-    noise = np.random.default_rng(seed).standard_normal(cut.block.size)
-    return noise + np.asarray(off, dtype=float)[cut.block]
 
 
 @pytest.mark.parametrize('telling, says', [(8, True), (4, False), (3, False)])
@@ -87,37 +68,6 @@ def test_what_was_fitted_judges_as_well_where_each_part_is_judged_by_a_fit_to_th
     assert 1.0 < once < CERTAIN_T < twice
     against = preference(cut, base, better, worse, crossed=(FIT, worse, better))
     assert abs(against) < 1.0
-
-
-class Tied:
-    """Rivals in one cut, whose errors are given; the cut is ``cuts[0]``."""
-
-    def __init__(self, cut, before, left):
-        self.cuts = [cut]
-        self.base = self._found(None, before)
-        self.rivals = [Rival(name, self._found(name, off)) for name, off in left.items()]
-        self.choice = Choice(self, self.base, 2.0)
-        for r in self.rivals:
-            r.share = self.choice.shares(r.found)
-
-    def _found(self, name, left):
-        effects = () if name is None else tuple(
-            c for c in candidates(nominal(), ('contraction',)) if c.effect == name)
-        cut = self.cuts[0]
-        theta = np.concatenate([np.full(len(c.free), 0.5) for c in effects] or [np.zeros(0)])
-        return Found(Hypothesis(effects), theta, {'muscle': np.zeros(0)},
-                     {'muscle': errors(cut, 1, np.broadcast_to(left, 60))}, {})
-
-    @staticmethod
-    def crossed(found):
-        """Return what a fit to the other part is; here the same."""
-        return found
-
-    polish = crossed
-
-    def names(self):
-        """Return the names that the data cannot tell apart."""
-        return [r.name for r in self.choice.tied(self.rivals, self.base, self.cuts[0])]
 
 
 @pytest.mark.parametrize('off, tied', [(0.1, True), (1.0, False)])

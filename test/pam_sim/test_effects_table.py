@@ -45,6 +45,7 @@ muscle friction hysteresis_prandtl_ishlinskii loop_half_width_at_400kpa_n
 muscle friction hysteresis_lugre loop_half_width_at_400kpa_n
 muscle friction history_friction loop_half_width_at_400kpa_n
 muscle friction braid_contact_friction force_at_400kpa_n
+muscle friction smooth_friction force_n
 muscle damping viscous_damping force_at_50mm_per_s_n
 muscle damping viscous_damping_thinning force_at_50mm_per_s_n
 muscle slow creep relaxing_stiffness_n_per_m creep_fraction_at_400kpa
