@@ -94,7 +94,10 @@ class Finish:
         cut, s = self._cut(w.subsystem), w.subsystem
         if not self._is_open(cut, current):
             return None
+        had = {e.name for e in self.problem.with_effects(current.settings()).effects}
         for c in relatives(w.name):
+            if c.effect in had:
+                continue
             theta = [f.coordinate(f.scale) for f in c.free]
             bare = self._swapped(current, w.name)
             found = self.problem.polish(self.problem.fit(

@@ -113,7 +113,7 @@ class Search(Finish):
         current, taken = self._added(self.base, [])
         current, named, explained = self._finished(current, taken)
         gone = {w.name for w in taken} - {w.name for w in named}
-        if named and gone:
+        if named and gone and not self.mistaken:
             # What was dropped may have kept its place from another one.
             self.pool = [c for c in self.pool if c.name not in gone]
             again, taken = self._added(current, named)

@@ -45,6 +45,14 @@ def test_it_is_named_by_whoever_asks_for_it(smooth):
     assert result.effects[0]['equivalent']['force_n']['value'] == pytest.approx(2.0, rel=0.1)
 
 
+def test_one_that_the_model_has_is_not_held_against_a_name():
+    model = nominal().with_(effects=[{'name': 'smooth_friction', 'parameters': {'force_n': 2.0}}])
+    dry = {'name': 'coulomb_friction', 'parameters': {'force_n': 3.0}}
+    result = find_gap(recorded(model.with_(effects=[*model.effects, dry]), voltages(20.0)),
+                      model, effects=NAMES)
+    assert [e['name'] for e in result.effects] == ['coulomb_friction']
+
+
 @pytest.mark.parametrize('name, formulation', [
     ('coulomb_friction', 'coulomb_friction'), ('coulomb_friction', 'coulomb_friction_presliding'),
     ('pressure_friction', 'pressure_friction_presliding')])
