@@ -32,7 +32,7 @@ NAMED = 0.9                  # least share of the gap that all effects of a cut 
 BENT = 3.0                   # prior deviations of a number; a fit that needs them explains nothing
 STRAIGHT = 2.0               # within which a fit must do as well as UNBENT, not to need them
 UNBENT = 0.98                # share of the gap
-NAMED_CLEARLY = 0.95         # where the rest is so clear that its form can be seen
+NAMED_CLEARLY = 0.95         # in several formulations, where the rest is so clear
 CLEAR = 25.0                 # floors squared
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
@@ -64,9 +64,9 @@ class Finish:
     """
     The last stage of a search; a part of ``Search``, with its fits, gaps and choice.
 
-    It needs ``problem``, ``choice``, ``base``, ``seen_gap``, ``first_gap``, ``least_gap``,
-    ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and ``_cut`` of it; ``mistaken``
-    gets the relatives that fit better than a name.
+    It needs ``problem``, ``pool``, ``choice``, ``base``, ``seen_gap``, ``first_gap``,
+    ``least_gap``, ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and ``_cut`` of it;
+    ``mistaken`` gets the relatives that fit better than a name.
     """
 
     def _finished(self, current, named):
@@ -225,7 +225,12 @@ class Finish:
         """Return whether a fit explains too little of a cut, or by bent numbers, for a name."""
         s = cut.subsystem
         left = gap(cut, current.errors[s])
-        least = RIVAL if left < NEAR_FLOOR else NAMED if left < CLEAR else NAMED_CLEARLY
+        least = RIVAL if left < NEAR_FLOOR else NAMED
+        # What was tried in one formulation alone may be far from the muscle's own.
+        forms = [sum(o.name == c.name for o in self.pool) for c in current.hypothesis.effects
+                 if acts_on(c.effect, s)]
+        if left > CLEAR and max(forms, default=0) > 1:
+            least = NAMED_CLEARLY
         return self._is_bent(cut, current) or explained.get(s, 0.0) < least
 
     @staticmethod

@@ -90,6 +90,7 @@ class Stage(Search):
 
     def __init__(self, case):
         self.problem, self.base = SimpleNamespace(cuts=case.cuts), case.base
+        self.pool = candidates(load_rig(NOMINAL), ('contraction',))
 
 
 @pytest.mark.parametrize('at_edge, best', [(False, 0.1), (True, 0.5)])
@@ -103,11 +104,13 @@ def test_of_a_name_the_formulation_that_leaves_least_competes(at_edge, best):
     assert [r.off for r in found] == [best]
 
 
-@pytest.mark.parametrize('off, explained, poor', [
-    (3.0, 0.93, False), (6.0, 0.93, True), (6.0, 0.96, False), (3.0, 0.89, True),
-    (0.3, 0.6, False), (0.3, 0.4, True)])
-def test_a_rest_whose_form_can_be_seen_costs_a_name_earlier(off, explained, poor):
-    case = Tied(Blocks(60), 20.0, {'bladder_stiffness': off})
+@pytest.mark.parametrize('name, off, explained, poor', [
+    ('bladder_stiffness', 3.0, 0.93, False), ('bladder_stiffness', 6.0, 0.93, True),
+    ('bladder_stiffness', 6.0, 0.96, False), ('bladder_stiffness', 3.0, 0.89, True),
+    ('bladder_stiffness', 0.3, 0.6, False), ('bladder_stiffness', 0.3, 0.4, True),
+    ('threshold_pressure', 6.0, 0.93, False), ('threshold_pressure', 6.0, 0.89, True)])
+def test_a_clear_rest_costs_a_name_of_several_formulations_earlier(name, off, explained, poor):
+    case = Tied(Blocks(60), 20.0, {name: off})
     assert Stage(case)._is_poor(
         case.cuts[0], case.rivals[0].found, {'muscle': explained}) == poor
 
