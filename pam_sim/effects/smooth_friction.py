@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Friction that never sticks: F -> F - (F_c + F_400 p_g / 400 kPa) tanh(v / v_s).
+Friction that never sticks: F -> F - (F0 + k_p p_g) tanh(v / v_s).
 
 Coulomb friction as simulators smooth it, and as a film between the surfaces makes it: above v_s
 it is dry friction, but at rest nothing holds and the muscle creeps until the forces balance. With
@@ -25,16 +25,14 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.loop_level import LEVEL_AMPLITUDE, LEVEL_SLOTS, loop_level_n, pack_level
 from pam_sim.parameters import Parameter
-from pam_sim.units import P_ATM_PA
 
-_FORCE, _PER_PA, _INVERSE_SPEED = range(3)
-_AT_PA = 4e5
+_INVERSE_SPEED = LEVEL_SLOTS
 
 
 def _pack(values, numbers):
-    return (values['force_n'], values['force_at_400kpa_n'] / _AT_PA,
-            1.0 / values['speed_m_per_s'])
+    return (*pack_level(values, numbers), 1.0 / values['speed_m_per_s'])
 
 
 EFFECT = Effect(
@@ -44,16 +42,17 @@ EFFECT = Effect(
     relative_of=('coulomb_friction', 'pressure_friction'),
     sentence='Friction inside the muscle is that of a dry contact, but it does not stick.',
     source='Regularised Coulomb friction, as many simulators have it. Sizes: design values.',
-    equation='F -> F - (F_c + F400 p_g / 400 kPa) tanh(v / v_s)',
+    equation='F -> F - (F0 + k_p p_g) tanh(v / v_s)',
     parameters=(
-        Parameter('force_n', 'N', 2.0, 0.0, 50.0, description='Constant part of the level.'),
-        Parameter('force_at_400kpa_n', 'N', 0.0, 0.0, 100.0,
-                  description='Part of the level that grows with gauge pressure.'),
+        Parameter('force_n', 'N', 2.0, 0.0, 50.0, description='Level at zero gauge pressure.'),
+        Parameter('force_per_pa', 'N/Pa', 0.0, 0.0, 2e-4,
+                  description='Growth of the level with gauge pressure.'),
         Parameter('speed_m_per_s', 'm/s', 2e-3, 2e-4, 0.1,
                   description='Speed v_s above which the friction is that of a dry contact.'),
     ),
-    amplitude=('force_n', 'force_at_400kpa_n'),
+    amplitude=LEVEL_AMPLITUDE,
     reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),),
+    slots=LEVEL_SLOTS + 1,
     pack=_pack,
 )
 
@@ -62,5 +61,5 @@ EFFECT = Effect(
 def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
                  state, i, par, k):
     """Return the force less that of the contact."""
-    level_n = par[k + _FORCE] + par[k + _PER_PA] * max(pressure_pa - P_ATM_PA, 0.0)
-    return force_n - level_n * math.tanh(velocity_m_per_s * par[k + _INVERSE_SPEED])
+    return force_n - loop_level_n(pressure_pa, par, k) * math.tanh(
+        velocity_m_per_s * par[k + _INVERSE_SPEED])

@@ -156,9 +156,7 @@ _TABLE = {
     'guide_friction': (Free('force_n', 1.0, 0.0, 50.0),),
     'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
     'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4), _HARDENING),
-    'smooth_friction': (Free('force_n', 1.0, 0.0, 50.0),
-                        Free('force_at_400kpa_n', 1.0, 0.0, 100.0),
-                        Free('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=())),
+    'smooth_friction': _level_and(Free('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=())),
     'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
     'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
 }
@@ -231,11 +229,10 @@ def candidates(rig, outputs, only=None):
     return found
 
 
-def relatives(name=None):
-    """Return the candidates that no result names: all, or those that look like a name."""
-    return [Candidate(effect.name, _TABLE.get(effect.name) or _plain(effect))
-            for effect in effects().values()
-            if effect.relative_of and name in (None, *effect.relative_of)]
+def relatives(rig, outputs, name):
+    """Return what may be taken for a name on a rig, and is named only by who asks for it."""
+    return candidates(rig, outputs, [
+        effect.name for effect in effects().values() if name in effect.relative_of])
 
 
 def split_refinements(pool):

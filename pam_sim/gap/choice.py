@@ -137,10 +137,10 @@ class Choice:
         near = max(near, 1.0 - (1.0 - least) / UNPOLISHED)      # the others will not win
         self._polish([r for r in ranked if r.share[s] > near and gap(
             cut, r.found.errors[s]) > self.seen_gap])
-        ranked, is_tied, same = self._judged(ranked, current, cut)
+        ranked, is_tied, same = self._judged(ranked, current, cut, before)
         # One within the noise counts as behind only where it would not come nearer.
         if self._polish([r for r in ranked if r.share[s] > near and not is_tied(r)]):
-            ranked, is_tied, same = self._judged(ranked, current, cut)
+            ranked, is_tied, same = self._judged(ranked, current, cut, before)
         if not ranked:
             return []
         top = ranked[0].share[s]
@@ -166,7 +166,7 @@ class Choice:
             r.found, r.polished, r.crossed, r.share = found, True, None, self.shares(found)
         return bool(rough)
 
-    def _judged(self, rivals, current, cut):
+    def _judged(self, rivals, current, cut, before):
         """Return (rivals, best first; whether one is tied with the best; ids of those alike)."""
         s = cut.subsystem
         ranked = without_limits(rivals, current, s)
@@ -174,7 +174,6 @@ class Choice:
             r.t[s] = preference(cut, current.errors[s], ranked[0].found.errors[s],
                                 r.found.errors[s])
         top = ranked[0].share[s] if ranked else 0.0
-        before = share(cut, self.base.errors[s], current.errors[s])
         alike = top - SAME_FORM * max(top - before, 0.0)
         same = {id(r) for r in ranked if r.share[s] >= alike}
 

@@ -24,7 +24,7 @@ from pam_sim.gap.candidates import LIMITS, relatives
 from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
-from pam_sim.gap.hypothesis import Hypothesis
+from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
 from pam_sim.gap.side_by_side import side_by_side
 
@@ -64,9 +64,9 @@ class Finish:
     """
     The last stage of a search; a part of ``Search``, with its fits, gaps and choice.
 
-    It needs ``problem``, ``pool``, ``choice``, ``base``, ``seen_gap``, ``first_gap``,
-    ``least_gap``, ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and ``_cut`` of it;
-    ``mistaken`` gets the relatives that fit better than a name.
+    It needs ``problem``, ``outputs``, ``pool``, ``choice``, ``base``, ``seen_gap``,
+    ``first_gap``, ``least_gap``, ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and
+    ``_cut`` of it; ``mistaken`` gets the relatives that fit better than a name.
     """
 
     def _finished(self, current, named):
@@ -94,15 +94,12 @@ class Finish:
         cut, s = self._cut(w.subsystem), w.subsystem
         if not self._is_open(cut, current):
             return None
-        had = {e.name for e in self.problem.with_effects(current.settings()).effects}
-        for c in relatives(w.name):
-            if c.effect in had:
+        for c in relatives(self.problem.rig, self.outputs, w.name):
+            if c in current.hypothesis.effects:
                 continue
-            theta = [f.coordinate(f.scale) for f in c.free]
-            bare = self._swapped(current, w.name)
-            found = self.problem.polish(self.problem.fit(
-                Hypothesis((*bare.hypothesis.effects, c), bare.hypothesis.freed),
-                (*bare.theta, *theta), current))
+            alone = Found(Hypothesis((c,)), np.array(
+                [f.coordinate(f.scale) for f in c.free]), {}, {}, {})
+            found = self.problem.polish(self._swapped(current, w.name, Rival(c.name, alone)))
             if gap(cut, found.errors[s]) < HELD * gap(cut, current.errors[s]) and preference(
                     cut, self.base.errors[s], found.errors[s], current.errors[s]) >= CERTAIN_T:
                 return c.effect

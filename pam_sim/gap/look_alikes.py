@@ -15,9 +15,9 @@
 """When an effect shows, and with which others a protocol confuses it: before any data exist."""
 
 import numpy as np
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import effects, get_effect
 from pam_sim.errors import InputError
-from pam_sim.gap.candidates import candidates, relatives
+from pam_sim.gap.candidates import candidates
 from pam_sim.gap.cuts import acts_on, cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
@@ -56,7 +56,7 @@ def look_alikes(run, rig, name):
     name = effect.variant_of or effect.name
     problem = Problem(rig, cuts_of(rig, [Recording(run, rig.valve, rig.load != 'hanging_mass')]))
     outputs = sum((cut.signals for cut in problem.cuts), ())
-    pool = [c for c in candidates(rig, outputs) if c.effect == c.name] + relatives()
+    pool = [c for c in candidates(rig, outputs, effects()) if c.effect == c.name]
     mine = next((c for c in pool if c.name == name), None)
     if mine is None:
         raise InputError(f'effect `{name}` does not show on rig {rig.name} with valve '

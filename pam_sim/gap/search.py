@@ -100,8 +100,8 @@ class Search(Finish):
                  matters=lambda found, without: True):
         self.problem, self.out_of_time, self.matters = problem, out_of_time, matters
         self.seen_gap, self.least_gap = seen_gap, least_gap
-        outputs = sum((cut.signals for cut in problem.cuts), ())
-        self.pool = candidates(problem.rig, outputs, only)
+        self.outputs = sum((cut.signals for cut in problem.cuts), ())
+        self.pool = candidates(problem.rig, self.outputs, only)
         self.base = problem.base
         self.choice = Choice(problem, self.base, seen_gap)
         self.fitted, self.mistaken = [], {}
@@ -258,15 +258,16 @@ class Search(Finish):
         rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
             current.hypothesis.effects, (*current.hypothesis.freed, name)),
             current.theta, current, whole=False), name), pulled)
-        contending = set().union(*(self._contending(rivals, current, c) for c in cuts))
+        had = self.choice.shares(current)
+        had = {c.subsystem: had[c.subsystem] for c in cuts}
+        contending = set().union(*(
+            self._contending(rivals, s, before) for s, before in had.items()))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
             s for s in screened
             if s.candidate.name in contending and s.candidate not in fitted])
-        had = self.choice.shares(current)
         rivals += self._fit_all(current, self._refined(
-            rivals, refinements, {c.subsystem: had[c.subsystem] for c in cuts},
-            len(current.hypothesis.effects)))
+            rivals, refinements, had, len(current.hypothesis.effects)))
         self.fitted = rivals
         self.set_levels(rivals, cuts)
         return self._best_of_name(rivals)
@@ -294,10 +295,9 @@ class Search(Finish):
                     f.coordinate(values.get(f.name, f.scale)) for f in c.free), {}))
         return found
 
-    def _contending(self, rivals, current, cut):
+    @staticmethod
+    def _contending(rivals, s, before):
         """Return the names of which a formulation is near enough to the best, and to winning."""
-        s = cut.subsystem
-        before = self.choice.shares(current)[s]
         top = max([before + least_gain(before)] + [r.share[s] for r in rivals])
         least = top - CONTENDS * (1.0 - before)
         return {r.name for r in rivals if r.share[s] > max(least, 0.0)}

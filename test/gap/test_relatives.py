@@ -62,12 +62,11 @@ def test_dry_friction_keeps_its_name(name, formulation):
 
 
 def test_a_relative_is_no_candidate_and_knows_what_it_looks_like():
-    known = effects()
-    found = relatives()
-    assert {c.effect for c in found} == {n for n, e in known.items() if e.relative_of}
-    named = {c.effect for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
-    assert not named & {c.effect for c in found}
-    for c in found:
-        for name in known[c.effect].relative_of:
-            assert name in named and c in relatives(name)
-    assert not relatives('creep')
+    shown = nominal(), ('pressure', 'contraction', 'force')
+    named = {c.effect for c in candidates(*shown)}
+    found = {n: e.relative_of for n, e in effects().items() if e.relative_of}
+    assert found and not named & set(found)
+    for relative, names in found.items():
+        for name in names:
+            assert name in named and relative in [c.effect for c in relatives(*shown, name)]
+    assert not relatives(*shown, 'creep')
