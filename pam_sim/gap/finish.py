@@ -21,7 +21,7 @@ its cut without numbers that are bent for it.
 
 import numpy as np
 from pam_sim.gap.candidates import LIMITS, relatives
-from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
+from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival, SAME_AS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -107,6 +107,9 @@ class Finish:
 
     def _eliminate(self, current, named):
         """Drop what is not missed when it is left out, once there are several."""
+        # A number and the effect that is another name of it are one; the effect has forms.
+        for w in [w for w in named if w.name in {SAME_AS.get(o.name) for o in named}]:
+            current, named = self._swapped(current, w.name), [o for o in named if o is not w]
         for w in list(named):
             if len(named) < 2:
                 break

@@ -150,8 +150,9 @@ class Proof:
         # It is the same sensor, and a recording without rest hides its slow noise.
         self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
         self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
+        self.drift = self._drift(final, whole, seed)
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
-        self.floor, self.highest_floor = self._floors(final, whole, seed)
+        self.floor, self.highest_floor = self._floors()
 
     def run(self, found, whole, stamp_shift_s=None, start_error_pa=0.0):
         """Return the free run of a fit at the stamps, by signal."""
@@ -214,6 +215,17 @@ class Proof:
             apart += float(np.mean((first - last) ** 2)) / variance
         return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
 
+    def doubt(self, worse, better):
+        """Return the standard deviation of ``fall`` by stamps and the start of this recording."""
+        apart, by_draw = 0.0, np.zeros(len(self.drift))
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            between = (worse[s] - better[s])[chosen]
+            apart += float(np.mean(between ** 2)) / variance
+            by_draw += [2.0 * float(np.mean(d[s][chosen] * between)) / variance
+                        for d in self.drift]
+        return float(np.sqrt(np.mean(by_draw ** 2))) / apart if apart > 0.0 else 0.0
+
     def left(self):
         """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
         return math.sqrt(sum(
@@ -237,15 +249,20 @@ class Proof:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def _floors(self, final, whole, seed):
+    def _drift(self, final, whole, seed):
+        """Return by signal, for some draws, how far stamps and the start move the final run."""
         random, r = np.random.default_rng(seed), self.recording
-        squares, start_sd = {s: [] for s in r.signals}, start_error_sd(r)
+        found, start_sd = [], start_error_sd(r)
         for _ in range(INPUT_DRAWS):
             shift = STAMP_SD_S * random.standard_normal(r.messages)
             moved = self.run(final, whole, shift, start_sd * random.standard_normal())
             self.simulations += 1
-            for s in r.signals:
-                squares[s].append(float(np.mean((moved[s] - self.after[s]) ** 2)))
+            found.append({s: moved[s] - self.after[s] for s in r.signals})
+        return found
+
+    def _floors(self):
+        r = self.recording
+        squares = {s: [float(np.mean(d[s] ** 2)) for d in self.drift] for s in r.signals}
         return [{s: sensor_floor(r.time_s[s], r.measured[s], s,
                                  float(np.sqrt(of(squares[s]) + self._slow[s] ** 2)))
                  for s in r.signals} for of in (np.mean, np.max)]

@@ -24,6 +24,7 @@ nothing.
 from dataclasses import replace
 import math
 
+from pam_sim.gap.compare import CERTAIN_T
 from pam_sim.gap.finish import NAMED
 from pam_sim.gap.hypothesis import Hypothesis
 from pam_sim.gap.prove import held_without, VISIBLE
@@ -64,7 +65,7 @@ def refute(named, problem, base, final, proof, whole):
         before = proof.run(_less(w.name, problem, base, final), whole) if runs else {}
         best = max(runs, key=lambda name: _squares_saved(proof, before, runs[name]), default=None)
         gone = {name for name in runs if name != best and _contradicted(
-            *proof.fall(runs[name], runs[best]), proof.fall(before, runs[best])[1])}
+            proof, runs[name], runs[best], before)}
         names = tuple(n for n in w.names if n not in gone)
         if w.name in gone:
             final = fits[names[0]]
@@ -105,8 +106,13 @@ def unconfirmed(named, problem, base, final, proof, whole):
     return name, fits[name]
 
 
-def _contradicted(fell, apart, moved):
-    return fell > REFUTED and apart > max(VISIBLE, math.sqrt(1.0 - NAMED) * moved)
+def _contradicted(proof, run, best, before):
+    """Return whether the certify data speak against a run, and for the best one beyond doubt."""
+    fell, apart = proof.fall(run, best)
+    form = math.sqrt(1.0 - NAMED) * proof.fall(before, best)[1]
+    # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
+    return (fell > REFUTED and apart > max(VISIBLE, form)
+            and fell + 1.0 > CERTAIN_T * proof.doubt(run, best))
 
 
 def _squares_saved(proof, before, run):

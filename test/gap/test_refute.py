@@ -38,17 +38,19 @@ def found_of(*names):
     return Found(Hypothesis(effects), theta, {}, {}, {})
 
 
-@pytest.mark.parametrize('moved, apart, left', [
-    (2.0, 1.5, NAMES[1:]),            # another course altogether
-    (20.0, 1.5, NAMES),               # no formulation is that true
-    (0.5, 0.2, NAMES)])               # nothing can be seen
-def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart, left):
+@pytest.mark.parametrize('moved, apart, drift, left', [
+    (2.0, 1.5, 0.1, NAMES[1:]),       # another course altogether
+    (2.0, 1.5, 3.0, NAMES),           # the valve drifts that way by itself, too
+    (20.0, 1.5, 0.1, NAMES),          # no formulation is that true
+    (0.5, 0.2, 0.1, NAMES)])          # nothing can be seen
+def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart, drift, left):
     time_s = np.arange(SAMPLES) * 0.005
     truth = moved * np.sin(time_s)
     noise = np.random.default_rng(3).standard_normal(SAMPLES)
     fits = {n: found_of(n) for n in NAMES}
     runs = {(): 0.0 * truth, (NAMES[1],): truth, (NAMES[0],): truth + apart * np.cos(time_s)}
     proof = Proof.__new__(Proof)
+    proof.drift = [{'contraction': sign * drift * np.cos(time_s)} for sign in (-1.0, 1.0)]
 
     class Given:
         signals, measured = ('contraction',), {'contraction': truth + noise}

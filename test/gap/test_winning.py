@@ -168,3 +168,14 @@ def test_beside_another_effect_the_better_of_two_sensor_causes_takes_the_place(t
     found = Given()._resolve(SimpleNamespace(hypothesis=SimpleNamespace(
         names=('leakage', 'threshold_pressure'))), both)[1]
     assert [w.names for w in found] == [named, ('threshold_pressure',)]
+
+
+@pytest.mark.parametrize('effect, number', [
+    ('viscous_damping', 'damping_n_s_per_m'), ('dead_volume', 'V_dead')])
+def test_a_number_and_the_effect_that_is_another_name_of_it_are_one(effect, number):
+    given = SimpleNamespace(
+        problem=SimpleNamespace(cuts=['muscle']), matters=lambda current, without: True,
+        _is_missed=lambda *judged: True, _swapped=lambda current, out: (*current, out))
+    named = [Named(n, 'muscle', [], (n,)) for n in (number, 'creep', effect)]
+    assert Search._eliminate(given, (), named) == ((number,), named[1:])
+    assert Search._eliminate(given, (), named[:2]) == ((), named[:2])
