@@ -134,7 +134,9 @@ class Finish:
         base = self.base.errors[s]
         rest = 1.0 - share(cut, base, without.errors[s])
         gained = rest - (1.0 - share(cut, base, current.errors[s]))
-        return (gained > 0.0 and gained >= LATER_STEP * rest and preference(
+        # By itself in its cut it needs no more than one that is alone altogether.
+        least = LATER_STEP if without.hypothesis.touches(cut) else RIVAL
+        return (gained > 0.0 and gained >= least * rest and preference(
             cut, base, current.errors[s], without.errors[s]) >= CERTAIN_T)
 
     def _simpler(self, current, w, without, named):

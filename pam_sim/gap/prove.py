@@ -33,7 +33,7 @@ from pam_sim.gap.result import SignalGap, Trace, UNIT
 INPUT_DRAWS = 8
 FLOOR_ERROR = 1.2            # how far a noise floor may be too low
 VISIBLE = 0.3                # standard deviations of a sensor; less cannot be told from none
-FOUND_AGAIN = 0.2            # where the certify data tell it from none all the same
+FOUND_AGAIN = 0.1            # where the certify data tell it from none all the same
 MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
 

@@ -24,7 +24,7 @@ missed when it is left out.
 from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
-from pam_sim.gap.candidates import candidates, split_refinements
+from pam_sim.gap.candidates import candidates, LIMITS, split_refinements
 from pam_sim.gap.choice import Choice, CLOSE, least_gain, RIVAL, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
@@ -252,6 +252,7 @@ class Search(Finish):
         screened = self.screened if current is self.base else screen(
             self.problem, current, plain)
         chosen = self._promising(screened, cuts)
+        chosen += [s for s in self._wider(screened, taken) if s not in chosen]
         rivals = self._fit_all(current, chosen)
         pulled = [name for cut in cuts for name, z in current.pulls(cut).items()
                   if abs(z) > PULLED]
@@ -313,6 +314,20 @@ class Search(Finish):
             chosen += self._ranked([s.flat for s in screened], cut.subsystem)[:IN_FULL]
         candidates = [s.candidate for s in chosen]
         return [s for i, s in enumerate(chosen) if s.candidate not in candidates[:i]]
+
+    @staticmethod
+    def _wider(screened, taken):
+        """
+        Return the best formulation of every name that has a limit among the names ``taken``.
+
+        Such an effect, which gave way to its limit, may be there beside it; its signature may
+        not tell, for much of it is that of the limit.
+        """
+        by_name = {}
+        for s in sorted(screened, key=lambda s: -sum(s.promise.values())):
+            if any((name, s.candidate.name) in LIMITS for name in taken):
+                by_name.setdefault(s.candidate.name, s)
+        return list(by_name.values())
 
     @staticmethod
     def _ranked(screened, subsystem):

@@ -27,6 +27,7 @@ from pam_sim.gap.compare import CERTAIN_T, preference
 from pam_sim.gap.finish import within_the_chain
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.screen import Screened
 from pam_sim.gap.search import Search
 import pytest
 
@@ -137,7 +138,7 @@ def test_a_gap_without_a_name_must_be_clear(monkeypatch, off, materiality, verdi
                             unexplained=lambda: 1.0)
     monkeypatch.setattr(workflow, 'is_material', lambda *given: False)
     monkeypatch.setattr(workflow, 'spread_of_numbers', lambda *given: {})
-    proof.moved = proof.fall = lambda *given: (0.0,)
+    proof.moved = proof.fall = lambda *given: (0.0, 0.0)
     proof.refit = proof.after = None
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
     monkeypatch.setattr(workflow, 'held_without', lambda found: found)
@@ -179,3 +180,24 @@ def test_a_number_and_the_effect_that_is_another_name_of_it_are_one(effect, numb
     named = [Named(n, 'muscle', [], (n,)) for n in (number, 'creep', effect)]
     assert Search._eliminate(given, (), named) == ((number,), named[1:])
     assert Search._eliminate(given, (), named[:2]) == ((), named[:2])
+
+
+def test_an_effect_that_gave_way_to_its_limit_is_tried_beside_it():
+    def screened(name, *promises):
+        return [Screened(c, (), {'muscle': p}) for c, p in zip(
+            (c for c in candidates(nominal(), ('contraction',)) if c.name == name), promises)]
+
+    creep, loops = screened('creep', 0.0)[0], screened('hysteresis', 0.1, 0.3, 0.2)
+    given = [creep, *loops, *screened('end_taper', 0.9)]
+    assert Search._wider(given, {'bladder_stiffness'}) == [creep]
+    assert Search._wider(given, {'coulomb_friction', 'parallel_spring'}) == [loops[1]]
+
+
+@pytest.mark.parametrize('left, beside, missed', [
+    (0.67, None, True), (0.67, 'end_taper', False), (0.5, 'end_taper', True), (0.8, None, False)])
+def test_what_is_alone_in_its_cut_is_missed_as_a_single_effect_is(left, beside, missed):
+    case = Tied(Blocks(60), 1.2, {'bladder_stiffness': 1.2 * left})
+    given = SimpleNamespace(
+        base=case.base, first_gap={'muscle': 1.44}, least_gap=0.01)
+    assert Search._is_missed(given, case.cuts[0], case.rivals[0].found,
+                             case._found(beside, 1.2)) == missed
