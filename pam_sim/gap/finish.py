@@ -231,7 +231,9 @@ class Finish:
         # What was tried in one formulation alone may be far from the muscle's own.
         forms = [sum(o.name == c.name for o in self.pool) for c in current.hypothesis.effects
                  if acts_on(c.effect, s)]
-        if left > CLEAR and max(forms, default=0) > 1:
+        # And a number that is wrong leaves nothing: its equation is the model's own.
+        is_number = any(k.name in current.hypothesis.freed for k in cut.known)
+        if left > CLEAR and (is_number or max(forms, default=0) > 1):
             least = NAMED_CLEARLY
         return self._is_bent(cut, current) or explained.get(s, 0.0) < least
 

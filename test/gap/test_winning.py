@@ -14,6 +14,7 @@
 
 """What a rival needs to win, and what is spent on those that cannot."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from gap_rivals import Blocks, Tied
@@ -24,6 +25,7 @@ from pam_sim.gap import workflow
 from pam_sim.gap.candidates import candidates
 from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.compare import CERTAIN_T, preference
+from pam_sim.gap.cuts import known_numbers
 from pam_sim.gap.finish import within_the_chain
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
@@ -114,6 +116,17 @@ def test_a_clear_rest_costs_a_name_of_several_formulations_earlier(name, off, ex
     case = Tied(Blocks(60), 20.0, {name: off})
     assert Stage(case)._is_poor(
         case.cuts[0], case.rivals[0].found, {'muscle': explained}) == poor
+
+
+@pytest.mark.parametrize('off, explained, poor', [
+    (6.0, 0.93, True), (6.0, 0.96, False), (3.0, 0.93, False)])
+def test_a_number_of_the_model_leaves_no_clear_rest(off, explained, poor):
+    case = Tied(Blocks(60), 20.0, {'threshold_pressure': off})
+    mass = next(k for k in known_numbers(nominal()) if k.name == 'mass_kg')
+    case.cuts[0].known = [mass]
+    found = replace(case.rivals[0].found, hypothesis=Hypothesis((), ('mass_kg',)),
+                    known_z={'muscle': np.array([8.0])})
+    assert Stage(case)._is_poor(case.cuts[0], found, {'muscle': explained}) == poor
 
 
 @pytest.mark.parametrize('form', ['valve_dead_zone', 'valve_dead_zone_gradual'])
