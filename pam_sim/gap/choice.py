@@ -21,6 +21,7 @@ numbers of the model bent is dropped, and the simpler one stands for the one it 
 
 from dataclasses import dataclass, field
 
+from pam_sim.effects.registry import effects
 from pam_sim.gap.candidates import is_narrow, LIMITS
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -32,6 +33,7 @@ LATER_STEP = 0.7             # least share of what is left that a further effect
 RIVAL = 0.5                  # of the best share; a name that explains less is no rival
 BETTER_T = 2.0               # by which a formulation beats the simpler one it contains
 HALF_SURE_T = 1.0            # from which on all of the data are asked
+AHEAD_T = 2.5                # by which a name leaves one that explains about as much behind
 BEHIND_T = 1.5               # with which a rival that explains clearly less is none
 SAME_FORM = 0.002            # of the gap an effect explains; no formulation is that true
 CLOSE = 0.05                 # shares this near count as equal for a cause in several cuts
@@ -66,6 +68,12 @@ class Rival:
                     f.shape and abs(x - f.coordinate(getattr(f, end))) < EDGE
                     for f, x in zip(c.free, self.found.theta_of(place)) for end in f.ends)
         return False
+
+    @property
+    def is_exact(self):
+        """Return whether it has one form: a number of the model, a bias or gain of a sensor."""
+        return self.name not in effects() or (
+            effects()[self.name].subsystem == 'sensor' and not self.name.endswith('_lag'))
 
 
 @dataclass
@@ -137,10 +145,10 @@ class Choice:
         near = max(near, 1.0 - (1.0 - least) / UNPOLISHED)      # the others will not win
         self._polish([r for r in ranked if r.share[s] > near and gap(
             cut, r.found.errors[s]) > self.seen_gap])
-        ranked, is_tied, same = self._judged(ranked, current, cut, before)
+        ranked, is_tied, is_same = self._judged(ranked, current, cut, before)
         # One within the noise counts as behind only where it would not come nearer.
         if self._polish([r for r in ranked if r.share[s] > near and not is_tied(r)]):
-            ranked, is_tied, same = self._judged(ranked, current, cut, before)
+            ranked, is_tied, is_same = self._judged(ranked, current, cut, before)
         if not ranked:
             return []
         top = ranked[0].share[s]
@@ -153,8 +161,8 @@ class Choice:
         names = {r.name for r in tied}
         # A simpler one stands for the other only where it was tested and explains as much.
         close = top - CLOSE * max(top - before, 0.0)
-        as_good = {r.name for r in tied if id(r) in same
-                   or (r.t[s] < BETTER_T and r.share[s] > close)}
+        as_good = {r.name for r in tied if is_same(r) or (
+                   r.t[s] < BETTER_T and r.share[s] > close)}
         return [r for r in tied
                 if not any((simple, r.name) in LIMITS for simple in as_good)
                 and SAME_AS.get(r.name) not in names]
@@ -167,7 +175,7 @@ class Choice:
         return bool(rough)
 
     def _judged(self, rivals, current, cut, before):
-        """Return (rivals, best first; whether one is tied with the best; ids of those alike)."""
+        """Return (rivals, best first; whether one is tied with the best; whether it is alike)."""
         s = cut.subsystem
         ranked = without_limits(rivals, current, s)
         for r in ranked:
@@ -175,13 +183,16 @@ class Choice:
                                 r.found.errors[s])
         top = ranked[0].share[s] if ranked else 0.0
         alike = top - SAME_FORM * max(top - before, 0.0)
-        same = {id(r) for r in ranked if r.share[s] >= alike}
+
+        def is_same(r):
+            is_behind = r.is_exact and ranked[0].is_exact and r.t[s] >= AHEAD_T
+            return r.share[s] >= alike and not is_behind
 
         def is_tied(r):
-            return id(r) in same or (r.share[s] > RIVAL * top and not r.t[s] >= (
-                CERTAIN_T if r.share[s] > top - CLOSE else BEHIND_T))
+            return is_same(r) or (r.share[s] > RIVAL * top and not r.t[s] >= (
+                AHEAD_T if r.share[s] > top - CLOSE else BEHIND_T))
 
-        return ranked, is_tied, same
+        return ranked, is_tied, is_same
 
     def _cross(self, tied, current, cut):
         """Compare those that are tied with the first of them once more, on all of the data."""

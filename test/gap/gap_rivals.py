@@ -21,6 +21,7 @@ from pam_sim.gap.choice import Choice, Rival
 from pam_sim.gap.cuts import Cut
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import SELECT
+from pam_sim.gap.result import SIGNALS
 
 SAMPLES = 100                # of a block
 
@@ -56,7 +57,7 @@ class Tied:
 
     def _found(self, name, left):
         effects = () if name is None else tuple(
-            c for c in candidates(nominal(), ('contraction',)) if c.effect == name)
+            c for c in candidates(nominal(), SIGNALS) if c.effect == name)
         cut = self.cuts[0]
         theta = np.concatenate([np.full(len(c.free), 0.5) for c in effects] or [np.zeros(0)])
         return Found(Hypothesis(effects), theta, {'muscle': np.zeros(0)},
