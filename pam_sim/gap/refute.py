@@ -106,22 +106,13 @@ def unconfirmed(named, problem, base, final, proof, whole):
     return name, fits[name]
 
 
-def is_found_again(proof):
-    """Return whether the certify data tell the final model from the calibrated one."""
-    return _tells(proof, proof.refit, proof.after)
-
-
 def _contradicted(proof, run, best, before):
-    """Return whether the certify data speak against a run, and for the best one."""
+    """Return whether the certify data speak against a run, and for the best one beyond doubt."""
+    fell, apart = proof.fall(run, best)
     form = math.sqrt(1.0 - NAMED) * proof.fall(before, best)[1]
-    return _tells(proof, run, best) and proof.fall(run, best)[1] > max(VISIBLE, form)
-
-
-def _tells(proof, worse, better):
-    """Return whether the certify data say beyond doubt which of two free runs is the better."""
-    fell, _ = proof.fall(worse, better)
-    # Were the other one true, the squares would rise by what the two are apart: a fall of -1.
-    return fell > REFUTED and fell + 1.0 > CERTAIN_T * proof.doubt(worse, better)
+    # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
+    return (fell > REFUTED and apart > max(VISIBLE, form)
+            and fell + 1.0 > CERTAIN_T * proof.doubt(run, best))
 
 
 def _squares_saved(proof, before, run):

@@ -29,7 +29,7 @@ from pam_sim.gap.locate import locate
 from pam_sim.gap.parts import FIT, SELECT
 from pam_sim.gap.prove import (
     FLOOR_ERROR, free_run_of, held_without, is_material, model_of, moved, numbers_of, Proof)
-from pam_sim.gap.refute import is_found_again, refute, unconfirmed
+from pam_sim.gap.refute import refute, REFUTED, unconfirmed
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.screen import least_sizes
 from pam_sim.gap.search import Search
@@ -167,7 +167,10 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
     named = outcome.named
     result.moved = proof.moved(base, whole) if named else {}
     own = proof.moved(held_without(final), whole) if named else {}
-    material = is_material(own, result.moved, materiality, is_found_again(proof))
+    again = proof.fall(proof.refit, proof.after)[0] > REFUTED
+    # Too small for a name is only what certainly is.
+    material = is_material(own, result.moved, materiality, again) or (bool(named) and is_material(
+        own, result.moved, materiality / _at_most(problem, final, named), again))
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:
@@ -192,6 +195,13 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
         result.verdict = 'ambiguous'
     else:
         result.verdict = 'effects' if result.effects else 'parameter'
+
+
+def _at_most(problem, final, named):
+    """Return how many times as large as fitted the effects may be, with 95 % certainty."""
+    names = [c.name for c in final.hypothesis.effects]
+    return 1.0 + NORMAL_95 / min((problem.certainty(final, names.index(w.name))
+                                  for w in named if w.name in names), default=math.inf)
 
 
 def _is_left(result, problem, proof, base, least, whole):

@@ -214,3 +214,29 @@ def test_what_is_alone_in_its_cut_is_missed_as_a_single_effect_is(left, beside, 
         base=case.base, first_gap={'muscle': 1.44}, least_gap=0.01)
     assert Search._is_missed(given, case.cuts[0], case.rivals[0].found,
                              case._found(beside, 1.2)) == missed
+
+
+@pytest.mark.parametrize('names, at_most', [
+    (('creep',), 1.2), (('creep', 'end_taper'), 1.4), (('mass_kg',), 1.0)])
+def test_how_large_effects_may_be_rests_on_the_least_certain(names, at_most):
+    problem = SimpleNamespace(certainty=lambda final, place: 1.96 / (0.2, 0.4)[place])
+    effects = tuple(SimpleNamespace(name=n) for n in ('creep', 'end_taper'))
+    final = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects))
+    named = [Named(n, 'muscle', [], (n,)) for n in names]
+    assert workflow._at_most(problem, final, named) == pytest.approx(at_most, rel=1e-4)
+
+
+@pytest.mark.parametrize('certainty, verdict', [(6.0, 'effects'), (60.0, 'no_gap')])
+def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
+        monkeypatch, certainty, verdict):
+    result = SimpleNamespace(parameters=[], effects=['creep'], signals={})
+    proof = SimpleNamespace(noise={}, unexplained=lambda: 0.0, fall=lambda *given: (1.0, 0.8),
+                            moved=lambda *given: {'contraction': 0.8}, refit=None, after=None)
+    monkeypatch.setattr(workflow, 'held_without', lambda found: found)
+    creep = SimpleNamespace(name='creep')
+    final = SimpleNamespace(hypothesis=SimpleNamespace(effects=(creep,)))
+    outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
+        Named('creep', 'muscle', [], ('creep',))])
+    problem = SimpleNamespace(certainty=lambda found, place: certainty)
+    workflow._judge(result, outcome, problem, proof, None, final, 1.0, True)
+    assert result.verdict == verdict
