@@ -185,14 +185,20 @@ class Choice:
         alike = top - SAME_FORM * max(top - before, 0.0)
 
         def is_same(r):
-            is_behind = r.is_exact and ranked[0].is_exact and r.t[s] >= AHEAD_T
-            return r.share[s] >= alike and not is_behind
+            return r.share[s] >= alike and not (
+                r.is_exact and ranked[0].is_exact and self._is_behind(r, ranked[0], s))
 
         def is_tied(r):
             return is_same(r) or (r.share[s] > RIVAL * top and not r.t[s] >= (
                 AHEAD_T if r.share[s] > top - CLOSE else BEHIND_T))
 
         return ranked, is_tied, is_same
+
+    def _is_behind(self, rival, first, subsystem):
+        """Return whether data and priors together leave a rival behind."""
+        t = rival.t[subsystem]
+        bent = self._strain(first.found) - self._strain(rival.found)
+        return t > 0.0 and t ** 2 - bent >= AHEAD_T ** 2
 
     def _cross(self, tied, current, cut):
         """Compare those that are tied with the first of them once more, on all of the data."""

@@ -217,3 +217,9 @@ def test_a_lag_that_any_filter_may_have_is_no_effect(name, size, is_so):
                   if c.effect == name)
     theta = [f.coordinate(size or f.scale) for f in effect.free]
     assert within_the_chain(Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == is_so
+
+
+def test_of_two_that_have_one_form_a_bent_one_is_not_ahead():
+    case = Tied(Blocks(60), 5.0, {'contraction_bias': 0.0, 'pressure_gain': 0.1})
+    case.choice._strain = lambda found: 200.0 * (found.hypothesis.names == ('contraction_bias',))
+    assert case.names() == ['pressure_gain']
