@@ -164,17 +164,40 @@ class Finish:
             if abs(self._freed_z(current).get(w.name, np.inf)) < STRAIGHT:
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
-            names = [c.name for c in current.hypothesis.effects]
-            if w.name not in names:
-                continue
-            place = names.index(w.name)
-            of_shapes = all(f.shape for f in current.hypothesis.effects[place].free)
-            if (within_the_chain(current, place)
-                    or (of_shapes and Rival(w.name, current).at_edge)
-                    or self.problem.certainty(current, place) < CERTAIN_SIZE):
+            if w.name in [c.name for c in current.hypothesis.effects] and not self._stands(
+                    w.name, current):
+                plain = self._plainer(w, current)
+                if plain is not None:
+                    current = plain
+                    continue
                 current = self._swapped(current, w.name)
                 named = [o for o in named if o is not w]
         return current, named
+
+    def _stands(self, name, current):
+        """Return whether the size of an effect is certain, and no doing of the measurement."""
+        place = [c.name for c in current.hypothesis.effects].index(name)
+        of_shapes = all(f.shape for f in current.hypothesis.effects[place].free)
+        return not (within_the_chain(current, place)
+                    or (of_shapes and Rival(name, current).at_edge)
+                    or self.problem.certainty(current, place) < CERTAIN_SIZE)
+
+    def _plainer(self, w, current):
+        """
+        Return the fit with a plainer formulation that stands and explains almost as much, or None.
+
+        A further shape that the data hardly show can take the certainty from a size.
+        """
+        free = next(len(c.free) for c in current.hypothesis.effects if c.name == w.name)
+        fewer = [r for r in w.formulations if r.name == w.name and any(
+            c.name == w.name and len(c.free) < free for c in r.found.hypothesis.effects[-1:])]
+        s = w.subsystem
+        for r in sorted(fewer, key=lambda r: -r.share[s]):
+            found = self.problem.polish(self._swapped(current, w.name, r))
+            if (self.choice.shares(found)[s] > ALMOST * self.choice.shares(current)[s]
+                    and self._stands(w.name, found)):
+                return found
+        return None
 
     def _freed_z(self, current):
         """Return by name how far the numbers without a prior are from it, in its deviations."""

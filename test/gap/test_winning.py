@@ -240,3 +240,35 @@ def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
     problem = SimpleNamespace(certainty=lambda found, place: certainty)
     workflow._judge(result, outcome, problem, proof, None, final, 1.0, True)
     assert result.verdict == verdict
+
+
+@pytest.mark.parametrize('plain_share, stays', [(0.95, True), (0.85, False)])
+def test_a_name_that_a_further_shape_made_uncertain_stands_in_its_plainer_form(
+        plain_share, stays):
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
+
+    def rival(form, share):
+        candidate = by_name[form]
+        return Rival('coulomb_friction', Found(
+            Hypothesis((candidate,)), np.ones(len(candidate.free)), {}, {}, {}), {'muscle': share})
+
+    forms = [rival('coulomb_friction_presliding', 1.0), rival('coulomb_friction', plain_share)]
+    none = Found(Hypothesis(), np.zeros(0), {}, {}, {})
+    shares = {id(r.found): r.share for r in forms}
+
+    class Last(Search):
+        problem = SimpleNamespace(cuts=[], polish=lambda found: found)
+        choice = SimpleNamespace(shares=lambda found: shares[id(found)])
+
+        def __init__(self):
+            pass
+
+        def _stands(self, name, current):
+            return len(current.hypothesis.effects[0].free) == 1
+
+        def _swapped(self, current, out, put=None):
+            return put.found if put else none
+
+    named = [Named('coulomb_friction', 'muscle', forms, ('coulomb_friction',), forms)]
+    left = Last()._established(forms[0].found, named)
+    assert left == ((forms[1].found, named) if stays else (none, []))
