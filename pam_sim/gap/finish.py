@@ -189,8 +189,8 @@ class Finish:
         A further shape that the data hardly show can take the certainty from a size.
         """
         free = next(len(c.free) for c in current.hypothesis.effects if c.name == w.name)
-        fewer = [r for r in w.formulations if r.name == w.name and any(
-            c.name == w.name and len(c.free) < free for c in r.found.hypothesis.effects[-1:])]
+        fewer = [r for r in w.formulations if r.name == w.name
+                 and len(r.found.hypothesis.effects[-1].free) < free]
         s = w.subsystem
         for r in sorted(fewer, key=lambda r: -r.share[s]):
             found = self.problem.polish(self._swapped(current, w.name, r))

@@ -217,14 +217,14 @@ class Proof:
 
     def doubt(self, worse, better):
         """Return the standard deviation of ``fall`` by stamps and the start of this recording."""
-        apart, by_draw = 0.0, np.zeros(len(self.drift))
+        _, apart = self.fall(worse, better)
+        by_draw = np.zeros(len(self.drift))
         for s in self.recording.signals:
             chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
             between = (worse[s] - better[s])[chosen]
-            apart += float(np.mean(between ** 2)) / variance
             by_draw += [2.0 * float(np.mean(d[s][chosen] * between)) / variance
                         for d in self.drift]
-        return float(np.sqrt(np.mean(by_draw ** 2))) / apart if apart > 0.0 else 0.0
+        return float(np.sqrt(np.mean(by_draw ** 2))) / apart ** 2 if apart > 0.0 else 0.0
 
     def left(self):
         """Return what the final model leaves beyond the floor (rms), as of ``fall``."""

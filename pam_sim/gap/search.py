@@ -323,20 +323,15 @@ class Search(Finish):
         Such an effect, which gave way to its limit, may be there beside it; its signature may
         not tell, for much of it is that of the limit.
         """
-        by_name = {}
-        for s in sorted(screened, key=lambda s: -sum(s.promise.values())):
-            if any((name, s.candidate.name) in LIMITS for name in taken):
-                by_name.setdefault(s.candidate.name, s)
-        return list(by_name.values())
+        ranked = sorted(screened, key=lambda s: -sum(s.promise.values()))
+        return _first_of_each([s for s in ranked if any(
+            (name, s.candidate.name) in LIMITS for name in taken)])
 
     @staticmethod
     def _ranked(screened, subsystem):
         """Return the best formulation of every name, the most promising first."""
-        by_name = {}
-        for s in sorted(screened, key=lambda s: -s.promise.get(subsystem, 0.0)):
-            if s.promise.get(subsystem, 0.0) > 0.0:
-                by_name.setdefault(s.candidate.name, s)
-        return list(by_name.values())
+        ranked = sorted(screened, key=lambda s: -s.promise.get(subsystem, 0.0))
+        return _first_of_each([s for s in ranked if s.promise.get(subsystem, 0.0) > 0.0])
 
     def _fit_all(self, current, screened):
         """Return the rivals of screened candidates; the simulations hold no lock."""
@@ -423,3 +418,11 @@ class Search(Finish):
                 theta += list(put.found.theta_of(len(added.effects) - 1))
         return self.problem.fit(
             Hypothesis(tuple(effects), tuple(freed)), theta, current, whole=False)
+
+
+def _first_of_each(ranked):
+    """Return the first Screened of every name, in their order."""
+    by_name = {}
+    for s in ranked:
+        by_name.setdefault(s.candidate.name, s)
+    return list(by_name.values())

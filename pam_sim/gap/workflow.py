@@ -168,9 +168,13 @@ def _judge(result, outcome, problem, proof, base, final, materiality, whole):
     result.moved = proof.moved(base, whole) if named else {}
     own = proof.moved(held_without(final), whole) if named else {}
     again = proof.fall(proof.refit, proof.after)[0] > REFUTED
-    # Too small for a name is only what certainly is.
-    material = is_material(own, result.moved, materiality, again) or (bool(named) and is_material(
-        own, result.moved, materiality / _at_most(problem, final, named), again))
+
+    def is_worth_a_name(least):
+        return is_material(own, result.moved, least, again)
+
+    # Too small is only what certainly is.
+    material = is_worth_a_name(materiality) or (
+        bool(named) and is_worth_a_name(materiality / _at_most(problem, final, named)))
     result.noise = proof.noise
     unsure = next((w for w in named if len(w.names) > 1), None)
     if unsure is not None:
