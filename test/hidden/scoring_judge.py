@@ -121,6 +121,13 @@ def family_of(name, families):
     return families.get(name, name)
 
 
+def is_of_family(answer, family, families):
+    """Return whether something is claimed, or left in a set, and all of it is of a family."""
+    names = answer.claimed or answer.reported
+    return len(answer.claimed) <= 1 and bool(names) and all(
+        family_of(n, families) == family for n in names)
+
+
 def suggests_rightly(answer, key):
     """Return whether the suggested experiment is one that can tell the rivals apart."""
     suggestion = answer.raw.get('next_experiment') or {}

@@ -14,12 +14,12 @@
 
 """The table of an examination: every measure with its bar, its count and a Wilson interval."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
 from scoring_judge import (
-    abstains, family_of, is_false_alarm, is_in_set, is_right, quantities, read_answer,
+    abstains, is_false_alarm, is_in_set, is_of_family, is_right, quantities, read_answer,
     shrink_percent, suggests_rightly, wrong_names)
 
 GAP_EDGES = (0.0, 0.3, 1.0, 3.0, 10.0, math.inf)
@@ -41,6 +41,16 @@ class Scored:
         if self.key.get('gap_alone'):
             return min(self.key['gap_alone'].values())
         return max(self.key.get('gap_sigma', {'': 0.0}).values())
+
+    @property
+    def tempered(self):
+        """Return the same with the gap after the tempered refit, None if the key has none."""
+        key = self.key
+        if 'gap_sigma_tempered' not in key:
+            return None
+        alone = key.get('gap_alone_tempered')
+        return replace(self, key=key | {'gap_sigma': key['gap_sigma_tempered']} | (
+            {'gap_alone': alone} if alone else {}))
 
 
 def scored(key, raw, raw_after=None, wall_s=0.0, processor_s=0.0):
@@ -109,8 +119,7 @@ def table(cases, families):
         return is_right(c.answer, c.key)
 
     def family(c):
-        return c.answer.single and family_of(c.answer.single, families) == families[
-            c.key['effects'][0]]
+        return is_of_family(c.answer, families[c.key['effects'][0]], families)
 
     def one_wrong(c):
         return len(wrong_names(c.answer, c.key)) > 0

@@ -39,8 +39,9 @@ def report(cases, families, rivals=None):
     parts += [f'| {r.measure} | {r.bar} | {r.value} | {_met(r)} |' for r in rows]
     if rivals:
         parts += ['', *_rivals(cases, rivals)]
-    parts += ['', *_by_gap(cases), '', *_by_kind_of_motion(cases), '', *_confusion(cases), '',
-              *_confidence(cases), '', *_wrong(cases), '', *_missed(rows)]
+    parts += ['', *_by_other_refit(cases, rows, families), *_by_gap(cases), '',
+              *_by_kind_of_motion(cases), '', *_confusion(cases), '', *_confidence(cases), '',
+              *_wrong(cases), '', *_missed(rows)]
     return '\n'.join(parts)
 
 
@@ -74,6 +75,21 @@ def _rivals(cases, rivals):
         parts.append(f'| {name} | {_share(singles, _right)} | '
                      f'{_share(nulls, lambda c: c.answer.claimed)} | {_share(found, _wrongly)} |')
     return parts
+
+
+def _by_other_refit(cases, rows, families):
+    """Lay the rows that rest on the size of a gap beside those after the tempered refit."""
+    others = [c.tempered for c in cases]
+    if None in others:
+        return []
+    parts = ['The same with gaps after a refit that is tempered (rows that differ):', '',
+             '| measure | at least | measured | met |', '|---|---|---|---|']
+    parts += [f'| {r.measure} | {r.bar} | {r.value} | {_met(r)} |'
+              for r, plain in zip(table(others, families), rows) if r.value != plain.value]
+    apart = [c.key['name'] for c, other in zip(cases, others)
+             if c.key['kind'] == 'single' and (c.gap >= 1.0) != (other.gap >= 1.0)]
+    return [*parts, '', 'Single effects on the other side of 1 σ with it: '
+            + (', '.join(apart) or 'none') + '.', '']
 
 
 def _by_gap(cases):

@@ -163,12 +163,28 @@ def test_a_gap_after_refit_is_small_for_a_wrong_number_and_large_for_friction():
     fit, certify = (truth_run.run_rig(
         {'dry': 2.0}, 'ppr', truth_commands.protocol(name, 3)) for name in ('steps', 'triangle'))
     chain = truth_sensors.Chain()
-    found = truth_gap.gap_in_sigma({'dry': 2.0}, {}, chain, fit, certify, 'ppr')
-    assert found['pressure'] < 0.1 and found['contraction'] > 20.0
+    for found in truth_gap.gap_in_sigma({'dry': 2.0}, {}, chain, fit, certify, 'ppr').values():
+        assert found['contraction'] > max(15.0, 4.0 * found['pressure'])
     fit, certify = (truth_run.run_rig(
         {'mass': 5.05}, 'ppr', truth_commands.protocol(name, 3)) for name in ('steps', 'triangle'))
     found = truth_gap.gap_in_sigma({'mass': 5.05}, {}, chain, fit, certify, 'ppr')
-    assert max(found.values()) < 0.3
+    assert max(max(signals.values()) for signals in found.values()) < 0.3
+
+
+def test_what_numbers_of_the_rig_can_take_up_is_no_gap_at_full_weight():
+    # The load cell 2 % too low: mass and force map 2 % lower say nearly the same.
+    chain = truth_sensors.Chain(effects={'force_gain': -0.02})
+    fit, certify = (truth_run.run_rig(
+        {}, 'ppr', truth_commands.protocol(name, 3)) for name in ('minimum', 'multisine'))
+    found = truth_gap.gap_in_sigma({}, {}, chain, fit, certify, 'ppr')
+    assert max(found['plain'].values()) < 0.2 * max(found['tempered'].values())
+
+
+def test_a_run_without_the_effect_starts_at_what_is_read():
+    truth = truth_run.run_rig({}, 'hsv', truth_commands.protocol('steps', 2))
+    start_pa = truth.rows[0, truth_sensors.rig.O_P]
+    rows = truth_run.replay({}, 'hsv', truth, start_pa + 2e3)
+    assert rows[0, truth_sensors.rig.O_P] == pytest.approx(start_pa + 2e3, abs=200.0)
 
 
 def test_cases_repeat_and_differ_by_seed(tmp_path):

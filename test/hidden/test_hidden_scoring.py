@@ -15,7 +15,7 @@
 """The scorer itself: who knows the key scores everything, who does not scores chance."""
 
 import pytest
-from scoring_judge import is_right, read_answer, shrink_percent, wrong_names
+from scoring_judge import is_of_family, is_right, read_answer, shrink_percent, wrong_names
 from scoring_mutants import constant, oracle
 from scoring_table import scored, table, wilson
 from scoring_text import report
@@ -80,6 +80,27 @@ def test_a_number_by_another_name_is_right():
     key = {'effects': [], 'wrong': {'damping_n_s_per_m': 40.0}, 'outside': []}
     assert is_right(read_answer(constant('effects', 'viscous_damping')), key)
     assert not is_right(read_answer(constant('effects', 'creep')), key)
+
+
+def test_a_set_has_the_family_that_all_of_it_has():
+    def answer(*names, verdict='ambiguous'):
+        return read_answer(constant(verdict, names[0]) | {'ambiguity_set': list(names)})
+    assert is_of_family(answer('tube_lag', 'valve_dead_time'), 'transport', FAMILIES)
+    assert not is_of_family(answer('tube_lag', 'leakage'), 'transport', FAMILIES)
+    assert not is_of_family(answer('tube_lag', 'mass_kg'), 'transport', FAMILIES)
+    assert is_of_family(answer('tube_lag', verdict='effects'), 'transport', FAMILIES)
+    assert not is_of_family(answer('leakage', verdict='effects'), 'transport', FAMILIES)
+    assert not is_of_family(read_answer(constant('no_gap')), 'transport', FAMILIES)
+
+
+def test_both_refits_are_reported_where_they_differ(keys):
+    small = [k | {'gap_sigma_tempered': k['gap_sigma']} for k in keys]
+    victim = next(i for i, k in enumerate(small) if k['kind'] == 'single')
+    small[victim] = small[victim] | {'gap_sigma': {'contraction': 0.9}}
+    text = report([scored(k, oracle(k)) for k in small], FAMILIES)
+    assert '(149/149' in text and '(150/150' in text.split('tempered')[1]
+    assert f'other side of 1 σ with it: {small[victim]["name"]}.' in text
+    assert 'tempered' not in report([scored(k, oracle(k)) for k in keys], FAMILIES)
 
 
 def test_a_stated_remainder_excuses_a_name_only_out_of_library():

@@ -204,10 +204,15 @@ def build(case, folder, with_gap=True):
         f'rig: dmsp_5_300_hanging_mass\nvalve: {case.valve}\n', encoding='utf-8')
     key = key_of(case, drawn) | {'noise': chain.noise, 'filter_s': chain.filter_s}
     if with_gap:
-        key['gap_sigma'] = gap.gap_in_sigma(
+        found = gap.gap_in_sigma(
             drawn.numbers, drawn.without, chain, truths['fit'], truths['certify'], case.valve)
-        if len(key['effects']) > 1:
-            key['gap_alone'] = {e: _alone(case, drawn, chain, e, truths) for e in key['effects']}
+        alone = {e: _alone(case, drawn, chain, e, truths) for e in key['effects']
+                 } if len(key['effects']) > 1 else {}
+        # Both, so that nobody has to take the choice of the refit on trust.
+        for refit, ending in (('plain', ''), ('tempered', '_tempered')):
+            key[f'gap_sigma{ending}'] = found[refit]
+            if alone:
+                key[f'gap_alone{ending}'] = {e: g[refit] for e, g in alone.items()}
     return key
 
 
@@ -228,7 +233,7 @@ def key_of(case, drawn):
 
 
 def _alone(case, drawn, chain, effect, truths):
-    """Return the largest gap in sigma of one of several effects: with it and without the rest."""
+    """Return {refit: largest gap in sigma} of one of several effects, without the rest."""
     rng = np.random.default_rng([*case.seed, 3])
     one = Rig(dict(drawn.without), drawn.without)
     part = effects.EFFECTS[effect].draw(rng, drawn.scales[effect], case.valve)
@@ -238,8 +243,8 @@ def _alone(case, drawn, chain, effect, truths):
         runs.Truth(runs.replay(one.numbers, case.valve, truths[t]), truths[t].sent_s,
                    truths[t].sent, truths[t].wanted_s, truths[t].wanted)
         for t in ('fit', 'certify'))
-    return max(gap.gap_in_sigma(
-        one.numbers, one.without, alone, fit, certify, case.valve).values())
+    found = gap.gap_in_sigma(one.numbers, one.without, alone, fit, certify, case.valve)
+    return {refit: max(gaps.values()) for refit, gaps in found.items()}
 
 
 def run_suggested(case, folder, experiment):

@@ -69,17 +69,22 @@ def run_rig(numbers, valve, experiment):
     return Truth(rows[int(round(SETTLE_S / sensors.ROW_S)):], sent_s, sent, times, held)
 
 
-def replay(numbers, valve, truth):
-    """Return the rows of a rig with these numbers, given the signal sent in another run."""
+def replay(numbers, valve, truth, start_pa=None):
+    """
+    Return the rows of a rig with these numbers, given the signal sent in another run.
+
+    It starts at ``start_pa`` [Pa], by default where the other run did.
+    """
     instants = truth.sent_s + SETTLE_S
     first = truth.sent[:, 0]
     second = truth.sent[:, 1] if valve == 'hsv' else np.zeros(first.size)
     idle = np.zeros(1)
     lead = truth.sent[:1, 0] if valve == 'ppr' else idle
+    start = truth.rows[0, rig.O_P] if start_pa is None else start_pa
     rows, _ = rig.simulate(
         truth_numbers.numbers(**numbers), rig.PPR if valve == 'ppr' else rig.HSV,
         np.concatenate([idle, instants]), np.concatenate([lead, first]),
-        np.concatenate([idle, second]), truth.rows[0, rig.O_P] - rig.ATM,
+        np.concatenate([idle, second]), start - rig.ATM,
         SETTLE_S + (truth.rows.shape[0] - 1) * sensors.ROW_S, False)
     return rows[int(round(SETTLE_S / sensors.ROW_S)):]
 
