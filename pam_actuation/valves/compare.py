@@ -89,7 +89,7 @@ def _measure(rig, seed, power, hold_s, done):
     hold = measure.measure_hold(bench, hold_s, power)
     done()
     leaking = rig.with_(effects=[
-        *(item for item in rig.effects if item.name != 'leakage'), measure.LEAK])
+        *(item for item in rig.effects if not item.name.startswith('leakage')), measure.LEAK])
     leak = measure.measure_hold(Bench(leaking, seed), hold_s, power)
     done()
     loss = measure.measure_power_loss(bench)

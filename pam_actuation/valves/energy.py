@@ -17,6 +17,7 @@
 import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.leakage import CRITICAL_RATIO
+from pam_sim.effects.leakage_slit import slit_share
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.units import P_ATM_PA, RHO_REFERENCE
@@ -64,13 +65,17 @@ def supplied_kg(record, rig):
     if rig.valve == 'hsv':
         return record.filled_kg - record.filled_kg[0]
     change = np.diff(record.air_mass_kg)
-    leak = rig.effect('leakage')
-    if leak is not None:
-        conductance = leak.parameters['conductance_m3_per_s_pa'] * RHO_REFERENCE
-        lost = np.empty(len(record))
-        _leak_flow(record.true_pressure_pa, conductance, lost)
-        change = change + 0.5 * (lost[1:] + lost[:-1]) * np.diff(record.time_s)
+    for leak in (rig.effect('leakage'), rig.effect('leakage_slit')):
+        if leak is not None:
+            lost = _lost_kg_per_s(record.true_pressure_pa, **leak.parameters)
+            change = change + 0.5 * (lost[1:] + lost[:-1]) * np.diff(record.time_s)
     return np.concatenate([[0.0], np.cumsum(np.maximum(change, 0.0))])
+
+
+def _lost_kg_per_s(pressure_pa, conductance_m3_per_s_pa, slit_flow_at_400kpa_kg_per_s=0.0):
+    lost = np.empty(len(pressure_pa))
+    _leak_flow(pressure_pa, conductance_m3_per_s_pa * RHO_REFERENCE, lost)
+    return lost + slit_flow_at_400kpa_kg_per_s * slit_share(pressure_pa)
 
 
 @compiled

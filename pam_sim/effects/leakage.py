@@ -38,7 +38,8 @@ def _pack(values, numbers):
             *numbers.muscle.shape)
 
 
-def _flow_at_400kpa(values, rig):
+def flow_at_400kpa(values, rig):
+    """Return the mass flow of the orifice at 400 kPa gauge [kg/s]."""
     return float(mass_flow_kg_per_s(
         400e3 + P_ATM_PA, P_ATM_PA, values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
         CRITICAL_RATIO))
@@ -60,7 +61,7 @@ EFFECT = Effect(
     reported=(
         Reported('conductance_m3_per_s_pa', 'm3/(s Pa)',
                  lambda values, rig: values['conductance_m3_per_s_pa']),
-        Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', _flow_at_400kpa),
+        Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', flow_at_400kpa),
     ),
     slots=7,
     pack=_pack,

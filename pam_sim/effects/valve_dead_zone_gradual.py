@@ -73,28 +73,34 @@ def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, 
 
 
 @compiled
-def mean_opening_with_lift(duty, period_s, open_s, close_s, ramp_s):
-    """Return the mean opening of one valve driven with a constant duty, its lift on a ramp."""
-    ramp_s = min(ramp_s, 2.0 * open_s, 2.0 * close_s)
+def mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s):
+    """
+    Return the mean opening of one valve driven with a constant duty, its lift on ramps.
+
+    ``rise_s`` and ``fall_s`` are the times a whole lift takes, around ``open_s`` and
+    ``close_s``: at most twice these.
+    """
+    rise_s, fall_s = min(rise_s, 2.0 * open_s), min(fall_s, 2.0 * close_s)
     pulse = duty * period_s
-    lifted = pulse - open_s + 0.5 * ramp_s      # since the lift began
+    lifted = pulse - open_s + 0.5 * rise_s      # since the lift began
     if pulse <= 0.0 or lifted <= 0.0:
         return 0.0
     if period_s - pulse < close_s:
         return 1.0                       # never shut between pulses
-    if lifted >= ramp_s:
+    if lifted >= rise_s:
         return min((pulse - open_s + close_s) / period_s, 1.0)
-    lift = lifted / ramp_s
-    shutting = lift * (close_s - 0.5 * ramp_s) + 0.5 * lift * lift * ramp_s
+    lift = lifted / rise_s
+    shutting = lift * (close_s - 0.5 * fall_s) + 0.5 * lift * lift * fall_s
     return min((0.5 * lift * lifted + shutting) / period_s, 1.0)
 
 
 @compiled
 def opening(fill, vent, period_s, state, i, par, k):
     """Return the mean openings of the averaged pair."""
-    return (
-        mean_opening_with_lift(fill, period_s, par[k + _OPEN], par[k + _CLOSE], par[k + _RAMP]),
-        mean_opening_with_lift(vent, period_s, par[k + _OPEN], par[k + _CLOSE], par[k + _RAMP]))
+    open_s, close_s = par[k + _OPEN], par[k + _CLOSE]
+    ramp_s = min(par[k + _RAMP], 2.0 * open_s, 2.0 * close_s)
+    return (mean_opening_with_lift(fill, period_s, open_s, close_s, ramp_s, ramp_s),
+            mean_opening_with_lift(vent, period_s, open_s, close_s, ramp_s, ramp_s))
 
 
 @compiled

@@ -121,11 +121,15 @@ _RATES = (4e5, 1e6, 2.5e6)
 _TABLE = {
     'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3),),
     'tube_lag': (Free('time_constant_s', 0.01, 0.0, 0.5),),
+    'tube_lag_two_stage': (Free('time_constant_s', 0.01, 0.0, 0.5),
+                           Free('second_stage_share', 0.2, 0.02, 0.5, True, ends=())),
     'valve_hysteresis': (Free('half_width_pa', 2e3, 0.0, 5e4),),
     'flow_limit': (Free('fill_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES),
                    Free('vent_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES)),
     'vent_asymmetry': (Free('ratio_minus_1', 0.2, -0.4, 4.0),),
     'leakage': (Free('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),),
+    'leakage_slit': (Free('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),
+                     Free('slit_flow_at_400kpa_kg_per_s', 1e-7, 0.0, 1e-4)),
     # A compressor that starts once more or less makes other valleys of the misfit.
     'supply_droop': (Free('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True,
                           (2e-4, 4e-4, 7e-4, 1.2e-3, 2.5e-3, 5e-3)),),
@@ -165,12 +169,15 @@ _TRIED = (1e-3, 1e-4, 0.0)
 _SWITCHING = (Free('open_time_s', 1e-3, 0.0, 9e-3, starts=_TRIED),
               Free('close_time_s', 1e-3, 0.0, 9e-3, starts=_TRIED))
 _HSV = {'valve_dead_zone': _SWITCHING,
-        'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3))}
+        'valve_dead_zone_gradual': (*_SWITCHING, Free('ramp_s', 5e-4, 0.0, 9e-3)),
+        'valve_dead_zone_two_ramps': (
+            *_SWITCHING, Free('rise_s', 1e-3, 0.0, 9e-3), Free('fall_s', 1e-3, 0.0, 9e-3))}
 _OVERLAP = (Free('half_width_pa', 2e3, 0.0, 5e4),)
 _PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
 # Each contains another formulation of its name, adds a few per cent of its gap, and takes long.
 REFINEMENTS = {'coulomb_friction_presliding', 'pressure_friction_presliding',
-               'guide_friction_presliding'}
+               'guide_friction_presliding', 'tube_lag_two_stage',
+               'valve_dead_zone_two_ramps'}
 # Left is a limit of right: where both explain the data, the simpler one is named.
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}

@@ -259,6 +259,8 @@ class Search(Finish):
         rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
             current.hypothesis.effects, (*current.hypothesis.freed, name)),
             current.theta, current, whole=False), name), pulled)
+        # Before that, a gap near the noise may have no share to contend for.
+        self.set_levels(rivals, cuts)
         had = self.choice.shares(current)
         had = {c.subsystem: had[c.subsystem] for c in cuts}
         contending = set().union(*(

@@ -180,7 +180,7 @@ def test_a_refinement_alone_is_one_to_begin_with():
     pool = candidates(nominal(), ('contraction',))
     first, refinements = split_refinements(pool)
     assert {c.name for c in refinements} == {
-        'coulomb_friction', 'pressure_friction', 'guide_friction'}
+        'coulomb_friction', 'pressure_friction', 'guide_friction', 'tube_lag'}
     assert not set(first) & set(refinements) and set(first) | set(refinements) == set(pool)
     assert split_refinements(refinements) == (refinements, [])
 
@@ -202,3 +202,31 @@ def test_an_effect_knows_its_look_alikes_and_its_least_size():
     found = look_alikes(run, nominal(), 'coulomb_friction')
     assert 'pressure_friction' in [name for name, _ in found['alike']]
     assert 0.0 < found['least']['value'] < 0.5 and found['least']['unit'] == 'N'
+
+
+def test_a_leak_beside_a_lag_of_two_stages_is_named():
+    """What a wrong form of the lag leaves would hide it."""
+    rig = nominal().with_(effects=[
+        {'name': 'tube_lag_two_stage', 'parameters': {
+            'time_constant_s': 0.014, 'second_stage_share': 0.35}},
+        {'name': 'leakage_slit', 'parameters': {
+            'conductance_m3_per_s_pa': 1.2e-11, 'slit_flow_at_400kpa_kg_per_s': 3e-6}}])
+    result = find_gap(recorded(rig, voltages(30.0)), nominal())
+    assert sorted(e['name'] for e in result.effects) == ['leakage', 'tube_lag']
+    lag = next(e for e in result.effects if e['name'] == 'tube_lag')
+    assert lag['formulation'] == 'tube_lag_two_stage'
+    assert lag['equivalent']['time_constant_s']['value'] == pytest.approx(0.014, rel=0.05)
+
+
+def test_other_forms_of_a_small_leak_widen_its_interval():
+    """Behind a regulator the flow depends on the law; one law alone is too sure of it."""
+    rig = nominal().with_(effects=[{'name': 'leakage_slit', 'parameters': {
+        'conductance_m3_per_s_pa': 5e-12, 'slit_flow_at_400kpa_kg_per_s': 1.2e-6}}])
+    result = find_gap(recorded(rig, voltages(30.0)), nominal())
+    assert [e['name'] for e in result.effects] == ['leakage']
+    quantity = 'mass_flow_at_400kpa_kg_per_s'
+    effect = rig.effect('leakage_slit')
+    truth, _ = effects()[effect.name].report(effect.parameters, rig)[quantity]
+    found = result.effects[0]['equivalent'][quantity]
+    assert found['ci95'][0] < truth < found['ci95'][1]
+    assert found['value'] == pytest.approx(truth, rel=0.35)

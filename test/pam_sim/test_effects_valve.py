@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.effects.registry import effects
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.errors import InputError
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
@@ -51,6 +52,49 @@ def test_tube_lag_of_the_regulator_is_a_second_lag(tau_s):
     assert np.max(np.abs(response.pressure_pa - expected)) < 20.0
 
 
+def test_two_stages_of_a_line_are_lags_in_series():
+    start, tau_s, slow = P_ATM_PA + 300e3, (0.024, 0.006), 0.060
+    response = held('ppr', ('tube_lag_two_stage', {
+        'time_constant_s': 0.030, 'second_stage_share': 0.2})).simulate(
+            np.full(400, 4.0), initial_pressure_pa=start, initial_signal=3.0)
+    # Partial fractions of three lags: the step less each time constant's exponential.
+    times, t = (slow, *tau_s), response.time_s
+    left = sum(a**2 / np.prod([a - b for b in times if b != a]) * np.exp(-t / a) for a in times)
+    assert np.max(np.abs(response.pressure_pa - start - 100e3 * (1.0 - left))) < 30.0
+
+
+def test_a_line_of_one_stage_is_the_plain_lag():
+    start = {'initial_pressure_pa': P_ATM_PA + 300e3}
+    signal = pulse(fill=0.2, vent=0.1, last=300)
+    one = held('hsv', ('tube_lag', {'time_constant_s': 0.01})).simulate(signal, **start)
+    two = held('hsv', ('tube_lag_two_stage', {
+        'time_constant_s': 0.01, 'second_stage_share': 0.0})).simulate(signal, **start)
+    assert np.max(np.abs(one.pressure_pa - two.pressure_pa)) < 0.1
+
+
+def test_a_slit_loses_the_flow_it_reports_and_less_at_a_low_pressure():
+    effect, flow = effects()['leakage_slit'], 4e-6
+    rig = held('hsv', ('leakage_slit', {
+        'conductance_m3_per_s_pa': 0.0, 'slit_flow_at_400kpa_kg_per_s': flow}))
+    report = effect.report(rig.effect('leakage_slit').parameters, rig)
+    assert report['mass_flow_at_400kpa_kg_per_s'][0] == flow
+    sonic = report['conductance_m3_per_s_pa'][0]
+    orifice = held('hsv', ('leakage', {'conductance_m3_per_s_pa': sonic}))
+    for gauge_pa, expected in ((400e3, flow), (200e3, flow * (
+            (200e3 + P_ATM_PA)**2 - P_ATM_PA**2) / ((400e3 + P_ATM_PA)**2 - P_ATM_PA**2))):
+        lost = [(r.air_mass_kg[0] - r.air_mass_kg[10]) / 0.010 for r in (
+            one.simulate(np.zeros((20, 2)), initial_pressure_pa=P_ATM_PA + gauge_pa)
+            for one in (rig, orifice))]
+        assert lost[0] == pytest.approx(expected, rel=0.01)
+        assert lost[1] == pytest.approx(flow, rel=0.01) if gauge_pa == 400e3 else (
+            lost[1] > 1.3 * lost[0])
+    droops = [P_ATM_PA + 400e3 - held('ppr', (name, values)).simulate(
+        np.full(3000, 4.0), initial_pressure_pa=P_ATM_PA + 400e3).pressure_pa[-1]
+        for name, values in (('leakage_slit', rig.effect('leakage_slit').parameters),
+                             ('leakage', {'conductance_m3_per_s_pa': sonic}))]
+    assert droops[0] == pytest.approx(droops[1], rel=0.02) and droops[0] > 10.0
+
+
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
 def test_tube_lag_of_the_switching_valves_delays_the_air_and_loses_none(fidelity):
     signal = pulse(fill=0.3, last=200)
@@ -67,17 +111,27 @@ def test_tube_lag_of_the_switching_valves_delays_the_air_and_loses_none(fidelity
 
 
 @pytest.mark.parametrize('duty', [0.05, 0.12, 0.15, 0.2, 0.5, 0.95])
-@pytest.mark.parametrize('ramp_s', [0.2e-3, 1.4e-3])
-def test_gradual_dead_zone_of_a_switching_valve_is_the_area_under_its_lift(duty, ramp_s):
+@pytest.mark.parametrize('rise_s, fall_s', [(0.2e-3, 0.2e-3), (1.4e-3, 1.4e-3), (2e-3, 0.4e-3)])
+def test_gradual_dead_zone_of_a_switching_valve_is_the_area_under_its_lift(duty, rise_s, fall_s):
     period_s, open_s, close_s = 0.010, 1.5e-3, 0.8e-3
     t = (np.arange(40000) + 0.5) * 0.5e-6
     pulse_s = duty * period_s
-    lift = np.clip((np.minimum(t, pulse_s) - open_s) / ramp_s + 0.5, 0.0, 1.0)
-    shut = np.maximum(t - pulse_s - close_s + 0.5 * ramp_s, 0.0) / ramp_s
+    lift = np.clip((np.minimum(t, pulse_s) - open_s) / rise_s + 0.5, 0.0, 1.0)
+    shut = np.maximum(t - pulse_s - close_s + 0.5 * fall_s, 0.0) / fall_s
     expected = min(np.sum(np.maximum(lift - shut, 0.0)) * 0.5e-6 / period_s, 1.0)
-    found = mean_opening_with_lift(duty, period_s, open_s, close_s, ramp_s)
+    found = mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s)
     # A valve that is not shut when the next pulse comes stays open.
     assert found == pytest.approx(1.0 if duty == 0.95 else expected, abs=1e-4)
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_two_equal_ramps_are_the_gradual_dead_zone(fidelity):
+    edges = {'open_time_s': 1.5e-3, 'close_time_s': 1.2e-3}
+    signal = np.linspace(0.0, 0.6, 1000)[:, np.newaxis] * [1.0, 0.5]
+    one = held('hsv', ('valve_dead_zone_gradual', {**edges, 'ramp_s': 1e-3}), fidelity=fidelity)
+    two = held('hsv', ('valve_dead_zone_two_ramps', {**edges, 'rise_s': 1e-3, 'fall_s': 1e-3}),
+               fidelity=fidelity)
+    assert np.array_equal(one.simulate(signal).pressure_pa, two.simulate(signal).pressure_pa)
 
 
 def test_gradual_dead_zone_of_the_regulator_is_slow_near_the_set_point():

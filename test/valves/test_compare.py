@@ -103,6 +103,10 @@ def test_a_tight_muscle_is_held_by_shut_valves(name):
     assert 0.1 < loss['vented']['to_ten_percent_s'] < 2.0
 
 
+def slit_flow(gauge_pa):
+    return (gauge_pa + P_ATM_PA) ** 2 - P_ATM_PA**2
+
+
 def test_holding_a_leak_costs_the_leak():
     effects = [measure.LEAK]
     leak = bench('ppr', effects=effects).rig
@@ -111,6 +115,12 @@ def test_holding_a_leak_costs_the_leak():
     assert leak.effect('leakage').parameters['conductance_m3_per_s_pa'] == 2.0e-13
     assert held['air_kg'] == pytest.approx(5.0 * rate, rel=1e-3)
     assert held['power_w'] == power_values()['ppr_power_w'] and held['signal_mean'] > 3.9
+    # A slit that loses as much at this pressure costs as much.
+    slit = [{'name': 'leakage_slit', 'parameters': {
+        'conductance_m3_per_s_pa': 0.0,
+        'slit_flow_at_400kpa_kg_per_s': rate * slit_flow(400e3) / slit_flow(measure.HOLD_PA)}}]
+    through = measure.measure_hold(bench('ppr', effects=slit), 5.0, power_values())
+    assert through['air_kg'] == pytest.approx(held['air_kg'], rel=1e-2)
     # The pair tops up: what it fills is what leaks and what it vents, less what is missing.
     held = measure.measure_hold(bench('hsv averaged', effects=effects), 20.0, power_values())
     assert held['air_kg'] > 15.0 * rate and held['pulses_per_s'] > 0.0

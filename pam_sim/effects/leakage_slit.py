@@ -1,0 +1,100 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Air lost through an orifice and a slit side by side, as through a hole and a worn seal.
+
+The flow of a slit is laminar and grows with p^2 - p_atm^2, where that of a choked orifice
+grows with p.
+"""
+
+import numpy as np
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.leakage import CRITICAL_RATIO, EFFECT as _SIBLING, flow_at_400kpa
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.parameters import Parameter
+from pam_sim.units import P_ATM_PA
+from pam_sim.valve.flow import mass_flow_kg_per_s
+
+_SQUARED = (400e3 + P_ATM_PA) ** 2 - P_ATM_PA**2
+_CONDUCTANCE, _ATMOSPHERE, _RT, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE, _SLIT = range(8)
+
+
+def _pack(values, numbers):
+    return (*_SIBLING.pack(values, numbers),
+            values['slit_flow_at_400kpa_kg_per_s'] / _SQUARED)
+
+
+def slit_share(pressure_pa):
+    """Return the flow of a slit at pressures [Pa absolute], as a share of that at 400 kPa."""
+    return np.maximum(np.square(pressure_pa) - P_ATM_PA**2, 0.0) / _SQUARED
+
+
+def _flow_at_400kpa(values, rig):
+    return flow_at_400kpa(values, rig) + values['slit_flow_at_400kpa_kg_per_s']
+
+
+def _conductance(values, rig):
+    """Return the conductance of an orifice that loses as much at 400 kPa."""
+    return _flow_at_400kpa(values, rig) / flow_at_400kpa({'conductance_m3_per_s_pa': 1.0}, rig)
+
+
+EFFECT = Effect(
+    name='leakage_slit',
+    variant_of='leakage',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    sentence='Air escapes through a hole and through a slit.',
+    source='ISO 6358 orifice; isothermal laminar flow of a gas through a narrow slit (Reynolds).',
+    equation='mdot_leak = C rho0 p psi(p_atm / p) + mdot_400 (p^2 - p_atm^2) / (p_400^2 - '
+             'p_atm^2), b = 0.5; else as leakage',
+    parameters=(
+        *_SIBLING.parameters,
+        Parameter('slit_flow_at_400kpa_kg_per_s', 'kg/s', 0.0, 0.0, 1e-3,
+                  description='Mass flow of the slit at 400 kPa gauge.'),
+    ),
+    amplitude=(*_SIBLING.amplitude, 'slit_flow_at_400kpa_kg_per_s'),
+    reported=(
+        Reported('conductance_m3_per_s_pa', 'm3/(s Pa)', _conductance),
+        Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', _flow_at_400kpa),
+    ),
+    slots=8,
+    pack=_pack,
+)
+
+
+@compiled
+def lost_kg_per_s(pressure_pa, par, k):
+    """Return the mass flow of orifice and slit [kg/s]."""
+    atmosphere_pa = par[k + _ATMOSPHERE]
+    lost = mass_flow_kg_per_s(
+        pressure_pa, atmosphere_pa, par[k + _CONDUCTANCE], CRITICAL_RATIO)
+    if pressure_pa > atmosphere_pa:
+        lost += par[k + _SLIT] * (pressure_pa - atmosphere_pa) * (pressure_pa + atmosphere_pa)
+    return lost
+
+
+@compiled
+def mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, i, par, k):
+    """Return the net flow less the leak."""
+    return flow_kg_per_s - lost_kg_per_s(pressure_pa, par, k)
+
+
+@compiled
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the pressure rate behind the PPR less the leak's share."""
+    volume = par[k + _DEAD] + volume_m3(
+        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
+    return rate_pa_per_s - par[k + _RT] / volume * lost_kg_per_s(pressure_pa, par, k)

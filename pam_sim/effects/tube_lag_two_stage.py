@@ -1,0 +1,81 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Line and pilot stage in series: two first order lags, stated as their sum.
+
+    tau (1 - s) dw/dt = u - w,  tau s dy/dt = w - y
+
+PPR: y is the set point that reaches the regulator. HSV: y is the opening of each valve.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.lag import mean_of_held, pack_held
+from pam_sim.effects.tube_lag import EFFECT as _SIBLING
+from pam_sim.parameters import Parameter
+
+_SHORTEST_S = 1e-9             # of a stage that is not there
+_SECOND = 2                    # packed values, and states, of the second stage begin here
+
+
+def _initial(values, numbers):
+    return 2 * tuple(_SIBLING.initial(values, numbers))
+
+
+def _pack(values, numbers):
+    whole_s, second = values['time_constant_s'], values['second_stage_share']
+    packed = ()
+    for share in (1.0 - second, second):
+        packed += pack_held({'time_constant_s': max(share * whole_s, _SHORTEST_S)}, numbers)
+    return packed
+
+
+EFFECT = Effect(
+    name='tube_lag_two_stage',
+    variant_of='tube_lag',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    sentence='Line and pilot stage add a lag each between command and flow.',
+    source='Two first order lags in series; design choice.',
+    equation='tau (1 - s) dw/dt = u - w, tau s dy/dt = w - y, y for u (PPR: set point; HSV: '
+             'opening of each valve)',
+    parameters=(
+        *_SIBLING.parameters,
+        Parameter('second_stage_share', '1', 0.2, 0.0, 0.5,
+                  description='Share s of the second stage in the extra time constant.'),
+    ),
+    amplitude=_SIBLING.amplitude,
+    reported=_SIBLING.reported,
+    states=4,
+    slots=4,
+    pack=_pack,
+    initial=_initial,
+    order=_SIBLING.order,
+)
+
+
+@compiled
+def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+    """Return the set point of the PPR behind both stages."""
+    first_pa = mean_of_held(set_point_pa, state, i, par, k)
+    return mean_of_held(first_pa, state, i + _SECOND, par, k + _SECOND), time_constant_s
+
+
+@compiled
+def flow_opening(fill, vent, step_s, state, i, par, k):
+    """Return the openings of the HSV pair behind both stages."""
+    fill, vent = mean_of_held(fill, state, i, par, k), mean_of_held(vent, state, i + 1, par, k)
+    return (mean_of_held(fill, state, i + _SECOND, par, k + _SECOND),
+            mean_of_held(vent, state, i + _SECOND + 1, par, k + _SECOND))

@@ -1,0 +1,69 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A poppet of a switching valve that lifts and falls at speeds of their own.
+
+The lift rises evenly over t_rise around t_open and falls over t_fall around t_close; a pulse
+that ends before it is whole opens partially and closes sooner.
+"""
+
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.valve_dead_zone import EFFECT as _SIBLING
+from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
+from pam_sim.parameters import Parameter
+
+_OPEN, _CLOSE, _RISE, _FALL = range(4)
+_EDGES = ('open_time_s', 'close_time_s')
+
+
+EFFECT = Effect(
+    name='valve_dead_zone_two_ramps',
+    variant_of='valve_dead_zone',
+    family=_SIBLING.family,
+    subsystem=_SIBLING.subsystem,
+    sentence='The on/off valves open and close late, each at a speed of its own.',
+    source='Averaged PWM opening with delays and ramps of the lift: design choice.',
+    equation='lift from 0 to 1 within t_rise around t_open, back within t_fall around d T_pwm + '
+             't_close, averaged',
+    parameters=(
+        Parameter('open_time_s', 's', 0.0, 0.0, 0.02,
+                  description='Delay from switching on to half open.'),
+        Parameter('close_time_s', 's', 0.0, 0.0, 0.02,
+                  description='Delay from switching off to half shut.'),
+        Parameter('rise_s', 's', 0.8e-3, 0.0, 0.02,
+                  description='Time the lift takes to open, at most twice its delay.'),
+        Parameter('fall_s', 's', 0.8e-3, 0.0, 0.02,
+                  description='Time the lift takes to close, at most twice its delay.'),
+    ),
+    amplitude=_EDGES,
+    reported=tuple(r for r in _SIBLING.reported if r.name in _EDGES),
+    valves=('hsv',),
+)
+
+
+@compiled
+def opening(fill, vent, period_s, state, i, par, k):
+    """Return the mean openings of the averaged pair."""
+    open_s, close_s, rise_s, fall_s = (
+        par[k + _OPEN], par[k + _CLOSE], par[k + _RISE], par[k + _FALL])
+    return (mean_opening_with_lift(fill, period_s, open_s, close_s, rise_s, fall_s),
+            mean_opening_with_lift(vent, period_s, open_s, close_s, rise_s, fall_s))
+
+
+@compiled
+def switch_times(open_s, close_s, state, i, par, k):
+    """Return the delays of the switching pair, which has no partial lift."""
+    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]
