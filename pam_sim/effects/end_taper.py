@@ -19,7 +19,7 @@ from pam_sim.effects.effect import Effect, Reported
 from pam_sim.parameters import Parameter
 
 
-def _force_change(values, rig):
+def force_change_n(values, rig):
     """Return the change of tension at 500 kPa gauge and 10 mm, N."""
     strain = 10e-3 / rig.muscle.length_m
     force_n = rig.muscle.law.law.force_n
@@ -41,7 +41,7 @@ EFFECT = Effect(
     amplitude=('k_minus_1',),
     reported=(
         Reported('k_minus_1', '-', lambda values, rig: values['k_minus_1']),
-        Reported('force_change_at_500kpa_10mm_n', 'N', _force_change),
+        Reported('force_change_at_500kpa_10mm_n', 'N', force_change_n),
     ),
 )
 

@@ -149,6 +149,8 @@ _TABLE = {
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'viscous_damping_thinning': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),
                                  Free('speed_m_per_s', 0.2, 0.02, 5.0, True, ends=())),
+    'end_taper_growing': (
+        Free('k_minus_1', 0.05, -0.3, 1.0), Free('k_per_strain', 0.2, -3.0, 3.0)),
     'bladder_stiffness_progressive': (
         Free('stiffness_n_per_m', 200.0, -2e3, 1e4), _HARDENING),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
@@ -177,7 +179,7 @@ _PPR = {'valve_dead_zone': _OVERLAP, 'valve_dead_zone_gradual': _OVERLAP}
 # Each contains another formulation of its name, adds a few per cent of its gap, and takes long.
 REFINEMENTS = {'coulomb_friction_presliding', 'pressure_friction_presliding',
                'guide_friction_presliding', 'tube_lag_two_stage',
-               'valve_dead_zone_two_ramps'}
+               'valve_dead_zone_two_ramps', 'end_taper_growing'}
 # Left is a limit of right: where both explain the data, the simpler one is named.
 LIMITS = {('coulomb_friction', 'hysteresis'), ('pressure_friction', 'hysteresis'),
           ('viscous_damping', 'creep'), ('bladder_stiffness', 'creep')}

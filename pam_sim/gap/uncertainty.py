@@ -30,7 +30,7 @@ AS_GOOD = 2.0                # times the rest of the best formulation, plus what
 AS_GOOD_SHARE = 0.01
 FORM = 1.5                   # times the amplitude of what is left, relative to the gap
 HELD = 1.5                   # times what latency and skew took up
-LEAST = 0.02                 # relative; no formulation is worth less
+LEAST = 0.03                 # relative; no formulation is worth less
 NUMERICS = 0.002             # relative, of step and interpolation
 
 

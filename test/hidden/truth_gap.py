@@ -92,18 +92,38 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
     for refit, rounds in ROUNDS.items():
         step = _fitted(left, slopes, prior, rounds)
         if rounds == 1:
-            # The slopes are those of the start; where they lead is asked once more.
-            reached = model(theta + step[:-1], fit)
-            off = {s: left[s] - (reached[s] - base[s]) - slopes[s][:, -1] * step[-1]
-                   for s in signals}
-            step = step + _fitted(off, slopes, prior + step, rounds)
+            step = _corrected(step, model, theta, fit, target, slopes, prior)
         end = model(theta + step[:-1], certify)
         truth = _scaled(certify.rows, chain, signals)
-        found[refit] = {}
-        for s in signals:
-            late = np.gradient(end[s], EVERY * sensors.ROW_S) * step[-1] * LATENCY_SD_S
-            found[refit][s] = float(np.sqrt(np.mean((truth[s] - end[s] + late) ** 2)))
+        found[refit] = {s: float(np.sqrt(np.mean((truth[s] - _late(end[s], step)) ** 2)))
+                        for s in signals}
     return found
+
+
+def _late(values, step):
+    """Return a signal later by the latency of a step."""
+    return values - np.gradient(values, EVERY * sensors.ROW_S) * step[-1] * LATENCY_SD_S
+
+
+def _corrected(step, model, theta, fit, target, slopes, prior):
+    """
+    Return a step of full weight, corrected once where it leads, if that lowers the squares.
+
+    The slopes are those of the start, and a misfit of hundreds of sigma takes numbers far.
+    """
+    def reached(at):
+        values = model(theta + at[:-1], fit)
+        with np.errstate(all='ignore'):
+            off = {s: target[s] - _late(values[s], at) for s in target}
+            squares = sum(float(np.sum(v**2)) for v in off.values())
+        return off, squares + float(np.sum((prior + at) ** 2))
+
+    off, squares = reached(step)
+    while not np.isfinite(squares):             # no rig has such numbers
+        step = 0.5 * step
+        off, squares = reached(step)
+    further = step + _fitted(off, slopes, prior + step, 1)
+    return further if reached(further)[1] < squares else step
 
 
 def _fitted(left, slopes, prior, rounds):

@@ -90,6 +90,23 @@ def test_a_tube_that_stiffens_is_stated_as_its_secant():
     assert np.allclose(soft.force_n, spring.force_n, atol=2e-3)
 
 
+def test_ends_that_taper_more_at_a_larger_strain_are_stated_at_10_mm():
+    growing = {'k_minus_1': 0.05, 'k_per_strain': 0.6}
+    rig = load_rig('dmsp_5_300_driven')
+    stated = effects()['end_taper_growing'].report(growing, rig)
+    k_there = 0.05 + 0.6 * 10e-3 / rig.muscle.length_m
+    assert stated['k_minus_1'][0] == pytest.approx(k_there)
+    assert stated['force_change_at_500kpa_10mm_n'] == effects()['end_taper'].report(
+        {'k_minus_1': k_there}, rig)['force_change_at_500kpa_10mm_n']
+    # There it is the constant factor of that size; behind it, it takes more.
+    change = [driven((name, values)).force_n - driven().force_n for name, values in (
+        ('end_taper_growing', growing), ('end_taper', {'k_minus_1': k_there}))]
+    there = np.argmin(np.abs(TRIANGLE_M - 10e-3))
+    assert change[0][there] == pytest.approx(change[1][there], rel=1e-6)
+    far = TRIANGLE_M > 10.1e-3
+    assert np.all(change[0][far] < change[1][far]) and np.all(change[1][far] < 0.0)
+
+
 def test_a_spring_that_stiffens_is_read_by_the_load_cell():
     values = {'stiffness_n_per_m': 150.0, 'hardening_m': 0.03}
     rig, response = hanging(('parallel_spring_progressive', values))

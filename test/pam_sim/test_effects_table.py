@@ -55,6 +55,7 @@ muscle slow creep relaxing_stiffness_n_per_m creep_fraction_at_400kpa
 muscle slow thermal_softening gain_loss_at_20mm_per_s
 muscle static_map threshold_pressure pressure_pa
 muscle static_map end_taper k_minus_1 force_change_at_500kpa_10mm_n
+muscle static_map end_taper_growing k_minus_1 force_change_at_500kpa_10mm_n
 muscle static_map bladder_stiffness stiffness_n_per_m
 muscle static_map bladder_stiffness_progressive stiffness_n_per_m
 load friction guide_friction force_n
