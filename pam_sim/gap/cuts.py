@@ -22,12 +22,14 @@ faster than the whole. A sensor effect on a measured input is taken out of it.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 import threading
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.free_run import (
-    FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, simulate_driven, true_value)
+    FAST_GAIN_PA_PER_V, FAST_T_S, GRID_S, pressure_driven, sensor_changes, simulate_driven,
+    true_value, undone)
 from pam_sim.gap.noise import noise_of, noise_sd, sensor_floor, SMALLEST, STAMP_SD_S
 from pam_sim.gap.parts import part_of
 from pam_sim.gap.result import FIELD, SIGNALS
@@ -43,6 +45,7 @@ SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
 START_MAX_SD = 10.0
 COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
+KEPT = 16                    # inputs and instants that many simulations in a row share
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,7 @@ class Cut:
 
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self.recordings = recordings
+        self._place = lru_cache(maxsize=KEPT)(self._place_of)
         self.signals = tuple(s for s in SIGNALS
                              if any(s in self.outputs(r) for r in recordings))
         self.level = 1.0
@@ -154,11 +158,17 @@ class Cut:
                 self.simulations += 1
             for name in instants:
                 late = numbers.get(of_run('force_skew', index), 0.0) if name == 'force' else 0.0
-                place = np.clip((instants[name] - late) / GRID_S, 0.0, len(response) - 1.001)
-                row = place.astype(int)
+                row, ahead = self._place(index, name, late, len(response))
                 value = getattr(response, FIELD[name])
-                found.append(value[row] + (place - row) * (value[row + 1] - value[row]))
+                before = value[row]
+                found.append(before + ahead * (value[row + 1] - before))
         return np.concatenate(found)
+
+    def _place_of(self, index, name, late_s, count):
+        """Return (row before every instant that is compared, steps from there)."""
+        place = np.clip((self._index[index][name] - late_s) / GRID_S, 0.0, count - 1.001)
+        row = place.astype(int)
+        return row, place - row
 
     def chi2(self, errors, part):
         """Return the mean squared error in a part, each signal with the same weight."""
@@ -198,6 +208,8 @@ class ValveCut(Cut):
 
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self._shift_s = None
+        self._signal = lru_cache(maxsize=KEPT)(
+            lambda index, late_s: recordings[index].valve_signal(late_s))
         self._motion = [_smooth(r, 'contraction') for r in recordings]
         super().__init__(rig, recordings, own_proof, seed)
 
@@ -235,6 +247,7 @@ class ValveCut(Cut):
         p = self._start[index]['pressure'] + numbers.get(of_run('start_error', index), 0.0)
         return simulate_driven(
             rig.with_(effects=kept), recording, x,
+            self._signal(index, numbers[of_run('latency', index)]) if shift is None else
             recording.valve_signal(numbers[of_run('latency', index)], shift),
             true_value('pressure', rig, p, 0.0))
 
@@ -246,6 +259,7 @@ class MechanicsCut(Cut):
 
     def __init__(self, rig, recordings, own_proof=True, seed=0):
         self._noise_pa = [0.0] * len(recordings)
+        self._command = lru_cache(maxsize=KEPT)(self._command_of)
         self._noise = [noise_of(r.time_s['pressure'], r.measured['pressure'])
                        for r in recordings]
         self._pressure = [tuple(np.interp(r.time_s['pressure'], r.grid_s, y)
@@ -274,18 +288,21 @@ class MechanicsCut(Cut):
             np.interp(r.time_s['pressure'], r.time_s['pressure'][::2],
                       r.measured['pressure'][::2]) - r.measured['pressure']
             for r in self.recordings]
+        self._command.cache_clear()
         found = super()._coarse(rig)
         self._disturb(None)
         return found
 
     def _disturb(self, random):
+        self._command.cache_clear()
         self._noise_pa = [0.0 if random is None else noise.draw(r.time_s['pressure'], random)
                           for r, noise in zip(self.recordings, self._noise)]
 
     def _simulate(self, rig, index, numbers):
         recording = self.recordings[index]
         rig = pressure_driven(rig)
-        command = self._command(rig, index, numbers[of_run('pressure_skew', index)])
+        command = self._command(index, numbers[of_run('pressure_skew', index)],
+                                sensor_changes('pressure', rig))
         start = max(true_value('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
         if recording.driven:
             x = np.interp(recording.grid_s, recording.time_s['contraction'],
@@ -296,12 +313,12 @@ class MechanicsCut(Cut):
             command, external_force_n=recording.external_force_n, initial_pressure_pa=start,
             initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S)
 
-    def _command(self, rig, index, skew_s):
+    def _command_of(self, index, skew_s, changes):
         """Return the voltage at which the stand-in for the valve gives the measured pressure."""
         recording = self.recordings[index]
         time_s, rate = recording.time_s['pressure'], self._pressure[index][1]
-        p = true_value(
-            'pressure', rig, recording.measured['pressure'] + self._noise_pa[index], rate)
+        p = undone('pressure', changes,
+                   recording.measured['pressure'] + self._noise_pa[index], rate)
         # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
         at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
         command = (np.interp(at, time_s, p) - P_ATM_PA) / FAST_GAIN_PA_PER_V

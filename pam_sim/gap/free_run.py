@@ -225,17 +225,27 @@ def true_value(signal, rig, value, rate):
         What is read, and how fast that changes [1/s].
 
     """
+    return undone(signal, sensor_changes(signal, rig), value, rate)
+
+
+def sensor_changes(signal, rig):
+    """Return (bias, gain error, lag in s) of the sensor of a signal; None for what is not there."""
     settings = {e.name: e.parameters for e in rig.effects}
+    return tuple(
+        next(iter(settings[f'{signal}_{change}'].values()))
+        if settings.get(f'{signal}_{change}') else None for change in ('bias', 'gain', 'lag'))
+
+
+def undone(signal, changes, value, rate):
+    """Return what a reading means, given the ``sensor_changes``; other arguments see above."""
+    bias, gain_error, lag_s = changes
     zero = P_ATM_PA if signal == 'pressure' else 0.0
-    bias = settings.get(f'{signal}_bias')
-    if bias:
-        value = value - next(iter(bias.values()))
-    gain = settings.get(f'{signal}_gain')
-    if gain:
-        value = zero + (value - zero) / (1.0 + gain['gain_error'])
-    lag = settings.get(f'{signal}_lag')
-    if lag:
-        value = value + lag['time_constant_s'] * rate
+    if bias is not None:
+        value = value - bias
+    if gain_error is not None:
+        value = zero + (value - zero) / (1.0 + gain_error)
+    if lag_s is not None:
+        value = value + lag_s * rate
     return value
 
 
