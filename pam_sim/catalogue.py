@@ -122,9 +122,11 @@ def _module(kind, module, **more):
 
 def _effect(effect):
     nominal = effect.values()
-    rig = Rig('nominal', 'hanging_mass')
+    found = {}
+    for valve in effect.valves:
+        found |= effect.report(nominal, Rig('nominal', 'hanging_mass', valve=valve))
     reported = [{'name': name, 'unit': unit, 'nominal': value}
-                for name, (value, unit) in effect.report(nominal, rig).items()]
+                for name, (value, unit) in found.items()]
     return _entry(
         'effect', effect.name, effect.sentence, effect.equation, effect.source,
         effect.parameters, subsystem=effect.subsystem, family=effect.family,

@@ -59,11 +59,16 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Reported:
-    """A quantity a result states for an effect; ``function(values, rig)`` computes it."""
+    """
+    A quantity a result states for an effect; ``function(values, rig)`` computes it.
+
+    ``valves`` are the types of valve for which it means something.
+    """
 
     name: str
     unit: str
     function: object
+    valves: tuple = ('ppr', 'hsv')
 
 
 def _pack_in_order(values, numbers):
@@ -187,5 +192,6 @@ class Effect:
         state[i + len(first):i + self.states] = 0.0
 
     def report(self, values, rig):
-        """Return reported name -> (value, unit) for a rig."""
-        return {item.name: (item.function(values, rig), item.unit) for item in self.reported}
+        """Return reported name -> (value, unit) for a rig; all of them without one."""
+        return {item.name: (item.function(values, rig), item.unit) for item in self.reported
+                if rig is None or rig.valve in item.valves}

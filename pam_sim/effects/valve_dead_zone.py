@@ -52,9 +52,9 @@ EFFECT = Effect(
     ),
     amplitude=('half_width_pa', 'open_time_s', 'close_time_s'),
     reported=(
-        Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),
-        Reported('open_time_s', 's', lambda values, rig: values['open_time_s']),
-        Reported('close_time_s', 's', lambda values, rig: values['close_time_s']),
+        Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa'], ('ppr',)),
+        Reported('open_time_s', 's', lambda values, rig: values['open_time_s'], ('hsv',)),
+        Reported('close_time_s', 's', lambda values, rig: values['close_time_s'], ('hsv',)),
     ),
     active=_active,
 )

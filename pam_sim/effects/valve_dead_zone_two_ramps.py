@@ -26,7 +26,6 @@ from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.parameters import Parameter
 
 _OPEN, _CLOSE, _RISE, _FALL = range(4)
-_EDGES = ('open_time_s', 'close_time_s')
 
 
 EFFECT = Effect(
@@ -48,8 +47,8 @@ EFFECT = Effect(
         Parameter('fall_s', 's', 0.8e-3, 0.0, 0.02,
                   description='Time the lift takes to close, at most twice its delay.'),
     ),
-    amplitude=_EDGES,
-    reported=tuple(r for r in _SIBLING.reported if r.name in _EDGES),
+    amplitude=('open_time_s', 'close_time_s'),
+    reported=tuple(r for r in _SIBLING.reported if 'hsv' in r.valves),
     valves=('hsv',),
 )
 

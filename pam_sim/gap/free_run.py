@@ -229,7 +229,7 @@ def true_value(signal, rig, value, rate):
 
 
 def sensor_changes(signal, rig):
-    """Return (bias, gain error, lag in s) of the sensor of a signal; None for what is not there."""
+    """Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none."""
     settings = {e.name: e.parameters for e in rig.effects}
     return tuple(
         next(iter(settings[f'{signal}_{change}'].values()))

@@ -134,6 +134,13 @@ def test_two_equal_ramps_are_the_gradual_dead_zone(fidelity):
     assert np.array_equal(one.simulate(signal).pressure_pa, two.simulate(signal).pressure_pa)
 
 
+def test_a_dead_zone_states_what_its_valve_has():
+    for name in ('valve_dead_zone', 'valve_dead_zone_gradual'):
+        effect = effects()[name]
+        assert set(effect.report(effect.values(), held('ppr'))) == {'half_width_pa'}
+        assert set(effect.report(effect.values(), held('hsv'))) == {'open_time_s', 'close_time_s'}
+
+
 def test_gradual_dead_zone_of_the_regulator_is_slow_near_the_set_point():
     width_pa, start = 4e3, P_ATM_PA + 300e3
     rig = held('ppr', ('valve_dead_zone_gradual', {'half_width_pa': width_pa}))
