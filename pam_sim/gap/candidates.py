@@ -118,9 +118,11 @@ _BENDING = (Free('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
             Free('static_excess', 0.05, 0.0, 0.6))
 _HARDENING = Free('hardening_m', 0.1, 0.01, 1.0, True, ends=())
 _RATES = (4e5, 1e6, 2.5e6)
+# What comes this late in quick motion is not a multiple of what comes a little late.
+_LATE_S = (0.01, 0.002)
 _TABLE = {
-    'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3),),
-    'tube_lag': (Free('time_constant_s', 0.01, 0.0, 0.5),),
+    'valve_dead_time': (Free('delay_s', 0.01, 0.0, 0.3, starts=_LATE_S),),
+    'tube_lag': (Free('time_constant_s', 0.01, 0.0, 0.5, starts=_LATE_S),),
     'tube_lag_two_stage': (Free('time_constant_s', 0.01, 0.0, 0.5),
                            Free('second_stage_share', 0.2, 0.02, 0.5, True, ends=())),
     'valve_hysteresis': (Free('half_width_pa', 2e3, 0.0, 5e4),),
@@ -163,8 +165,8 @@ _TABLE = {
     'guide_friction_presliding': (Free('force_n', 1.0, 0.0, 50.0), *_BENDING),
     'parallel_spring_progressive': (Free('stiffness_n_per_m', 300.0, 0.0, 1e4), _HARDENING),
     'smooth_friction': _level_and(Free('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=())),
-    'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
-    'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2),),
+    'pressure_lag': (Free('time_constant_s', 0.01, 0.0, 0.2, starts=_LATE_S),),
+    'contraction_lag': (Free('time_constant_s', 0.01, 0.0, 0.2, starts=_LATE_S),),
 }
 # Their difference is added up by the valve, pulse by pulse; their sum is hardly seen.
 _TRIED = (1e-3, 1e-4, 0.0)
