@@ -259,12 +259,9 @@ class Search(Finish):
         rivals += side_by_side(lambda name: self._rival(self.problem.fit(Hypothesis(
             current.hypothesis.effects, (*current.hypothesis.freed, name)),
             current.theta, current, whole=False), name), pulled)
-        # Before that, a gap near the noise may have no share to contend for.
-        self.set_levels(rivals, cuts)
+        contending = self._names_that_contend(rivals, current, cuts)
         had = self.choice.shares(current)
         had = {c.subsystem: had[c.subsystem] for c in cuts}
-        contending = set().union(*(
-            self._contending(rivals, s, before) for s, before in had.items()))
         fitted = [s.candidate for s in chosen]
         rivals += self._fit_all(current, [
             s for s in screened
@@ -296,6 +293,24 @@ class Search(Finish):
                 values = plain.found.values()[place]
                 found.append(Screened(c, tuple(
                     f.coordinate(values.get(f.name, f.scale)) for f in c.free), {}))
+        return found
+
+    def _names_that_contend(self, rivals, current, cuts):
+        """
+        Return the names that contend for a cut, at the level of noise that the rivals reach.
+
+        At a higher one a gap near the noise has no share to contend for.
+        """
+        levels = [cut.level for cut in cuts]
+        self.set_levels(rivals, cuts)
+        had = self.choice.shares(current)
+        found = set().union(*(
+            self._contending(rivals, c.subsystem, had[c.subsystem]) for c in cuts))
+        # What is refined is judged at the level from before: the best of it is not perfect.
+        for cut, level in zip(cuts, levels):
+            cut.level = level
+        for r in rivals:
+            r.share = self.choice.shares(r.found)
         return found
 
     @staticmethod
