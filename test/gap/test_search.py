@@ -177,6 +177,36 @@ def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, b
         [(bending, (2.5, 0.0, 1.0))] if tried else [])
 
 
+def test_names_contend_at_the_level_that_rivals_reach_and_are_refined_at_the_one_before():
+    """A gap below the floor has names, and the best of two that refine no rest of zero."""
+    cut = types.SimpleNamespace(subsystem='valve', level=1.0, chi2=lambda errors, part: errors)
+    base, rests = 0.99, {'leakage': 0.95, 'pressure_bias': 0.96, 'tube_lag': 0.985}
+
+    def shares(found):
+        whole = base - cut.level
+        return {'valve': min((base - found.errors['valve']) / whole, 1.0) if whole > 0.0 else 0.0}
+
+    rivals = [Rival(name, types.SimpleNamespace(errors={'valve': rest}), {'valve': 0.0})
+              for name, rest in rests.items()]
+    search = types.SimpleNamespace(
+        choice=types.SimpleNamespace(shares=shares), _contending=Search._contending)
+    search.set_levels = types.MethodType(Search.set_levels, search)
+    current = types.SimpleNamespace(errors={'valve': base})
+    assert Search._names_that_contend(search, rivals, current, [cut]) == {
+        'leakage', 'pressure_bias'}
+    assert cut.level == 1.0 and [r.share['valve'] for r in rivals] == [0.0, 0.0, 0.0]
+
+
+def test_two_frictions_over_a_narrow_band_stay_together():
+    """Both are tried with their bristles, else the first that is wins by them."""
+    rig = nominal().with_(effects=[{'name': 'pressure_friction_presliding', 'parameters': {
+        'force_at_400kpa_n': 0.9, 'presliding_m': 1.5e-5, 'static_excess': 0.1}}])
+    t = np.arange(20000) * 1e-3
+    voltage = 4.0 + 0.15 * np.sin(2.0 * np.pi * 0.7 * t) + 0.1 * np.sin(2.0 * np.pi * 0.23 * t)
+    result = find_gap(recorded(rig, voltage), nominal())
+    assert set(result.ambiguity_set) >= {'coulomb_friction', 'pressure_friction'}
+
+
 def test_a_refinement_alone_is_one_to_begin_with():
     pool = candidates(nominal(), ('contraction',))
     first, refinements = split_refinements(pool)
