@@ -35,7 +35,7 @@ EFFECT = Effect(
     subsystem=_SIBLING.subsystem,
     sentence='The on/off valves open and close late, each at a speed of its own.',
     source='Averaged PWM opening with delays and ramps of the lift: design choice.',
-    equation='lift from 0 to 1 within t_rise around t_open, back within t_fall around d T_pwm + '
+    equation='lift: 0 -> 1 within t_rise around t_open, 1 -> 0 within t_fall around d T_pwm + '
              't_close, averaged',
     parameters=(
         Parameter('open_time_s', 's', 0.0, 0.0, 0.02,

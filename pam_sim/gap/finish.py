@@ -65,14 +65,18 @@ class Finish:
     The last stage of a search; a part of ``Search``, with its fits, gaps and choice.
 
     It needs ``problem``, ``outputs``, ``pool``, ``choice``, ``base``, ``seen_gap``,
-    ``first_gap``, ``least_gap``, ``matters``, ``_swapped``, ``_is_open``, ``_explained`` and
-    ``_cut`` of it; ``mistaken`` gets the relatives that fit better than a name.
+    ``first_gap``, ``least_gap``, ``matters``, ``_swapped``, ``_other_formulations``, ``_is_open``,
+    ``_explained`` and ``_cut`` of it; ``mistaken`` gets the relatives that fit better than a name.
     """
 
     def _finished(self, current, named):
         """Return (fit, what stays named, share explained by cut): only what is needed stays."""
+        before = len(current.hypothesis.effects)
         current, named = self._eliminate(current, named)
         current, named = self._established(*self._resolve(current, named))
+        if len(current.hypothesis.effects) < before:
+            # What went stood for what the form of another effect leaves.
+            current = self._other_formulations(current, always=True)
         current = self._straightened(current)
         explained = self._explained(current)
         poor = {c.subsystem for c in self.problem.cuts if self._is_poor(c, current, explained)}

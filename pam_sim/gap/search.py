@@ -397,10 +397,14 @@ class Search(Finish):
             return near
         return self.problem.fit(Hypothesis(effects, freed), theta, current)
 
-    def _other_formulations(self, current):
-        """Return the fit with each effect in the formulation that suits the others best."""
+    def _other_formulations(self, current, always=False):
+        """
+        Return the fit with each effect in the formulation that suits the others best.
+
+        Only while something is left to explain, unless ``always``.
+        """
         for place in range(len(current.hypothesis.effects)):
-            if not any(self._is_open(c, current) for c in self.problem.cuts):
+            if not always and not any(self._is_open(c, current) for c in self.problem.cuts):
                 break
             h = current.hypothesis
             old = h.effects[place]
