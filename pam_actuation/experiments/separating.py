@@ -38,6 +38,7 @@ from pam_sim.gap.compare import gap, preference, share
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
+from pam_sim.gap.parts import SELECT
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.units import P_ATM_PA
 
@@ -171,6 +172,10 @@ def separation(run, rig, rivals, with_force):
                           rig.load != 'hanging_mass')
     problem = Problem(rig, cuts_of(rig, [recording], own_proof=False))
     first, *others = (problem.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
+    for cut in problem.cuts:
+        # As in the search: where the floor is careful, gaps would begin above what the truth left.
+        s = cut.subsystem
+        cut.level = min([cut.level] + [cut.chi2(f.errors[s], SELECT) for f in (first, *others)])
     nearest = decided = np.inf
     for other in others:
         nearest = min(nearest, np.sqrt(sum(
