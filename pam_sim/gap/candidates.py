@@ -151,10 +151,13 @@ _TABLE = {
     'viscous_damping': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
     'viscous_damping_thinning': (Free('damping_n_s_per_m', 20.0, -200.0, 1000.0),
                                  Free('speed_m_per_s', 0.2, 0.02, 5.0, True, ends=())),
+    # What is missing takes force; one that gives some would be an error of the force map.
+    'threshold_pressure': (Free('pressure_pa', 10e3, 0.0, 2e5),),
+    'bladder_stiffness': (Free('stiffness_n_per_m', 200.0, 0.0, 1e4),),
     'end_taper_growing': (
         Free('k_minus_1', 0.05, -0.3, 1.0), Free('k_per_strain', 0.2, -3.0, 3.0)),
     'bladder_stiffness_progressive': (
-        Free('stiffness_n_per_m', 200.0, -2e3, 1e4), _HARDENING),
+        Free('stiffness_n_per_m', 200.0, 0.0, 1e4), _HARDENING),
     'creep': (Free('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
               Free('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
               Free('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
