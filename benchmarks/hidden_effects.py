@@ -121,7 +121,8 @@ def examine(cases, work, args):
     if args.rivals:
         from hidden_rivals import METHODS
         for name in METHODS:
-            found = each(args, name, other, [(work / c.name, name) for c in cases[:args.rivals]])
+            found = each(args, name, other, [
+                (work / c.name, name) for c in cases[:args.rivals]], args.jobs)
             rivals[name] = [(c.name, one) for c, one in zip(cases, found)]
     answers = {c.name: read(work / c.name / 'answer.json') for c in cases}
     keys = truth_key.open_keys(work, answers, [c.name for c in cases])
