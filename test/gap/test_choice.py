@@ -130,6 +130,17 @@ def test_an_experiment_must_decide_in_many_places():
     assert decided(truth, rivals, few) < 1.0 <= decided(truth, rivals, many)
 
 
+def test_an_experiment_decides_by_what_the_truth_leaves_not_by_a_floor_above_it():
+    """Rivals of nearly one form: what both leave of many steps is below a careful floor."""
+    names = ('valve_dead_time', 'tube_lag_two_stage')
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    starts = {n: [f.coordinate(f.scale) for f in by_name[n].free] for n in names}
+    rivals = [(n, None, Hypothesis((by_name[n],)), starts[n]) for n in names]
+    truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.0087})])
+    steps = np.repeat(np.random.default_rng(4).uniform(3.2, 5.6, 24), 700)
+    assert decided(truth, rivals, steps) > 0.2
+
+
 def decided(truth, rivals, voltage):
     run = recorded(truth, voltage, topics=('pressure', 'contraction'))
     return separation(run, nominal(), rivals, False)[1]

@@ -21,6 +21,7 @@ from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.screen import screen
+import pytest
 
 
 def screened(rig, given, valve_signal):
@@ -53,3 +54,11 @@ def test_switching_times_are_tried_one_by_one():
     mine = next(s for s in found if s.candidate.effect == 'valve_dead_zone')
     opening, closing = mine.start
     assert mine.promise['valve'] > 0.8 and opening > 0.0 and closing == 0.0
+
+
+@pytest.mark.parametrize('name', ['threshold_pressure', 'bladder_stiffness'])
+def test_what_is_missing_takes_force_and_gives_none(name):
+    """A bias of the pressure has a sign; what it looks like with the other one is no rival."""
+    for candidate in candidates(nominal(), ('pressure', 'contraction')):
+        if candidate.name == name:
+            assert candidate.amplitudes[0].value(-1.0) == 0.0
