@@ -194,17 +194,19 @@ class Problem:
 
         Its shapes are held: a size that is known only together with a shape is none the less
         there. The numbers that could stand in for it stay within their ranges: a latency is
-        no longer than the longest. Infinite for an effect of shapes alone, of which no value
-        inside its range means none.
+        no longer than the longest. An effect of shapes alone, of which no value means none, is
+        as certain as the best known of them, in relation to itself: a reservoir that may as well
+        be twice as large is none that empties.
         """
         own = self._own()
         own._slopes_at(found)
         effect, first = found.hypothesis.effects[place], found.hypothesis.rows(place).start
         held = [first + j for j, f in enumerate(effect.free) if f.shape]
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
-        if not size:
-            return np.inf
         touched = self._touched(found.hypothesis)
+        if not size:
+            _, *covariances = own._covariances(found, touched)
+            return min(1.0 / np.sqrt(np.diag(c)[held].min()) for c in covariances)
         _, *covariances = own._covariances(found, touched, held)
         search = Solver(own, found.hypothesis, touched, dict(found.temper))
         x = search.join(found.theta, found.known_z)

@@ -18,6 +18,7 @@ from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_sim.gap.candidates import candidates
 from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.finish import CERTAIN_SIZE
 from pam_sim.gap.fit import Problem
 from pam_sim.gap.free_run import Recording
 from pam_sim.gap.hypothesis import Hypothesis
@@ -62,3 +63,19 @@ def test_the_other_cut_stays_as_it_was_and_the_fit_is_the_same(problem):
     assert part.theta[0] == one.theta[0] and part.known_z['valve'] is one.known_z['valve']
     assert part.theta == pytest.approx(whole.theta, rel=0.02)
     assert problem.cost(part) == pytest.approx(problem.cost(whole), rel=0.01)
+
+
+@pytest.mark.parametrize('reservoir_m3, certain', [(None, False), (2e-3, True)])
+def test_a_reservoir_that_may_as_well_be_twice_as_large_is_not_certain(reservoir_m3, certain):
+    """Of shapes alone no value means none; how well one is known tells."""
+    given = nominal().with_(valve='hsv')
+    effects = [] if reservoir_m3 is None else [
+        {'name': 'supply_droop', 'parameters': {'reservoir_volume_m3': reservoir_m3}}]
+    duty = np.repeat(np.random.default_rng(3).uniform(-0.5, 0.5, 30), 500)
+    run = recorded(given.with_(effects=effects), np.column_stack(
+        [np.clip(duty, 0.0, 1.0), np.clip(-duty, 0.0, 1.0)]))
+    droop = next(c for c in candidates(given, ('pressure', 'contraction', 'force'))
+                 if c.effect == 'supply_droop')
+    problem = Problem(given, cuts_of(given, [Recording(run, 'hsv')]))
+    found = problem.fit(Hypothesis((droop,)), [droop.free[0].coordinate(0.01)])
+    assert (problem.certainty(found, 0) > CERTAIN_SIZE) == certain
