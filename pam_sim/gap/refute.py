@@ -67,10 +67,13 @@ def refute(named, problem, base, final, proof, whole):
         gone = {name for name in runs if name != best and _contradicted(
             proof, runs[name], runs[best], before)}
         names = tuple(n for n in w.names if n not in gone)
-        if w.name in gone:
-            final = fits[names[0]]
-            w = replace(w, name=names[0],
-                        formulations=[r for r in w.rivals if r.name == names[0]])
+        # The recordings hardly tell them apart: where the certify data do not find the first
+        # again, but another, that one is likelier.
+        if w.name in gone or (runs and proof.fall(before, runs[w.name])[0] < CONFIRMED
+                              and _is_found_again(proof, before, runs[best])):
+            names = (best, *(n for n in names if n != best))
+            final = fits[best]
+            w = replace(w, name=best, formulations=[r for r in w.rivals if r.name == best])
         kept.append(replace(w, names=names))
     return kept, final
 
@@ -89,17 +92,21 @@ def unconfirmed(named, problem, base, final, proof, whole):
     name : str or None
         None where the squared errors fall with every name by more than ``CONFIRMED`` of what it
         moves, the other names in the model. One that moves nothing that could be seen there, or
-        less than what all of them leave, is not judged.
+        less than what all of them leave, or of which stamps and the start may hide the fall, is
+        not judged.
     without : Found
         The other names, everything refitted; the final model where there is no such name.
 
     """
     fits = {w.name: _less(w.name, problem, base, final) for w in named}
-    told = {name: proof.fall(proof.run(fit, whole), proof.after) for name, fit in fits.items()}
+    runs = {name: proof.run(fit, whole) for name, fit in fits.items()}
+    told = {name: proof.fall(run, proof.after) for name, run in runs.items()}
     # Beside a large effect whose form leaves more than that, a small one cannot be judged.
     least = max(VISIBLE, proof.left() if len(named) > 1 else 0.0)
+    # Were it true, the fall would be 1, but for what stamps and start move.
     against = {name: fell for name, (fell, apart) in told.items()
-               if fell < CONFIRMED and apart > least}
+               if fell < CONFIRMED and apart > least
+               and 1.0 - fell > CERTAIN_T * proof.doubt(runs[name], proof.after)}
     if not against:
         return None, final
     name = min(against, key=against.get)
@@ -113,6 +120,12 @@ def _contradicted(proof, run, best, before):
     # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
     return (fell > REFUTED and apart > max(VISIBLE, form)
             and fell + 1.0 > CERTAIN_T * proof.doubt(run, best))
+
+
+def _is_found_again(proof, before, run):
+    """Return whether the squares fall with a run, by what can be seen."""
+    fell, apart = proof.fall(before, run)
+    return fell >= CONFIRMED and apart > VISIBLE
 
 
 def _squares_saved(proof, before, run):

@@ -50,6 +50,10 @@ class Screened:
     size: dict = field(default_factory=dict)
     flat: 'Screened' = None
 
+    def at_typical_size(self):
+        """Return the same from the typical size of everything that is fitted."""
+        return replace(self, start=tuple(f.coordinate(f.scale) for f in self.candidate.free))
+
 
 def screen(problem, near, found):
     """

@@ -28,7 +28,7 @@ from pam_sim.gap.candidates import candidates, LIMITS, split_refinements
 from pam_sim.gap.choice import Choice, CLOSE, least_gain, RIVAL, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
-from pam_sim.gap.finish import Finish, NAMED
+from pam_sim.gap.finish import CLEAR, Finish, NAMED
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.pairs import pair_of
 from pam_sim.gap.parts import FIT, SELECT
@@ -262,15 +262,28 @@ class Search(Finish):
         contending = self._names_that_contend(rivals, current, cuts)
         had = self.choice.shares(current)
         had = {c.subsystem: had[c.subsystem] for c in cuts}
-        fitted = [s.candidate for s in chosen]
-        rivals += self._fit_all(current, [
-            s for s in screened
-            if s.candidate.name in contending and s.candidate not in fitted])
+        fitted, screened = [s.candidate for s in chosen], [
+            s for s in screened if s.candidate.name in contending]
+        rivals += self._fit_all(current, [s for s in screened if s.candidate not in fitted])
+        rivals += self._fit_all(current, self._other_starts(rivals, screened, cuts))
         rivals += self._fit_all(current, self._refined(
             rivals, refinements, had, len(current.hypothesis.effects)))
         self.fitted = rivals
         self.set_levels(rivals, cuts)
         return self._best_of_name(rivals)
+
+    @staticmethod
+    def _other_starts(rivals, contending, cuts):
+        """
+        Return what contends, from its typical size, where all leave a clear part of a gap.
+
+        A fit from the best linear guess may have stopped in a valley beside its best.
+        """
+        poor = [c.subsystem for c in cuts if all(
+            r.share[c.subsystem] < NAMED and gap(c, r.found.errors[c.subsystem]) > CLEAR
+            for r in rivals)]
+        return [q.at_typical_size() for q in contending
+                if any(acts_on(q.candidate.effect, s) for s in poor)]
 
     @staticmethod
     def _refined(rivals, refinements, before, place):
@@ -282,8 +295,9 @@ class Search(Finish):
         """
         chosen = []
         for s, had in before.items():
+            # What turns into another effect there is no rival of what that one's forms explain.
             least = max([NAMED, had + RIVAL * (1.0 - had)] + [
-                1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals])
+                1.0 - REFINABLE * (1.0 - r.share[s]) for r in rivals if not r.at_edge])
             chosen += [r for r in rivals if r.share[s] >= least and r not in chosen]
         found = []
         for c in refinements:

@@ -41,6 +41,8 @@ def found_of(*names):
 @pytest.mark.parametrize('moved, apart, drift, left', [
     (2.0, 1.5, 0.1, NAMES[1:]),       # another course altogether
     (2.0, 1.5, 3.0, NAMES),           # the valve drifts that way by itself, too
+    (1.0, 1.5, 3.0, NAMES[::-1]),     # and the errors fall with the other one alone
+    (0.2, 1.5, 3.0, NAMES),           # by nothing that can be seen
     (20.0, 1.5, 0.1, NAMES),          # no formulation is that true
     (0.5, 0.2, 0.1, NAMES)])          # nothing can be seen
 def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart, drift, left):
@@ -87,11 +89,16 @@ def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
     proof.run = lambda found, whole: {
         'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
     proof.after = proof.run(found_of(*NAMES), True)
+    proof.drift = [{'contraction': 0.0 * truth}]
     named = [Named(n, 'muscle', [], (n,)) for n in NAMES]
     final = found_of(*NAMES)
     name, left = unconfirmed(named, Refitted(), found_of(), final, proof, True)
     assert name == spurious
     assert left.hypothesis.names == tuple(n for n in NAMES if n != spurious)
+    # Where the valve may drift that way by itself, the fall tells nothing.
+    proof.drift = [{'contraction': sign * drift} for sign in (-1.0, 1.0)]
+    assert unconfirmed(named, Refitted(), found_of(), final, proof, True) == (None, final)
+    proof.drift = [{'contraction': 0.0 * truth}]
     # Beside what leaves far more, a small one is not judged.
     Given.measured = {'contraction': truth + noise + 50.0 * np.sin(7.0 * time_s)}
     assert unconfirmed(named, Refitted(), found_of(), final, proof, True) == (None, final)

@@ -177,6 +177,40 @@ def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, b
         [(bending, (2.5, 0.0, 1.0))] if tried else [])
 
 
+@pytest.mark.parametrize('stiffness_n_per_m, tried', [
+    (1e4, True),            # bristles that stiff are dry friction in another form
+    (1e3, False)])          # and a loop that wide is an effect of its own
+def test_a_limit_keeps_nothing_from_being_refined(stiffness_n_per_m, tried):
+    by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
+    plain, loop = by_name['pressure_friction'], by_name['hysteresis_lugre']
+    values = {'force_n': 0.0, 'force_per_pa': 7.4e-7, 'stiffness_n_per_m': stiffness_n_per_m}
+    rivals = [
+        Rival('pressure_friction', Found(
+            Hypothesis((plain,)), np.array([0.3]), {}, {}, {}), {'muscle': 0.985}),
+        Rival('hysteresis', Found(Hypothesis((loop,)), np.array(
+            [f.coordinate(values[f.name]) for f in loop.free]), {}, {}, {}), {'muscle': 0.9988})]
+    refined = Search._refined(
+        rivals, [by_name['pressure_friction_presliding']], {'muscle': 0.0}, 0)
+    assert [s.candidate.effect for s in refined] == ['pressure_friction_presliding'] * tried
+
+
+@pytest.mark.parametrize('best, left, again', [
+    (0.74, 26.0, True),
+    (0.74, 0.3, False),         # of a gap near the noise nothing much is left
+    (0.95, 26.0, False)])
+def test_what_contends_is_fitted_from_elsewhere_where_all_leave_much(best, left, again):
+    pool = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    delay = pool['valve_dead_time']
+    cuts = [types.SimpleNamespace(subsystem=s, level=1.0, chi2=lambda errors, part: 1.0 + errors)
+            for s in ('valve', 'muscle')]
+    found = types.SimpleNamespace(errors={'valve': left, 'muscle': left})
+    rivals = [Rival('valve_dead_time', found, {'valve': best, 'muscle': 0.0}),
+              Rival('creep', found, {'valve': 0.0, 'muscle': 0.97})]
+    contending = [Screened(delay, (7.0,), {}), Screened(pool['end_taper'], (3.0,), {})]
+    tried = Search._other_starts(rivals, contending, cuts)
+    assert [(s.candidate, s.start) for s in tried] == ([(delay, (1.0,))] if again else [])
+
+
 def test_names_contend_at_the_level_that_rivals_reach_and_are_refined_at_the_one_before():
     """A gap below the floor has names, and the best of two that refine no rest of zero."""
     cut = types.SimpleNamespace(subsystem='valve', level=1.0, chi2=lambda errors, part: errors)
