@@ -121,6 +121,10 @@ def test_the_live_rig_is_the_recorded_one():
     rows, _ = rig.simulate(vector_of(**numbers), rig.PPR, np.array([0.0, 0.3]),
                            np.array([4.0, 5.0]), np.zeros(2), 0.0, 0.6, False)
     found = np.array(found)
+    several = truth_live.LiveRig(numbers)
+    for volts in (4.0, 5.0):
+        several.step((volts,), steps=300)
+    assert (several.pressure_pa, several.contraction_m, several.force_n) == tuple(found[-1])
     assert found[:, 1] == pytest.approx(rows[5:3001:5, rig.O_X], abs=1e-9)
     # Pressure and force are those of the last step, 0.1 ms before the full millisecond.
     before = 0.5 * (rows[4:3000:5] + rows[5:3001:5])

@@ -63,16 +63,21 @@ class LiveRig:
         """Return the time since the start [s]."""
         return self._done * rig.STEP_S
 
-    def step(self, signal, external_force_n=0.0):
-        """Advance by ``dt_s``; a signal acts after the hidden delay, at the next step of 1 ms."""
-        if external_force_n:
-            raise ValueError('the hidden rig knows no disturbance')
+    def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
+        """
+        Advance by ``steps`` times ``dt_s`` with the signal held.
+
+        A signal acts after the hidden delay, at the next step of 1 ms.
+        """
+        if external_force_n or contraction_m is not None:
+            raise ValueError('the hidden rig knows no disturbance and no driven load')
         late = int(round(self._n[rig.DELAY] / rig.STEP_S))
-        self._waiting.append((self._done + late, float(signal[0])))
-        while self._waiting and self._waiting[0][0] <= self._done:
-            self._acting = self._waiting.pop(0)[1]
-        steps = int(round(self.dt_s / rig.STEP_S))
-        found = hold(self._n, rig.PPR, self._y, self._work, self._anchors, self._plays,
-                     self._acting, 0.0, self._done, steps)
-        self._done += steps
+        fine = int(round(self.dt_s / rig.STEP_S))
+        for _ in range(steps):
+            self._waiting.append((self._done + late, float(signal[0])))
+            while self._waiting and self._waiting[0][0] <= self._done:
+                self._acting = self._waiting.pop(0)[1]
+            found = hold(self._n, rig.PPR, self._y, self._work, self._anchors, self._plays,
+                         self._acting, 0.0, self._done, fine)
+            self._done += fine
         self.pressure_pa, self.contraction_m, self.force_n = self._readings(*found)
