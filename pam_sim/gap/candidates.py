@@ -103,6 +103,10 @@ class Candidate:
         return [dict(zip((f.name for f in self.free), values))
                 for values in itertools.product(*grids)]
 
+    def typical_start(self):
+        """Return the normalised coordinates of everything that is fitted at its typical size."""
+        return tuple(f.coordinate(f.scale) for f in self.free)
+
     def setting(self, values):
         """Return the effect as an entry of a model file."""
         return {'name': self.effect, 'parameters': {**dict(self.held), **values}}

@@ -101,8 +101,7 @@ class Finish:
         for c in relatives(self.problem.rig, self.outputs, w.name):
             if c in current.hypothesis.effects:
                 continue
-            alone = Found(Hypothesis((c,)), np.array(
-                [f.coordinate(f.scale) for f in c.free]), {}, {}, {})
+            alone = Found(Hypothesis((c,)), np.array(c.typical_start()), {}, {}, {})
             found = self.problem.polish(self._swapped(current, w.name, Rival(c.name, alone)))
             if gap(cut, found.errors[s]) < HELD * gap(cut, current.errors[s]) and preference(
                     cut, self.base.errors[s], found.errors[s], current.errors[s]) >= CERTAIN_T:

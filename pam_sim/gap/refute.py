@@ -63,14 +63,15 @@ def refute(named, problem, base, final, proof, whole):
         fits = _comparable(w, problem, final)
         runs = {name: proof.run(found, whole) for name, found in fits.items()}
         before = proof.run(_less(w.name, problem, base, final), whole) if runs else {}
-        best = max(runs, key=lambda name: _squares_saved(proof, before, runs[name]), default=None)
+        told = {name: proof.fall(before, run) for name, run in runs.items()}
+        best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2, default=None)
         gone = {name for name in runs if name != best and _contradicted(
-            proof, runs[name], runs[best], before)}
+            proof, runs[name], runs[best], told[best][1])}
         names = tuple(n for n in w.names if n not in gone)
         # The recordings hardly tell them apart: where the certify data do not find the first
         # again, but another, that one is likelier.
-        if w.name in gone or (runs and proof.fall(before, runs[w.name])[0] < CONFIRMED
-                              and _is_found_again(proof, before, runs[best])):
+        if w.name in gone or (w.name in told and told[w.name][0] < CONFIRMED <= told[best][0]
+                              and told[best][1] > VISIBLE):
             names = (best, *(n for n in names if n != best))
             final = fits[best]
             w = replace(w, name=best, formulations=[r for r in w.rivals if r.name == best])
@@ -113,24 +114,17 @@ def unconfirmed(named, problem, base, final, proof, whole):
     return name, fits[name]
 
 
-def _contradicted(proof, run, best, before):
-    """Return whether the certify data speak against a run, and for the best one beyond doubt."""
+def _contradicted(proof, run, best, moved):
+    """
+    Return whether the certify data speak against a run, and for the best one beyond doubt.
+
+    ``moved`` is how far the best one is from none.
+    """
     fell, apart = proof.fall(run, best)
-    form = math.sqrt(1.0 - NAMED) * proof.fall(before, best)[1]
+    form = math.sqrt(1.0 - NAMED) * moved
     # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
     return (fell > REFUTED and apart > max(VISIBLE, form)
             and fell + 1.0 > CERTAIN_T * proof.doubt(run, best))
-
-
-def _is_found_again(proof, before, run):
-    """Return whether the squares fall with a run, by what can be seen."""
-    fell, apart = proof.fall(before, run)
-    return fell >= CONFIRMED and apart > VISIBLE
-
-
-def _squares_saved(proof, before, run):
-    fell, apart = proof.fall(before, run)
-    return fell * apart ** 2
 
 
 def _comparable(w, problem, final):

@@ -50,10 +50,6 @@ class Screened:
     size: dict = field(default_factory=dict)
     flat: 'Screened' = None
 
-    def at_typical_size(self):
-        """Return the same from the typical size of everything that is fitted."""
-        return replace(self, start=tuple(f.coordinate(f.scale) for f in self.candidate.free))
-
 
 def screen(problem, near, found):
     """
@@ -164,7 +160,7 @@ def _screened(problem, near, candidate, spaces, flat):
 
 
 def _best_start(candidate, changes, spaces):
-    best = Screened(candidate, tuple(f.coordinate(f.scale) for f in candidate.free), {})
+    best = Screened(candidate, candidate.typical_start(), {})
     first, seen = changes[0][0], 0.0
     for values, by_cut in changes:
         promise, factors = {}, []

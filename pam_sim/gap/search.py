@@ -262,10 +262,10 @@ class Search(Finish):
         contending = self._names_that_contend(rivals, current, cuts)
         had = self.choice.shares(current)
         had = {c.subsystem: had[c.subsystem] for c in cuts}
-        fitted, screened = [s.candidate for s in chosen], [
-            s for s in screened if s.candidate.name in contending]
-        rivals += self._fit_all(current, [s for s in screened if s.candidate not in fitted])
-        rivals += self._fit_all(current, self._other_starts(rivals, screened, cuts))
+        fitted = [s.candidate for s in chosen]
+        near = [s for s in screened if s.candidate.name in contending]
+        rivals += self._fit_all(current, [s for s in near if s.candidate not in fitted])
+        rivals += self._fit_all(current, self._other_starts(rivals, near, cuts))
         rivals += self._fit_all(current, self._refined(
             rivals, refinements, had, len(current.hypothesis.effects)))
         self.fitted = rivals
@@ -282,7 +282,7 @@ class Search(Finish):
         poor = [c.subsystem for c in cuts if all(
             r.share[c.subsystem] < NAMED and gap(c, r.found.errors[c.subsystem]) > CLEAR
             for r in rivals)]
-        return [q.at_typical_size() for q in contending
+        return [Screened(q.candidate, q.candidate.typical_start(), {}) for q in contending
                 if any(acts_on(q.candidate.effect, s) for s in poor)]
 
     @staticmethod
@@ -427,7 +427,7 @@ class Search(Finish):
                       if c.name == old.name and c != old and len(h.effects) > 1]
             tried = [current, *side_by_side(lambda c, place=place, rows=rows: self.problem.fit(
                 Hypothesis((*h.effects[:place], c, *h.effects[place + 1:]), h.freed),
-                [*current.theta[:rows.start], *(f.coordinate(f.scale) for f in c.free),
+                [*current.theta[:rows.start], *c.typical_start(),
                  *current.theta[rows.stop:]], current), others)]
             current = max(tried, key=lambda f: sum(self._explained(f).values()))
         return current

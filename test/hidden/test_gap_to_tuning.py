@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A controller on the hidden rig, as benchmarks/gap_to_tuning.py runs it for hours."""
+"""A controller on the hidden rig, as benchmarks/gap_to_tuning.py runs it."""
 
 import importlib
 from pathlib import Path
