@@ -57,7 +57,9 @@ _RANGES = {
     'max_pressure_gauge_pa': (1e3, 1e6, 'pressure limit, gauge: commands are cut to it'),
     'lowest_plausible_gauge_pa': (-101_325.0, 0.0, 'lowest believable reading, gauge'),
     'highest_plausible_pa': (2e5, 5e6, 'highest believable reading, absolute'),
-    'resume_rate_pa_per_s': (1e3, 1e8, 'fastest rise of the pressure after a vent'),
+    'resume_rate_pa_per_s': (1e3, 1e9, 'fastest rise of the pressure after a vent'),
+    'resume_until_followed_s': (
+        0.1, 60.0, 'time under pressure with the command met that ends the slow rise'),
     'frozen_after_s': (0.02, 1e9, 'shortest stand-still of a frozen reading'),
     'frozen_change_pa': (1e3, 1e9, 'change that must have been missed to call it frozen'),
     'pause_s': (0.05, 1e9, 'time between two ticks that counts as a stopped driver'),

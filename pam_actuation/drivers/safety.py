@@ -28,6 +28,7 @@ import math
 import re
 
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
+from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNTIL_FOLLOWED_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 WAITING = 'waiting'
@@ -57,7 +58,8 @@ class SafetyLimits:
     max_pressure_gauge_pa: float = 600_000.0
     lowest_plausible_gauge_pa: float = -20_000.0
     highest_plausible_pa: float = 1_500_000.0
-    resume_rate_pa_per_s: float = 500_000.0
+    resume_rate_pa_per_s: float = RISE_PA_PER_S
+    resume_until_followed_s: float = UNTIL_FOLLOWED_S
     frozen_after_s: float = 0.2
     frozen_change_pa: float = 100_000.0
     pause_s: float = 0.3
@@ -131,7 +133,7 @@ class SafetySupervisor:
         self._warnings = {}
         self._fault = ('no_command', '')
         self._standing = None
-        self._ramp_pa = None
+        self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s)
         self._now_ns = None
         self._grace_until_ns = 0
         self._grace_ns = 0
@@ -206,8 +208,7 @@ class SafetySupervisor:
             fault = self._standing_fault(now_ns)
         if fault is not None:
             return self._vent(self._latched_if_raw(fault))
-        if self._fault is not None:
-            self._start_ramp()
+        self._fault = None
         if self.command_duty is not None:
             return self._follow_duty(now_ns)
         return self._follow(now_ns)
@@ -369,18 +370,13 @@ class SafetySupervisor:
         # The first text stays while only its figures change: the reason must not flicker.
         if self._fault is None or _without_figures(self._fault) != _without_figures(fault):
             self._fault = fault
-        self._ramp_pa = None
+        self._rise.begin()
         key, text = self._fault
         if key in LATCHING:
             return Decision(EMERGENCY_STOP, None, LEVEL_ERROR, text, key)
         if key in ('no_command', 'no_pressure'):
             return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)
         return Decision(VENTED, None, LEVEL_ERROR, 'vented because ' + text, key)
-
-    def _start_ramp(self):
-        measured = self.pressure.pressure_pa
-        self._ramp_pa = max(measured, P_ATM_PA) if math.isfinite(measured) else P_ATM_PA
-        self._fault = None
 
     def _latched_if_raw(self, fault):
         # What an opening does depends on all that went before: it is not taken up again.
@@ -393,7 +389,7 @@ class SafetySupervisor:
 
     def _follow_duty(self, now_ns):
         duty, gauge_pa = self.command_duty, self.pressure.pressure_pa - P_ATM_PA
-        self._ramp_pa = None
+        self._rise.hold()
         if duty > 0.0 and gauge_pa >= self.limits.max_pressure_gauge_pa:
             duty = 0.0
             self._warn('valve_command_at_limit', (
@@ -404,12 +400,7 @@ class SafetySupervisor:
     def _follow(self, now_ns):
         lim = self.limits
         target = min(max(self.command_pa, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
-        if self._ramp_pa is not None:
-            self._ramp_pa += lim.resume_rate_pa_per_s * self._dt_s
-            if target <= self._ramp_pa:
-                self._ramp_pa = None
-            else:
-                target = self._ramp_pa
+        target = self._rise.limited(target, self._dt_s)
         self._watch_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)
 
@@ -419,7 +410,7 @@ class SafetySupervisor:
             self._warn('second_publisher_seen', (
                 f'{self.publishers} publishers of pressure_command are on the graph'), now_ns)
         texts = []
-        if self._ramp_pa is not None:
+        if target is not None and self._rise.limiting:
             texts.append('resuming, pressure rises at no more than '
                          f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s')
         self._warnings = {key: item for key, item in self._warnings.items()

@@ -31,6 +31,8 @@ from pam_sim.units import P_ATM_PA
 STEP_S = 0.001
 SENSOR_EVERY = 4                    # steps between two readings: 250 Hz
 _STEP_NS = 1_000_000
+# What a driver that has long followed commands does is measured, not how it begins.
+_AT_ONCE = {'resume_rate_pa_per_s': 1e9}
 
 
 class Record(Response):
@@ -72,7 +74,7 @@ class Bench:
 
     def __init__(self, rig, seed=0):
         self.rig, self.seed = rig, seed
-        self._config = driver_config(rig)
+        self._config = driver_config(rig, _AT_ONCE)
 
     def chain(self, start_gauge_pa):
         """Return a new Chain that rests at a gauge pressure [Pa]."""
@@ -92,6 +94,8 @@ class Chain:
         self._contraction_m = self._now[layout.OUT_TRUE_CONTRACTION]
         self._sensors = SensorChain(rig, seed)
         self._every = max(round(self.driver.period_s / STEP_S), 1)
+        self._steps = -self._every
+        self._drive(P_ATM_PA + float(start_gauge_pa), None)      # it knows the time of a tick
         self._steps = 0
 
     def follow(self, command_gauge_pa):

@@ -305,7 +305,7 @@ def test_supply_loss_warns():
 
 
 def test_resumes_without_a_jump():
-    """After a vent the target climbs from the measured pressure at the set rate."""
+    """After a vent the target climbs from atmospheric pressure at the set rate."""
     bench = Bench(SafetyLimits(resume_rate_pa_per_s=400e3))
     bench.run(2000)
     bench.command = None

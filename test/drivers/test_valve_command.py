@@ -64,7 +64,7 @@ def test_duties_are_sent_as_commanded_and_never_both(wanted, sent):
 def test_voltage_is_sent_as_commanded_within_the_limit():
     bench = Bench('ppr', max_pressure_gauge_pa=400e3)
     bench.efforts = (3.0,)
-    assert bench.run(1000)[0] == (pytest.approx(3.0),)
+    assert bench.run(2000)[0] == (pytest.approx(3.0),)     # the slow rise of the start is over
     bench.efforts = (5.0,)
     efforts, status = bench.run(100)
     assert efforts == (pytest.approx(4.0),) and 'cut to the limit' in status.message
@@ -138,7 +138,7 @@ def test_pressure_and_valve_commands_may_take_turns_but_not_mix():
     for _ in range(10):
         bench.loop.on_command(Pressure(bench.now + 9 * MS, P_ATM_PA + 300e3))
         status = bench.run(10)[1]
-    assert status.message == 'following the pressure command'
+    assert status.message.startswith('resuming')
     bench.efforts = (0.0, 0.0)
     for _ in range(10):
         bench.loop.on_command(Pressure(bench.now + 10 * MS, P_ATM_PA + 300e3))

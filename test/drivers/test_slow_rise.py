@@ -1,0 +1,103 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The slow rise after a vent: no order of commands, vents and late ticks leads round it."""
+
+import itertools
+import random
+
+from pam_actuation.drivers.safety import SafetyLimits
+from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA
+from pam_sim.units import P_ATM_PA
+import pytest
+from test_safety import Bench
+
+FULL_PA = P_ATM_PA + 600e3
+PERIOD_S = 0.005
+
+
+def rises(targets):
+    """Return the largest rise [Pa/s] of followed pressures, None being a vent."""
+    known = [P_ATM_PA if target is None else target for target in targets]
+    return max(b - a for a, b in itertools.pairwise(known)) / PERIOD_S
+
+
+def test_a_first_command_of_atmosphere_does_not_end_it():
+    """The way round it: one command of atmospheric pressure, then all at once."""
+    bench = Bench(SafetyLimits())
+    for k in range(3):
+        bench.command = P_ATM_PA
+        bench.run(100 if k else 3000)
+        bench.command = FULL_PA
+        targets = [decision.pressure_pa for decision in bench.run(300)]
+        assert rises(targets) <= RISE_PA_PER_S * 1.001
+        bench.command = None            # lost: vented
+        bench.run(300)
+
+
+def test_it_begins_at_atmosphere_while_the_muscle_still_empties():
+    bench = Bench(SafetyLimits())
+    bench.run(3000)
+    bench.command = None
+    bench.run(150)
+    bench.pressure = P_ATM_PA + 250e3
+    bench.command = P_ATM_PA + 300e3
+    assert bench.run(10)[-1].pressure_pa <= P_ATM_PA + 0.01 * RISE_PA_PER_S
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_no_order_of_commands_rises_faster_until_one_was_followed_under_pressure(seed):
+    rng = random.Random(seed)
+    bench = Bench(SafetyLimits())
+    bench.run(rng.choice((0, 2500)))
+    bench.command = None
+    bench.run(200)
+    targets, followed_s = [P_ATM_PA], 0.0
+    while followed_s < 0.8:
+        bench.command = rng.choice((
+            P_ATM_PA, P_ATM_PA, FULL_PA, P_ATM_PA + rng.uniform(0.0, 600e3), P_ATM_PA - 5e3))
+        for decision in bench.run(5 * rng.randint(1, 60)):
+            targets.append(decision.pressure_pa)
+            if bench.command == decision.pressure_pa > UNDER_PRESSURE_PA:
+                followed_s += PERIOD_S
+    assert rises(targets) <= RISE_PA_PER_S * 1.001
+
+
+def test_it_ends_once_a_command_was_followed_for_a_second_and_begins_with_every_vent():
+    bench = Bench(SafetyLimits())
+    bench.command = P_ATM_PA + 100e3
+    bench.run(150)
+    assert 'no more than 500 kPa/s' in bench.last(10).message
+    bench.run(1200)
+    bench.command = FULL_PA
+    assert bench.last(5).pressure_pa == FULL_PA
+    bench.safety.emergency_stop('a test')
+    bench.run(10)
+    bench.safety.reset()
+    assert bench.last(10).pressure_pa <= P_ATM_PA + 0.01 * RISE_PA_PER_S
+
+
+def test_a_late_tick_does_not_make_up_for_the_time_it_missed():
+    rise = SlowRise()
+    rise.limited(FULL_PA, 0.005)
+    before_pa = rise.limited(FULL_PA, 0.005)
+    assert rise.limited(FULL_PA, 0.25) - before_pa <= 0.02 * RISE_PA_PER_S + 1e-6
+
+
+def test_openings_of_the_valves_leave_it_as_it_is():
+    rise = SlowRise()
+    rise.limited(P_ATM_PA + 3e5, 0.02)
+    rise.hold()
+    assert rise.limited(FULL_PA, 0.01) == P_ATM_PA + 0.01 * RISE_PA_PER_S
+    assert SafetyLimits().resume_rate_pa_per_s == RISE_PA_PER_S
