@@ -38,7 +38,11 @@ def valve_of(names):
 
 @dataclass(frozen=True, slots=True)
 class Pressure:
-    """Absolute pressure [Pa]: topics pressure, pressure_command, supply_pressure."""
+    """
+    Absolute pressure [Pa].
+
+    Topics pressure, pressure_command, followed_pressure, supply_pressure.
+    """
 
     stamp_ns: int
     pressure_pa: float

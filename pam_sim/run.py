@@ -21,7 +21,8 @@ from pam_sim.errors import InputError
 
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = (
-    'valve_signal', 'valve_command', 'reference', 'pressure_command', 'controller_state')
+    'valve_signal', 'valve_command', 'reference', 'pressure_command', 'followed_pressure',
+    'controller_state')
 # A day at 1 kHz; stamps of a broken clock would ask for far more than memory holds.
 MAX_GRID_POINTS = 100_000_000
 
@@ -64,7 +65,7 @@ class Run:
     ----------
     topics : dict of str to Series
         Short names: pressure, contraction, force, pressure_command,
-        valve_signal, reference, supply_pressure, external_force,
+        followed_pressure, valve_signal, reference, supply_pressure, external_force,
         controller_state; absent topics are absent keys.
     metadata : dict of str to str
         The ``pam_experiment`` record; empty for foreign bags.

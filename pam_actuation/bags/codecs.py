@@ -41,6 +41,7 @@ TOPIC_TYPES = {
     'reference': _JOINTS,
     'reference_trajectory': _TRAJECTORY,
     'pressure_command': _PRESSURE,
+    'followed_pressure': _PRESSURE,
     'valve_command': _JOINTS,
     'valve_signal': _JOINTS,
     'pressure': _PRESSURE,
@@ -139,7 +140,7 @@ def value_layout(short, raw):
     For all topics but ``reference_trajectory`` and ``diagnostics``. A value that
     the message leaves out has the offset None. Raises CdrError.
     """
-    if short in ('pressure', 'pressure_command', 'supply_pressure'):
+    if TOPIC_TYPES[short] == _PRESSURE:
         layout = cdr.fluid_pressure_layout(raw)
         columns = {'pressure_pa': layout.columns['fluid_pressure']}
     elif short in ('force', 'external_force'):
@@ -264,6 +265,7 @@ _ENCODERS = {
     'reference': _encode_reference,
     'reference_trajectory': _encode_trajectory,
     'pressure_command': _encode_pressure,
+    'followed_pressure': _encode_pressure,
     'valve_command': _encode_valve_signal,
     'valve_signal': _encode_valve_signal,
     'pressure': _encode_pressure,
@@ -283,6 +285,7 @@ _DECODERS = {
 _FROM_VALUES = {
     'reference': lambda stamp_ns, values: messages.Reference(stamp_ns, **values),
     'pressure_command': _decode_pressure,
+    'followed_pressure': _decode_pressure,
     'valve_command': _decode_valve_signal,
     'valve_signal': _decode_valve_signal,
     'pressure': _decode_pressure,

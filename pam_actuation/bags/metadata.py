@@ -20,7 +20,7 @@ from pam_sim.errors import InputError
 
 # Units of the values on the wire, per topic; the text goes into every bag.
 UNITS = (
-    'pressure, pressure_command, supply_pressure: Pa absolute; '
+    'pressure, pressure_command, followed_pressure, supply_pressure: Pa absolute; '
     'contraction, reference, reference_trajectory: m, m/s; '
     'force, external_force: N; '
     'valve_signal, valve_command: ppr_voltage V, fill_duty and vent_duty 1; '

@@ -29,6 +29,7 @@ from rosbags.serde import SerdeError
 VALUES = {
     'pressure': ('pressure_pa',),
     'pressure_command': ('pressure_pa',),
+    'followed_pressure': ('pressure_pa',),
     'supply_pressure': ('pressure_pa',),
     'force': ('force_n',),
     'external_force': ('force_n',),

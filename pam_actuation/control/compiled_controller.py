@@ -60,7 +60,7 @@ class CompiledController:
         return self.settings['lead_s']
 
     def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
+             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan, held_back=0.0):
         """
         Run one tick.
 
@@ -79,6 +79,10 @@ class CompiledController:
         pressure_pa, force_n : float
             Measured absolute pressure [Pa] and force [N]; NaN where not known. Used for the
             bumpless start and for freezing the learning only.
+        held_back : float
+            0 while the driver follows the command. While it vents or limits it, one of the
+            codes of ``following``: integral and rules stay as they are then, since the error
+            is not theirs.
 
         Returns
         -------
@@ -96,6 +100,7 @@ class CompiledController:
         inputs[6] = elapsed_s
         inputs[7] = pressure_pa
         inputs[8] = force_n
+        inputs[9] = held_back
         return self._step(*self._arguments)
 
     def compiled_arguments(self):

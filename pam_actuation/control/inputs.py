@@ -28,4 +28,5 @@ IN_LEARN = 5              # 1 = the rules may change in this tick
 IN_ELAPSED = 6            # s between the measurements of this and the former tick, NaN = period
 IN_PRESSURE = 7           # absolute Pa, measured; NaN = not known
 IN_FORCE = 8              # N, measured; NaN = not known
-INPUT_COUNT = 9
+IN_HELD_BACK = 9          # 0 = the driver follows the command; else see ``following``
+INPUT_COUNT = 10

@@ -33,6 +33,7 @@ import math
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
+from pam_actuation.control.following import CommandFollowing, FOLLOWS, UNKNOWN
 from pam_actuation.control.frozen import FrozenMeasurement, JOINT_SWING_PA
 from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
@@ -53,7 +54,8 @@ _STOP_RAD = 0.01             # this near an end of its range the joint may lie o
 _INPUT_NAMES = (
     'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced', 'joint_state_stamp_sec',
     'joint_state_stamp_nanosec', 'angle_rad', *codes.reference_names('rad'), 'elapsed_s',
-    *(f'{side}_pressure_pa' for side in SIDES), *(f'{side}_force_n' for side in SIDES))
+    *(f'{side}_pressure_pa' for side in SIDES), *(f'{side}_force_n' for side in SIDES),
+    codes.HELD_BACK)
 _TORQUE_NAMES = (
     'follows_torque', 'joint_effort_stamp_sec', 'joint_effort_stamp_nanosec', 'wanted_torque_n_m',
     *JointTorque.STATE_NAMES)
@@ -99,6 +101,7 @@ class JointControllerLoop:
         self._frozen = FrozenMeasurement(
             lower + _STOP_RAD, upper - _STOP_RAD, JOINT_SWING_PA)
         self._slack = SlackMuscle(), SlackMuscle()      # flexor, extensor
+        self._following = CommandFollowing(), CommandFollowing()
         self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
@@ -122,7 +125,7 @@ class JointControllerLoop:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
-        for monitor in (self._frozen, *self._slack):
+        for monitor in (self._frozen, *self._slack, *self._following):
             monitor.forget()
         self.follows_torque = False
         self._trajectory = self._angle = None
@@ -135,6 +138,10 @@ class JointControllerLoop:
     def on_pressure(self, side, message):
         """Take a ``Pressure`` measured at a muscle, ``FLEXOR`` or ``EXTENSOR``."""
         self._pressures[side] = message
+
+    def on_followed_pressure(self, side, message):
+        """Take the ``Pressure`` that the driver of a muscle follows."""
+        self._following[side].on_followed(message)
 
     def on_force(self, side, message):
         """Take a ``Force`` measured at a muscle."""
@@ -207,15 +214,19 @@ class JointControllerLoop:
         may_learn = bool(learning and reason == codes.OK and not self.follows_torque
                          and not controller.freeze_learning)
         inputs, stamp_ns, commands_pa = (math.nan,) * 10, -1, (P_ATM_PA, P_ATM_PA)
+        held_back = self._held_back(now_ns)
         if running:
             stamp_ns = self._angle.stamp_ns
             inputs = self._inputs(now_ns, stamp_ns, changed)
-            commands_pa = self._commands_pa = self._run(inputs, may_learn)
+            commands_pa = self._commands_pa = self._run(inputs, may_learn, held_back)
+        for following, command_pa in zip(self._following, commands_pa):
+            following.sent(now_ns, command_pa)
         self._used_ns = stamp_ns if running else None
         values = (
             float(self.ticks), float(reason), float(may_learn), float(stalled),
             float(controller.rules_replaced), *codes.split_stamp(stamp_ns), *inputs,
-            *controller.state_values(), float(self.follows_torque),
+            held_back if running else FOLLOWS, *controller.state_values(),
+            float(self.follows_torque),
             *codes.split_stamp(self.efforts.stamp_ns), self.efforts.torque_n_m,
             *self.torque.state_values())
         self.ticks += 1
@@ -259,12 +270,23 @@ class JointControllerLoop:
         return tuple(message.pressure_pa if fresh(message, now_ns) else math.nan
                      for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
 
-    def _run(self, inputs, may_learn):
+    def _held_back(self, now_ns):
+        """Return ``UNKNOWN`` where a driver does not follow: one law moves both muscles."""
+        pressures_pa = self._fresh_pressures_pa(now_ns)
+        # A list: both are to be asked.
+        found = [following.judge(now_ns, pressure_pa) for following, pressure_pa in zip(
+            self._following, pressures_pa)]
+        return FOLLOWS if found == [FOLLOWS, FOLLOWS] else UNKNOWN
+
+    def _run(self, inputs, may_learn, held_back):
         """Return the commands [Pa] of the law that counts; the other one stands aside."""
         controller, pressures_pa, forces_n = self.controller, inputs[6:8], inputs[8:]
         if not self.follows_torque:
             self.torque.pause()
-            return controller.step(*inputs[:5], may_learn, inputs[5], pressures_pa, forces_n)
+            return controller.step(
+                *inputs[:5], may_learn, inputs[5], pressures_pa, forces_n, held_back)
+        if held_back != FOLLOWS:
+            forces_n = math.nan, math.nan       # the feedback stands still
         commands_pa = self.torque.step(
             inputs[0], self.efforts.torque_n_m, controller.wanted_co_contraction_pa, forces_n,
             pressures_pa)

@@ -59,6 +59,50 @@ def filtered_change(change, filter_s, reference_rate, moved_m, elapsed_s, period
 
 
 @compiled
+def held_offset(offset_m, held_back, away_m, error_m, time_s, period_s):
+    """
+    Return the offset of a bumpless start while the driver does not follow the command.
+
+    The reference then goes with the muscle, and the law starts from where that is once its
+    command counts again. The error fades: at once gone, it would take the command back with it.
+
+    Parameters
+    ----------
+    offset_m : float
+        Offset while the command is followed.
+    held_back : float
+        A code of ``following``.
+    away_m : float
+        Reference less contraction.
+    error_m : float
+        Error of the tick before.
+    time_s, period_s : float
+        Time in which the error fades, period of the ticks.
+
+    """
+    if held_back == 0.0:
+        return offset_m
+    return away_m - error_m * (time_s / (time_s + period_s))
+
+
+@compiled
+def integral_growth(by_error, by_limits, held_back):
+    """
+    Return the rate at which an integral grows, by the error and by the limits of the law.
+
+    While the driver does not follow the command, it may only go to where the driver is;
+    ``held_back`` is a code of ``following``.
+    """
+    if held_back == 0.0:
+        return by_error + by_limits
+    if held_back == 1.0:
+        return min(by_error, 0.0)
+    if held_back == -1.0:
+        return max(by_error, 0.0)
+    return 0.0
+
+
+@compiled
 def limited(wanted_pa, former_pa, lowest_pa, highest_pa, reach_pa):
     """Return a command within its limits, and the same within reach of the former command."""
     inside = min(max(wanted_pa, lowest_pa), highest_pa)

@@ -26,7 +26,9 @@ no contraction yet; older than 0.1 s; more     vents (command = atmosphere), say
 than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
 range a muscle can reach
 contraction the same to the last bit for       vents until it has changed, 2 s at least
-0.2 s while the pressure changed by 150 kPa
+0.2 s while the pressure changed by 150 kPa;
+or, where the pressure stands still as well,
+while that followed by the driver did
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
@@ -35,6 +37,8 @@ reference silent for more than 2 s             vents
 a reference or trajectory that is not finite,  that message is ignored and counted
 out of reach or from the future
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
+followed pressure below or above the command,  integral and rules stand still: the error is
+or silent; pressure lost, where it is unknown  that of a driver that vents or limits
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
 """
@@ -42,6 +46,7 @@ the loop itself stood still over 0.25 s        starts bumplessly
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
+from pam_actuation.control.following import CommandFollowing, LESS
 from pam_actuation.control.frozen import FrozenMeasurement, STOP_SWING_PA
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS, ReferenceBuffer
@@ -136,6 +141,10 @@ class ControllerLoop:
         self.valid = False
         self._frozen = FrozenMeasurement(
             _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
+        # Of a muscle whose pressure reading stands still too, by the pressure it should have.
+        self._frozen_both = FrozenMeasurement(
+            _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
+        self._following = CommandFollowing()
         self._core = TickCore(controller)
         self._contraction = None
         self._pressure = None
@@ -166,6 +175,10 @@ class ControllerLoop:
         """Take a measured ``Pressure``."""
         self._pressure = message
 
+    def on_followed_pressure(self, message):
+        """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
+        self._following.on_followed(message)
+
     def on_force(self, message):
         """Take a ``Force``."""
         self._force = message
@@ -173,7 +186,8 @@ class ControllerLoop:
     def forget(self):
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
-        self._frozen.forget()
+        for part in (self._frozen, self._frozen_both, self._following):
+            part.forget()
         self._contraction = self._pressure = self._force = None
 
     def on_reference(self, message):
@@ -205,6 +219,7 @@ class ControllerLoop:
         """
         inputs = self._gather(now_ns, learning)
         command_pa, values = self._core.run(inputs)
+        self._following.sent(now_ns, command_pa)
         self.valid = inputs.reason in codes.RUNNING
         self.reason = codes.REASONS[inputs.reason]
         return (Pressure(now_ns, command_pa),
@@ -221,10 +236,19 @@ class ControllerLoop:
         """Return the code for the newest measurement of what is tracked, OK if usable."""
         message, value = self._measured()
         reason = measurement_reason(message, value, self._range, self._reasons, now_ns)
-        if reason == codes.OK and self._frozen.judge(
-                now_ns, message.stamp_ns, value, self._fresh_pressure_pa(now_ns)):
+        if reason == codes.OK and self._stands_still(now_ns, message.stamp_ns, value):
             return _FROZEN[self.tracked]
         return reason
+
+    def _stands_still(self, now_ns, stamp_ns, value):
+        """Return whether what is tracked stands still although the pressure changed."""
+        pressure_pa = self._fresh_pressure_pa(now_ns)
+        expected_pa = self._following.expected_pa(now_ns, pressure_pa)
+        if math.isnan(expected_pa):
+            self._frozen_both.pause()
+        # Both are to be asked, whatever the first one says.
+        return any([self._frozen.judge(now_ns, stamp_ns, value, pressure_pa),
+                    self._frozen_both.judge(now_ns, stamp_ns, value, expected_pa)])
 
     def _fresh_pressure_pa(self, now_ns):
         """Return the measured pressure [Pa], NaN where none is fresh."""
@@ -242,9 +266,11 @@ class ControllerLoop:
         may_learn = bool(
             learning and reason == codes.OK and not self.controller.freeze_learning)
         inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
+        held_back = self._following.judge(now_ns, self._fresh_pressure_pa(now_ns))
         if reason not in codes.RUNNING:
             self._used_ns = None
             return inputs
+        inputs.held_back = LESS if self._core.rise.limiting else held_back
         measured_ns = self._measured()[0].stamp_ns
         # The error belongs to the time of the measurement, the preview to now.
         inputs.reference, inputs.reference_rate = references.at(now_ns, measured_ns)

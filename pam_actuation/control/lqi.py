@@ -26,7 +26,8 @@ rules to learn.
 from numba import njit
 from pam_actuation.control import inputs as place
 from pam_actuation.control.fixed_law import FixedLawController
-from pam_actuation.control.law_parts import faded_offset, first_command_pa, limited
+from pam_actuation.control.law_parts import (
+    faded_offset, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.lqi_gains import (
     M_CONTRACTION, M_DELAY, M_HEAD, M_INTEGRAL_GAIN, M_ORDER, M_PA_PER_M, M_PRESSURE, pack)
 from pam_actuation.control.settings import checked_settings, Setting
@@ -58,7 +59,7 @@ STATE_NAMES = (
  P_ANTI_WINDUP_TIME, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
 # State: these, then the estimate (order), commands on their way (delay) and the feed-forward
 # they contained (delay), oldest first.
-(S_STARTED, S_OFFSET, S_INTEGRAL, S_OUTPUT, S_HEAD) = range(5)
+(S_STARTED, S_OFFSET, S_INTEGRAL, S_OUTPUT, S_ERROR, S_HEAD) = range(6)
 _STALE_S = 0.1              # a longer gap between measurements restarts the estimate
 
 
@@ -129,7 +130,9 @@ def _tick(par, model, st, inp, out):
     begins = st[S_STARTED] < 0.5
     if begins:
         st[S_OFFSET] = inp[place.IN_REFERENCE] - x
-    offset = st[S_OFFSET]
+    held_back = inp[place.IN_HELD_BACK]
+    offset = held_offset(st[S_OFFSET], held_back, inp[place.IN_REFERENCE] - x, st[S_ERROR],
+                         par[P_START_TIME], period)
     feedforward = par[P_FEEDFORWARD] * model[M_PA_PER_M] * (
         inp[place.IN_LEAD_REFERENCE] - offset - model[M_CONTRACTION])
     if begins:
@@ -139,13 +142,14 @@ def _tick(par, model, st, inp, out):
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp[place.IN_ELAPSED]
     innovation = y - st[S_HEAD]
-    if elapsed > _STALE_S:                 # False for NaN: one period
-        _rest(model, st, y)
+    if held_back != 0.0 or elapsed > _STALE_S:    # False for NaN: one period
+        _rest(model, st, y)                # what moved it is not known
     elif not elapsed <= 0.0:
         for i in range(n):
             st[S_HEAD + i] += model[M_HEAD + 2 * n + i] * innovation
 
     error = inp[place.IN_REFERENCE] - offset - x
+    st[S_ERROR] = error
     target = par[P_FEEDFORWARD] * (inp[place.IN_REFERENCE] - offset - model[M_CONTRACTION])
     feedback = _state_feedback(model, st, target)
     integral = st[S_INTEGRAL]
@@ -155,8 +159,8 @@ def _tick(par, model, st, inp, out):
     highest = P_ATM_PA + par[P_MAX]
     inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
     st[S_OUTPUT] = command
-    st[S_INTEGRAL] = integral + period * (
-        model[M_INTEGRAL_GAIN] * error + (command - wanted) / par[P_ANTI_WINDUP_TIME])
+    st[S_INTEGRAL] = integral + period * integral_growth(
+        model[M_INTEGRAL_GAIN] * error, (command - wanted) / par[P_ANTI_WINDUP_TIME], held_back)
     _predict(model, st, command - model[M_PRESSURE], feedforward)
     out[0] = command
     out[1] = error

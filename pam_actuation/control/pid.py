@@ -25,7 +25,7 @@ import numpy as np
 from pam_actuation.control import inputs as place
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, limited)
+    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.settings import checked_settings, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.compiled import compiled, source_key
@@ -48,8 +48,8 @@ SETTINGS = (
 
 (P_RATE, P_LEAD, P_INVERSE, P_PROPORTIONAL, P_INTEGRAL, P_DERIVATIVE, P_ANTI_WINDUP_TIME,
  P_CHANGE_FILTER, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
-(S_STARTED, S_OFFSET, S_CONTRACTION, S_RATE, S_INTEGRAL, S_OUTPUT, S_HISTORY) = range(7)
-STATE_COUNT = 7
+(S_STARTED, S_OFFSET, S_CONTRACTION, S_RATE, S_INTEGRAL, S_OUTPUT, S_HISTORY, S_ERROR) = range(8)
+STATE_COUNT = 8
 STATE_NAMES = (
     'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
     'integral_pa', 'derivative_pa', 'unlimited_command_pa', 'saturated_low', 'saturated_high',
@@ -82,9 +82,12 @@ def _tick(par, inverse, st, inp, out):
         x - st[S_CONTRACTION], inp[place.IN_ELAPSED], period, st[S_HISTORY] > 0.0)
     st[S_CONTRACTION] = x
     st[S_HISTORY] += 1.0
-    offset = st[S_OFFSET]
+    held_back = inp[place.IN_HELD_BACK]
+    offset = held_offset(st[S_OFFSET], held_back, inp[place.IN_REFERENCE] - x, st[S_ERROR],
+                         par[P_START_TIME], period)
     st[S_OFFSET] = faded_offset(offset, par[P_START_TIME], period)
     error = inp[place.IN_REFERENCE] - offset - x
+    st[S_ERROR] = error
     base = P_ATM_PA
     if par[P_INVERSE] > 0.5:
         base = inverse_pressure_pa(inverse, inp[place.IN_LEAD_REFERENCE] - offset)
@@ -96,8 +99,8 @@ def _tick(par, inverse, st, inp, out):
     highest = P_ATM_PA + par[P_MAX]
     inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
     st[S_OUTPUT] = command
-    st[S_INTEGRAL] = integral + period * (
-        par[P_INTEGRAL] * error + (command - wanted) / par[P_ANTI_WINDUP_TIME])
+    st[S_INTEGRAL] = integral + period * integral_growth(
+        par[P_INTEGRAL] * error, (command - wanted) / par[P_ANTI_WINDUP_TIME], held_back)
     out[0] = command
     out[1] = error
     out[2] = st[S_RATE]

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import math
 
 from pam_actuation.control.modes.tracked import tracked_by
+from pam_actuation.slow_rise import SlowRise
 from pam_sim.units import P_ATM_PA
 
 (OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
@@ -58,6 +59,7 @@ REASONS = (
     'a muscle is not under air although it should be, or its pressure is lost: both vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
+HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
 
 
@@ -70,7 +72,8 @@ def input_names(unit):
     return (
         'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced',
         *(f'{name}_stamp_{part}' for name in STAMPED for part in ('sec', 'nanosec')),
-        'contraction_m', *reference_names(unit), 'elapsed_s', 'pressure_pa', 'force_n')
+        'contraction_m', *reference_names(unit), 'elapsed_s', 'pressure_pa', 'force_n',
+        HELD_BACK)
 
 
 def reference_names(unit):
@@ -102,6 +105,7 @@ class TickInputs:
     elapsed_s: float = math.nan
     pressure_pa: float = math.nan
     force_n: float = math.nan
+    held_back: float = 0.0
 
 
 def split_stamp(stamp_ns):
@@ -124,11 +128,16 @@ class TickCore:
     Parameters
     ----------
     controller : SelfOrganizingFuzzyController, PidController or ForceController
+    rises_slowly : bool
+        Whether the command rises slowly after the inputs were invalid; False for recordings
+        of versions that did not.
 
     """
 
-    def __init__(self, controller):
+    def __init__(self, controller, rises_slowly=True):
         self.controller = controller
+        self.rise = SlowRise(active=False)
+        self._rises_slowly = rises_slowly
         self.ticks = 0
         self.names = input_names(tracked_by(controller).unit) + tuple(controller.state_names)
 
@@ -148,17 +157,21 @@ class TickCore:
         if inputs.restarted or inputs.reason not in RUNNING:
             controller.pause()
         command_pa = P_ATM_PA
+        if inputs.reason not in RUNNING and self._rises_slowly:
+            self.rise.begin()
         if inputs.reason in RUNNING:
             command_pa = float(controller.step(
                 inputs.contraction_m, inputs.reference, inputs.reference_rate,
                 inputs.lead_reference, inputs.lead_reference_rate, inputs.learning,
-                inputs.elapsed_s, inputs.pressure_pa, inputs.force_n))
+                inputs.elapsed_s, inputs.pressure_pa, inputs.force_n, inputs.held_back))
+            command_pa = self.rise.limited(command_pa, 1.0 / controller.rate_hz)
         values = (
             float(self.ticks), float(inputs.reason), float(inputs.learning),
             float(inputs.restarted), float(controller.rules_replaced),
             *(part for stamp_ns in inputs.stamps_ns for part in split_stamp(stamp_ns)),
             inputs.contraction_m, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
-            inputs.pressure_pa, inputs.force_n, *controller.state_values())
+            inputs.pressure_pa, inputs.force_n, inputs.held_back,
+            *controller.state_values())
         self.ticks += 1
         return command_pa, values

@@ -72,6 +72,7 @@ class DriverLoop:
         self._law_ns = None
         self._used_stamp_ns = None
         self._efforts = self._safe_efforts()
+        self._followed_pa = P_ATM_PA
         self._rate_start = None
         self._rate_measured_hz = math.nan
 
@@ -133,12 +134,23 @@ class DriverLoop:
         self._count(now_ns)
         efforts = self._hsv(decision, now_ns) if self.is_hsv else self._ppr(decision, now_ns)
         self._efforts = efforts
+        self._followed_pa = _followed_pa(decision)
         if decision.pressure_pa is not None and self.law.saturated:
             self.saturated_ticks += 1
             if self._last_ns is not None:
                 self.saturated_s += max(now_ns - self._last_ns, 0) / _NS
         self._last_ns = now_ns
         return self._signal(now_ns, efforts), self._status(now_ns, decision)
+
+    def followed(self):
+        """
+        Return the ``Pressure`` followed since the last tick, None where it is an opening.
+
+        It is the command after the limits and the slow rise; atmosphere while it vents.
+        """
+        if self._followed_pa is None or self._last_ns is None:
+            return None
+        return Pressure(self._last_ns, self._followed_pa)
 
     # -- laws -----------------------------------------------------------------------
 
@@ -244,6 +256,12 @@ class DriverLoop:
         if safety.supply.received:
             values.append(('supply_kpa_gauge', f'{gauge_kpa(safety.supply.pressure_pa):.1f}'))
         return Status(now_ns, decision.level, 'valve_driver', decision.message, tuple(values))
+
+
+def _followed_pa(decision):
+    if decision.duty is not None:
+        return None
+    return P_ATM_PA if decision.pressure_pa is None else decision.pressure_pa
 
 
 def _target_text(decision):

@@ -80,6 +80,7 @@ class JointLoops:
             if self.now_ns >= self._driver_due_ns[k]:
                 self._driver_due_ns[k] = self.now_ns + round(driver.period_s * _NS)
                 self.plant.signals[side].take(driver.tick(self.now_ns)[0])
+                control.on_followed_pressure(k, driver.followed())
         return commands
 
     def internal(self, name):

@@ -134,6 +134,9 @@ class _Loops:
         """Turn the command into a valve signal, supervised."""
         signal, status = self.driver.tick(now)
         self.send('valve_signal', signal, now)
+        followed = self.driver.followed()
+        if followed is not None:
+            self.send('followed_pressure', followed, now)
         if now - self._status_ns >= STATUS_EVERY_NS:
             self._status_ns = now
             self.recorder.write('diagnostics', status, now)

@@ -28,7 +28,7 @@ from pam_sim.units import P_ATM_PA
 MOST_WRONG_STEPS = 20
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
-INPUTS = ('reference_trajectory', 'reference', *MEASURED)
+INPUTS = ('reference_trajectory', 'reference', 'followed_pressure', *MEASURED)
 FOLLOWING = 'following the reference'
 
 
@@ -84,6 +84,8 @@ class ControllerNode(ManagedNode):
         from pam_actuation.experiments.reference import TRAJECTORY_EVERY_NS
         by_topic = {topic: subscription for topic, subscription, _ in self.inputs}
         awaited = [lockstep.EachTick(by_topic[topic]) for topic in SENT_LAST_FIRST]
+        if lockstep.DRIVER in self.participants:
+            awaited.append(lockstep.OneTickOld(by_topic['followed_pressure']))
         if lockstep.REFERENCE in self.participants:
             awaited += [lockstep.OneTickOld(by_topic['reference']), lockstep.OneTickOld(
                 by_topic['reference_trajectory'], TRAJECTORY_EVERY_NS)]
@@ -117,7 +119,7 @@ class ControllerNode(ManagedNode):
         if self.participants:
             self._check_step(now_ns)
         for topic, subscription, handler in self.inputs:
-            # In lockstep the reference is that of the tick before.
+            # In lockstep reference and followed pressure are those of the tick before.
             old = self.participants and topic not in MEASURED
             for message, _ in subscription.take_before(now_ns) if old else subscription.take():
                 handler(message)

@@ -51,6 +51,7 @@ MESSAGE_TYPES = {
     'reference': JointState,
     'reference_trajectory': JointTrajectory,
     'pressure_command': FluidPressure,
+    'followed_pressure': FluidPressure,
     'valve_command': JointState,
     'valve_signal': JointState,
     'pressure': FluidPressure,
@@ -165,6 +166,7 @@ _READERS = {
     'reference': _read_reference,
     'reference_trajectory': _read_trajectory,
     'pressure_command': _read_pressure,
+    'followed_pressure': _read_pressure,
     'valve_command': _read_valve_signal,
     'valve_signal': _read_valve_signal,
     'pressure': _read_pressure,
@@ -219,8 +221,8 @@ class RosWriter:
         self._names = ()
         self._points = []
         self._fill = getattr(self, '_fill_' + {
-            'pressure_command': 'pressure', 'supply_pressure': 'pressure',
-            'co_contraction': 'pressure', 'external_force': 'force',
+            'pressure_command': 'pressure', 'followed_pressure': 'pressure',
+            'supply_pressure': 'pressure', 'co_contraction': 'pressure', 'external_force': 'force',
             'valve_command': 'valve_signal', 'joint_effort': 'valve_signal'}.get(topic, topic))
         if topic in ('reference', 'contraction', 'joint_state', 'joint_reference'):
             self.message.name = [muscle]

@@ -84,7 +84,8 @@ class JointNode(LearningSwitch, ManagedNode):
             for topic, handler in INPUTS.items()]
         self._sides = [
             (topic, k, self.add_subscription(f'{side}/{topic}'), handler)
-            for topic, handler in (('pressure', self.loop.on_pressure),
+            for topic, handler in (('followed_pressure', self.loop.on_followed_pressure),
+                                   ('pressure', self.loop.on_pressure),
                                    ('force', self.loop.on_force))
             for k, side in enumerate(SIDES)]
         self._refusals = RefusalLog(self.get_logger())

@@ -39,6 +39,7 @@ TURN_S = 0.0005
 # Who needs a topic; the measurements go to whoever follows the clock.
 NEEDED_BY = {
     'reference': CONTROLLERS, 'reference_trajectory': CONTROLLERS,
+    'followed_pressure': CONTROLLERS,
     'pressure_command': (DRIVER,), 'valve_command': (DRIVER,),
     'valve_signal': (PLANT,), 'external_force': (PLANT,)}
 

@@ -108,6 +108,7 @@ class ValveDriver(ManagedNode):
         self.loop = loop
         self._latencies = {'command': Latency(), 'pressure': Latency()}
         self.add_publisher('valve_signal')
+        self.add_publisher('followed_pressure')
         self.commands = self.add_subscription('pressure_command')
         self.raw_commands = None
         if self.value('accept_valve_command'):
@@ -196,6 +197,9 @@ class ValveDriver(ManagedNode):
         problem = self.output.send(signal.efforts)
         self.loop.on_device(problem)
         self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
+        followed = self.loop.followed()
+        if followed is not None:
+            self.send('followed_pressure', followed)
         safety = self.loop.safety
         self._latencies['command'].used(safety.command_stamp_ns, now_ns)
         self._latencies['pressure'].used(safety.pressure.stamp_ns, now_ns)

@@ -33,7 +33,7 @@ from pam_sim.errors import InputError
 ORDER = (
     'pressure', 'contraction', 'force', 'supply_pressure', 'external_force', 'reference',
     'reference_trajectory', 'controller_state', 'pressure_command', 'valve_command',
-    'valve_signal')
+    'valve_signal', 'followed_pressure')
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000

@@ -124,6 +124,8 @@ class _Chain:
             self._command(message)
         elif topic == 'valve_command':
             self.driver.on_valve_command(message)
+        elif topic == 'followed_pressure':
+            self._tell_followed(message)
         else:
             self._drive(message)
 
@@ -164,6 +166,15 @@ class _Chain:
         for name, effort in zip(signal.names, signal.efforts):
             self._note(f'valve_signal.{name}', message.stamp_ns, recorded.get(name, np.nan),
                        effort)
+
+    def _tell_followed(self, message):
+        followed = self.driver.followed()
+        if followed is None:
+            return
+        if self.control is not None:
+            self.control.on_followed_pressure(followed)
+        self._note('followed_pressure.pressure_pa', message.stamp_ns, message.pressure_pa,
+                   followed.pressure_pa)
 
     def _note(self, name, stamp_ns, recorded, replayed):
         columns = self.rows.setdefault(name, (array('q'), array('d'), array('d')))

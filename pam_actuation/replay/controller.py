@@ -27,7 +27,8 @@ import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.tracked import TRACKED, tracked_by
 from pam_actuation.control.tick import (
-    input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
+    HELD_BACK, input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
+from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 
@@ -134,7 +135,9 @@ def replay_controller(run, controller=None, keep_states=False, progress=None):
     lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
     command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
 
-    core = TickCore(controller)
+    rises_slowly = HELD_BACK in states.values       # versions before did not
+    core = TickCore(controller, rises_slowly)
+    sent_after = SlowRise(active=False)     # what made the recorded commands of those of the law
     compare = tuple(core.names) if own else ()
     wanted = [columns.get(name) for name in compare]
     if own and any(column is None for column in wanted):
@@ -153,11 +156,16 @@ def replay_controller(run, controller=None, keep_states=False, progress=None):
             kept[place] = values
         stamp = int(states.stamp_ns[row])
         recorded[place] = command_at.get(stamp, np.nan)
+        running = int(columns['input_reason'][row]) in RUNNING
+        if running:
+            sent_pa = sent_after.limited(
+                float(columns['command_pa'][row]), 1.0 / controller.rate_hz)
+        elif rises_slowly:
+            sent_after.begin()
         if stamp not in command_at:
             missing += 1
             # A lost message; the state of a running tick keeps the command as well.
-            running = int(columns['input_reason'][row]) in RUNNING
-            recorded[place] = columns['command_pa'][row] if running else command_pa
+            recorded[place] = sent_pa if running else command_pa
         for name, column, value in zip(compare, wanted, values):
             if not _same(column[row], value):
                 differing[name] = differing.get(name, 0) + 1
@@ -178,12 +186,15 @@ def _columns(states, unit, path):
     if f'reference_{unit}' not in states.values and any(
             f'reference_{one.unit}' in states.values for one in TRACKED.values()):
         raise InputError('the recorded controller and this one track different quantities', path)
-    missing = [name for name in input_names(unit) if name not in states.values]
+    columns = dict(states.values)
+    # Recordings from before it existed: every command was taken to be followed.
+    columns.setdefault(HELD_BACK, np.zeros(len(states.stamp_ns)))
+    missing = [name for name in input_names(unit) if name not in columns]
     if missing:
         raise InputError(
             f'controller_state is not from a controller of this project: it lacks {missing[0]}',
             path)
-    return states.values
+    return columns
 
 
 def _check_complete(columns, order, path):
@@ -220,7 +231,8 @@ def _inputs(columns, row, lookups, unit, path):
         for name in ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory'))
     inputs = TickInputs(
         reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
-        restarted=bool(columns['restarted'][row]), stamps_ns=stamps)
+        restarted=bool(columns['restarted'][row]), stamps_ns=stamps,
+        held_back=float(columns[HELD_BACK][row]))
     inputs.elapsed_s = float(columns['elapsed_s'][row])
     fields = ('reference', 'reference_rate', 'lead_reference', 'lead_reference_rate')
     for field_name, name in zip(fields, reference_names(unit)):

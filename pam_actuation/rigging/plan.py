@@ -143,7 +143,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
         if rig.valve == 'hsv':
             topics.append('supply_pressure')
         if controller is not None:
-            topics += ['controller_state', 'pressure_command']
+            topics += ['controller_state', 'pressure_command', 'followed_pressure']
         nodes[RECORDER] = {
             'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}

@@ -39,6 +39,7 @@ def example_messages(i=0, valve='ppr'):
         'reference_trajectory': messages.ReferenceTrajectory(
             stamp_ns, (0, 20_000_000, 1_000_000_001), (0.014, 0.015, 0.016), (0.0, 0.1, -0.1)),
         'pressure_command': messages.Pressure(stamp_ns, 3.0e5 + i),
+        'followed_pressure': messages.Pressure(stamp_ns, 2.9e5 + i),
         'valve_signal': messages.ValveSignal(stamp_ns, *signal),
         'valve_command': messages.ValveSignal(stamp_ns, *signal),
         'pressure': messages.Pressure(stamp_ns, 2.9e5 + 1e3 * math.sin(phase)),

@@ -35,6 +35,7 @@ VALUES = {
     'pressure': {'pressure_pa': 'Pa'},
     'pressure_command': {'pressure_pa': 'Pa'},
     'supply_pressure': {'pressure_pa': 'Pa'},
+    'followed_pressure': {'pressure_pa': 'Pa'},
     'contraction': {'contraction_m': 'm', 'velocity_m_per_s': 'm/s'},
     'reference': {'contraction_m': 'm', 'velocity_m_per_s': 'm/s'},
     'force': {'force_n': 'N'},
@@ -93,7 +94,8 @@ def test_hsv_signals(tmp_path):
 
 
 def test_missing_optional_topics(tmp_path):
-    left_out = ('force', 'supply_pressure', 'reference', 'reference_trajectory',
+    left_out = ('force', 'supply_pressure', 'followed_pressure', 'reference',
+                'reference_trajectory',
                 'external_force', 'controller_state', 'pressure_command', 'valve_command',
                 'diagnostics')
     run = load_run(write_bag(tmp_path / 'run', 5, leave_out=left_out))

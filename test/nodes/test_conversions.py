@@ -32,6 +32,7 @@ SAMPLES = {
     'reference_trajectory': messages.ReferenceTrajectory(
         STAMP_NS, (0, 20_000_000, 1_040_000_000), (0.01, 0.011, 0.012), (0.0, 0.1, -0.1)),
     'pressure_command': messages.Pressure(STAMP_NS, 345_678.9),
+    'followed_pressure': messages.Pressure(STAMP_NS, 234_567.8),
     'valve_signal': messages.ValveSignal(STAMP_NS, ('fill_duty', 'vent_duty'), (0.25, 0.0)),
     'pressure': messages.Pressure(STAMP_NS, 101_325.0),
     'supply_pressure': messages.Pressure(STAMP_NS, 801_325.0),

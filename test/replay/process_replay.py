@@ -29,6 +29,7 @@ from pam_actuation.replay.driver import replay_driver
 from pam_actuation.replay.plant import replay_plant
 
 PINNED = Path(__file__).resolve().parent / 'pinned'
+OLDER = PINNED.parent / 'older'          # bags of versions before
 EXPERIMENT = PINNED / 'experiment.yaml'
 RIG = 'dmsp_5_300_realistic'
 SEED = 4

@@ -34,7 +34,7 @@ from pam_actuation.replay.settings import changed_controller
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
-from process_replay import bag_of, CASES
+from process_replay import bag_of, CASES, OLDER
 import pytest
 
 
@@ -52,6 +52,15 @@ def test_a_simulated_bag_is_reproduced_to_the_bit_by_every_part(runs, case):
     # The free run of the plant has no sensor noise; it stays within a few deviations.
     assert {d.signal for d in result.plant.differences} == {'pressure', 'contraction', 'force'}
     assert result.plant.to_dict()['rmse']['contraction'] < 2e-4
+
+
+@pytest.mark.parametrize('bag', sorted(OLDER.glob('*.mcap')), ids=lambda bag: bag.stem)
+def test_controllers_of_older_recordings_are_reproduced_to_the_bit(bag):
+    """Recordings without ``held_back`` are of versions that knew nothing of their driver."""
+    run = load_run(bag)
+    assert 'held_back' not in run.require('controller_state').values
+    result = replay_run(run)
+    assert result.controller.identical, result.controller.sentence()
 
 
 @pytest.mark.parametrize('case', CASES)

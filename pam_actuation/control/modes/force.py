@@ -171,7 +171,7 @@ class ForceController(WrappedLaw):
             self._par, self.surface, self._st, raw, self.law.static_inverse, self._inp)
 
     def step(self, x_m, ref_n, ref_rate_n_per_s, ref_lead_n, ref_lead_rate_n_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan):
+             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan, held_back=0.0):
         """
         Run one tick; arguments as of the law, references in N and N/s.
 
@@ -189,6 +189,8 @@ class ForceController(WrappedLaw):
             Measured absolute pressure [Pa]; NaN where not known.
         force_n : float
             Measured force [N].
+        held_back : float
+            0 while the driver follows the command, else a code of ``following``.
 
         Returns
         -------
@@ -197,7 +199,7 @@ class ForceController(WrappedLaw):
 
         """
         self._raw[:] = (x_m, ref_n, ref_rate_n_per_s, ref_lead_n, ref_lead_rate_n_per_s, 0.0,
-                        elapsed_s, pressure_pa, force_n)
+                        elapsed_s, pressure_pa, force_n, held_back)
         self._convert(self._raw)
         inp = self._inp.tolist()
         self._error_n = ref_n - force_n

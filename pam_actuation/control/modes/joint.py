@@ -178,7 +178,8 @@ class JointController(WrappedLaw):
 
     def step(self, angle_rad, ref_rad, ref_rate_rad_per_s, ref_lead_rad,
              ref_lead_rate_rad_per_s, learn=True, elapsed_s=math.nan,
-             pressures_pa=(math.nan, math.nan), forces_n=(math.nan, math.nan)):
+             pressures_pa=(math.nan, math.nan), forces_n=(math.nan, math.nan),
+             held_back=0.0):
         """
         Run one tick.
 
@@ -195,6 +196,8 @@ class JointController(WrappedLaw):
         pressures_pa, forces_n : pair of float
             Measured at flexor and extensor, absolute Pa and N; NaN where not known. Used for
             the bumpless start and for freezing the learning only.
+        held_back : float
+            0 while both drivers follow their commands, else a code of ``following``.
 
         Returns
         -------
@@ -203,7 +206,7 @@ class JointController(WrappedLaw):
 
         """
         self._raw[:] = (angle_rad, ref_rad, ref_rate_rad_per_s, ref_lead_rad,
-                        ref_lead_rate_rad_per_s, 0.0, elapsed_s, math.nan, math.nan)
+                        ref_lead_rate_rad_per_s, 0.0, elapsed_s, math.nan, math.nan, held_back)
         self._pressures[:] = pressures_pa
         self._forces[:] = forces_n
         _joint_inputs(self._par, self._raw, self._pressures, self._forces, self._inp)

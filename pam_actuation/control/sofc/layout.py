@@ -128,7 +128,8 @@ S_INTEGRAL_MEAN = 37
 S_INTEGRAL_SHAPE = 38
 S_SETTLING_LEFT = 39
 S_JUMPED = 40
-STATE_COUNT = 41
+S_ERROR = 41
+STATE_COUNT = 42
 
 # Outputs of one tick; STATE_NAMES are their names on topic controller_state.
 O_COMMAND = 0

@@ -26,7 +26,7 @@ import math
 from numba import njit
 from pam_actuation.control import inputs as place
 from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, limited)
+    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.sofc import credit, dynamics, guard, layout as at, learning
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
@@ -227,10 +227,15 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     st[at.S_CONTRACTION] = inp[place.IN_CONTRACTION]
     dynamics.note_jump(st, inp[place.IN_REFERENCE_RATE])
     lags = _valve_lags(par, ring, st, inp)
-    if lags or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
+    held_back = inp[place.IN_HELD_BACK]
+    stays_behind = lags or held_back != 0.0
+    if stays_behind or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
         st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
-    offset = st[at.S_OFFSET]
+    offset = held_offset(
+        st[at.S_OFFSET], held_back, inp[place.IN_REFERENCE] - to_go - inp[place.IN_CONTRACTION],
+        st[at.S_ERROR], par[at.P_START_TIME], period)
     error = inp[place.IN_REFERENCE] - to_go - offset - inp[place.IN_CONTRACTION]
+    st[at.S_ERROR] = error
     lead = inp[place.IN_LEAD_REFERENCE] - lead_to_go - offset
     lead_rate = inp[place.IN_LEAD_RATE] + lead_extra_rate
     st[at.S_OFFSET] = faded_offset(offset, par[at.P_START_TIME], period)
@@ -285,8 +290,9 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
     integral_gain = par[at.P_INTEGRAL]
     if _surprising(par, st, error):
         integral_gain *= par[at.P_SURPRISE_INTEGRAL]
-    growth = (integral_gain * error
-              + (inside - wanted) / par[at.P_ANTI_WINDUP_TIME]) * period
+    growth = integral_growth(
+        integral_gain * error, (inside - wanted) / par[at.P_ANTI_WINDUP_TIME],
+        held_back) * period
     # Supply, valve or driver hold the pressure back, or the command is on its way: more would
     # not help, and the way from one pressure to another is no error of the pressure at its end.
     if lags or at_slew:
@@ -310,7 +316,7 @@ def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
         index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
     else:
         index = index_table(error_scaled, change_scaled, par[at.P_INDEX_LIMIT])
-    reason = _reason(par, ring, st, inp, error, at_limit, lags)
+    reason = _reason(par, ring, st, inp, error, at_limit, stays_behind)
     fb_squares = 0.0
     ff_squares = 0.0
     motion_squares = 0.0

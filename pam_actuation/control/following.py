@@ -1,0 +1,136 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Whether the driver follows the commands of a controller, as it tells on ``followed_pressure``.
+
+While the driver vents or limits a command, the error is not the controller's: an integral that
+grew on it would ask for too much once the command counts again. A controller that knows holds
+its integral and its rules. No ROS inside.
+"""
+
+from collections import deque
+import math
+
+from pam_sim.units import P_ATM_PA
+
+FOLLOWS, LESS, MORE, UNKNOWN = 0.0, 1.0, -1.0, 2.0      # what the driver does; ``IN_HELD_BACK``
+TOLERANCE_PA = 2_000.0
+MAX_AGE_NS = 100_000_000
+MAX_AHEAD_NS = 20_000_000
+ON_THE_WAY_NS = 40_000_000  # a period of either, and what a busy machine takes
+_STANDS_NS = 200_000_000
+_FILTER_S = 0.1             # of the pressure expected in the muscle
+
+
+class CommandFollowing:
+    """
+    Compares what the driver follows with the commands sent just before.
+
+    One for each driver. A driver that never told is trusted, as long as the pressure that was
+    measured before still is: a driver that supervises it vents without.
+    """
+
+    def __init__(self):
+        self.forget()
+
+    def forget(self):
+        """Begin anew, as before the first message."""
+        self._followed = None       # newest message
+        self._sent = deque()        # (time, command), the newest last
+        self._measured = False      # whether a pressure ever was
+        self._reading_pa = math.nan
+        self._since_ns = 0
+        self._expected_pa = math.nan
+
+    def on_followed(self, message):
+        """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
+        if math.isfinite(message.pressure_pa):
+            self._followed = message
+
+    @property
+    def told(self):
+        """Tell whether the driver ever told what it follows."""
+        return self._followed is not None
+
+    def sent(self, now_ns, command_pa):
+        """Take note of a command [absolute Pa] sent now."""
+        oldest_ns = now_ns - MAX_AGE_NS - ON_THE_WAY_NS
+        while self._sent and self._sent[0][0] < oldest_ns:
+            self._sent.popleft()
+        if self._sent and self._sent[-1][0] >= now_ns:
+            self._sent.clear()      # the clock was set back
+        dt_s = (now_ns - self._sent[-1][0]) * 1e-9 if self._sent else 0.0
+        self._sent.append((now_ns, command_pa))
+        arrives_pa = self._followed.pressure_pa if self.told else command_pa
+        if not math.isfinite(self._expected_pa):
+            self._expected_pa = arrives_pa
+        self._expected_pa += dt_s / (_FILTER_S + dt_s) * (arrives_pa - self._expected_pa)
+
+    def judge(self, now_ns, pressure_pa):
+        """
+        Return what the driver does with the commands.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of the tick.
+        pressure_pa : float
+            Measured absolute pressure, NaN where none is fresh.
+
+        Returns
+        -------
+        float
+            ``FOLLOWS``; ``LESS`` or ``MORE`` where it gives less or more than commanded;
+            ``UNKNOWN`` where it fell silent, or the pressure it needs is lost.
+
+        """
+        known = math.isfinite(pressure_pa)
+        self._measured = self._measured or known
+        if not self.told:
+            return UNKNOWN if self._measured and not known else FOLLOWS
+        age_ns = now_ns - self._followed.stamp_ns
+        if not -MAX_AHEAD_NS <= age_ns <= MAX_AGE_NS:
+            return UNKNOWN
+        stamp_ns = self._followed.stamp_ns
+        sent = [command_pa for time_ns, command_pa in self._sent
+                if stamp_ns - ON_THE_WAY_NS <= time_ns <= stamp_ns]
+        if not sent:
+            return FOLLOWS
+        followed_pa = self._followed.pressure_pa
+        if followed_pa < max(min(sent), P_ATM_PA) - TOLERANCE_PA:
+            return LESS
+        return MORE if followed_pa > max(max(sent), P_ATM_PA) + TOLERANCE_PA else FOLLOWS
+
+    def expected_pa(self, now_ns, pressure_pa):
+        """
+        Return the pressure to be expected in the muscle [absolute Pa], NaN while it is measured.
+
+        A reading that has stood still to the last bit for 0.2 s is none. Without a word of the
+        driver its own commands count, but only while there is a reading at all.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of the tick.
+        pressure_pa : float
+            Measured absolute pressure, NaN where none is fresh.
+
+        """
+        if not math.isfinite(pressure_pa):
+            return self._expected_pa if self.told else math.nan
+        if pressure_pa != self._reading_pa or now_ns < self._since_ns:
+            self._reading_pa, self._since_ns = pressure_pa, now_ns
+        stands = now_ns - self._since_ns >= _STANDS_NS
+        return self._expected_pa if stands else math.nan
