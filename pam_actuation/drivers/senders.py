@@ -30,12 +30,12 @@ _MOST_UNNAMED = 32
 
 
 def told(names):
-    """Return names as words: ``/a and /b``, ``two nodes named /a``; '' is no ROS node."""
+    """Return names as words: ``/a and /b``, ``two nodes named /a``; '' has none."""
     words = []
     for name in sorted(set(names)):
         count = names.count(name)
         if not name:
-            words.append('a program that is no ROS node')
+            words.append('a program without a node name')
         elif count > 1:
             words.append(f'{("two", "three")[count > 2]}{" or more" * (count > 3)} nodes '
                          f'named {name}')
