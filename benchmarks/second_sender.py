@@ -78,8 +78,8 @@ class Case:
 
 CASES = {
     'drivers': Case('two drivers', 'valve_signal', DRIVER, (DRIVER, SECOND, WATCHDOG)),
-    'signal': Case('a second publisher of valve_signal at full opening, then SIGKILL of the driver',
-                   'valve_signal', tellers=(WATCHDOG,), kills=True),
+    'signal': Case('a second publisher of valve_signal at full opening, then SIGKILL of the '
+                   'driver', 'valve_signal', tellers=(WATCHDOG,), kills=True),
     'controllers': Case('two controllers', 'pressure_command', CONTROLLER),
     'pressures': Case('two pressure sensors', 'pressure'),
     'contractions': Case('two contraction sensors', 'contraction', tellers=(CONTROLLER,),
@@ -179,9 +179,10 @@ def play(rig, case, rng):
                  if one not in own and not witness.is_named(one, WATCHDOG)}
     safe_ns = (witness.safe_since(onset_ns, strangers) if case.safe == 'signal'
                else witness.atmosphere_since(onset_ns))
-    told_ns = [next((one.stamp_ns for who, one in witness.said if who == teller
-                     and one.stamp_ns >= onset_ns and second.name_for(teller) in one.message), None)
-               for teller in second.tellers]
+    told_ns = [next((
+        one.stamp_ns for who, one in witness.said if who == teller
+        and one.stamp_ns >= onset_ns and second.name_for(teller) in one.message), None)
+        for teller in second.tellers]
     told = None not in told_ns
     pressures = [one for one in witness.heard['true/pressure'] if one.stamp_ns >= onset_ns]
     highest_pa = max(one.pressure_pa for one in pressures) - 101_325.0
@@ -269,8 +270,8 @@ def stranger(valve):
 
 def table(outcomes, valve):
     """Return the Markdown table of a valve."""
-    lines = ['| what begins | times | vented within, median / worst | named within, median / worst '
-             '| named | highest pressure | a second later, at most | sound again |',
+    lines = ['| what begins | times | vented within, median / worst | named within, median / '
+             'worst | named | highest pressure | a second later, at most | sound again |',
              '|---|---|---|---|---|---|---|---|']
     for key, case in CASES.items():
         rows = [one for one in outcomes if one['valve'] == valve and one['case'] == key]
@@ -282,9 +283,9 @@ def table(outcomes, valve):
         tellers = ', '.join('the second driver' if one == SECOND else f'`{one}`'
                             for one in case.tellers)
         lines.append(
-            f'| {case.title} | {len(rows)} | {_times(vented)} ({sum(one["safe_ok"] for one in rows)}'
-            f' of {len(rows)}) | {_times(named)} ({sum(one["told"] for one in rows)} of '
-            f'{len(rows)}) | {names} by {tellers} '
+            f'| {case.title} | {len(rows)} | {_times(vented)} '
+            f'({sum(one["safe_ok"] for one in rows)} of {len(rows)}) | {_times(named)} '
+            f'({sum(one["told"] for one in rows)} of {len(rows)}) | {names} by {tellers} '
             f'| {max(one["highest_gauge_pa"] for one in rows) * 1e-3:.0f} kPa '
             f'| {max(one["later_gauge_pa"] for one in rows) * 1e-3:.0f} kPa '
             f'| {sum(one["restarted"] for one in rows)} of {len(rows)} |')

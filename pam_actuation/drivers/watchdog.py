@@ -31,7 +31,6 @@ WAITING, HEARS, RESTS, VENTS, CONTESTED = (
     'vented because the valve signal fell silent', 'vented because two send the valve signal')
 _MS, _NS = 1_000_000, 1_000_000_000
 _LATE_NS = 20_000_000           # between two of its own ticks: it was kept waiting itself
-_REMEMBERED_NS = 60 * _NS
 
 
 class _Other:
@@ -130,13 +129,14 @@ class SignalWatchdog:
             self._driver, self._driver_name = writer, name
             return True
         self._others = {one: other for one, other in self._others.items()
-                        if 0 <= now_ns - other.last_ns <= _REMEMBERED_NS}
+                        if 0 <= now_ns - other.last_ns <= CLEAR_S * _NS}
         first_ns = self._others.setdefault(writer, _Other(now_ns)).first_ns
         silent_ns = now_ns - self._heard_ns
         began_after = writer not in self._former and self._heard_ns < first_ns
         same = name and name in (self._driver_name, self._expected)
         if same and (began_after or silent_ns > CLEAR_S * _NS) or (
-                began_after and silent_ns > self._timeout_ns and self._ended_in_order()):
+                began_after and silent_ns > self._timeout_ns and self.state in (HEARS, RESTS)
+                and self._ended_in_order()):
             self._former.add(self._driver)
             del self._others[writer]
             self._driver, self._driver_name = writer, name
