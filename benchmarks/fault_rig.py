@@ -34,11 +34,14 @@ from pam_actuation.messages import Pressure, SAFE_EFFORTS
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.conversions import from_ros, RosWriter, stamp_ns, type_of
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.senders import WriterNames
+from pam_actuation.nodes.wire import WireReader
 from pam_actuation.rigging.client import RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_sim.units import P_ATM_PA
 import rclpy
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 NAMESPACE = '/muscle'
@@ -84,7 +87,7 @@ class FaultRig:
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = DomainLock()
-        self._environment = node_environment(self._lock.domain_id, folder)
+        self.environment = node_environment(self._lock.domain_id, folder)
         experiment = folder / 'swing.yaml'
         experiment.write_text(EXPERIMENT)
         kind = {'valve_type': valve}
@@ -97,8 +100,9 @@ class FaultRig:
         self.bag = None
         self._bags = 0
         self._recorded_before = None
+        self.stranger = None        # a process that may send what it should not
         self._relay = subprocess.Popen(
-            [sys.executable, __file__], env=self._environment, stdin=subprocess.PIPE, text=True,
+            [sys.executable, __file__], env=self.environment, stdin=subprocess.PIPE, text=True,
             start_new_session=True)
         for name in self._parameters:
             self.start(name)
@@ -114,7 +118,7 @@ class FaultRig:
             parameters['output'] = str(self.bag)
         remap = {topic: f'true/{topic}' for topic in RELAYED} if name == 'plant_simulator' else {}
         self.processes[name] = NodeProcess(
-            name, NAMESPACE, parameters, self._environment, self.folder, remap)
+            name, NAMESPACE, parameters, self.environment, self.folder, remap)
 
     def spoil(self, topic, how):
         """Have the relay spoil a sensor, or stop it with ``none``."""
@@ -156,8 +160,9 @@ class FaultRig:
         for name in ('valve_driver', 'experiment_recorder'):
             end_all([self.processes[name]], 30.0)
         end_all(self.processes.values())
-        self._relay.terminate()
-        self._relay.wait(10.0)
+        for process in filter(None, (self.stranger, self._relay)):
+            process.terminate()
+            process.wait(10.0)
         self.witness.close()
         self._lock.release()
 
@@ -174,6 +179,8 @@ class Witness:
         Every change of a status since ``forget``.
     heard : dict
         Topic to plain messages since ``forget``.
+    writers : dict
+        Topic to the writers of these messages, GIDs.
 
     """
 
@@ -182,9 +189,11 @@ class Witness:
         self._client = RigClient(domain_id)
         node = self._client.node
         self._sources = {
-            topic: PolledSubscription(node, type_of(topic), f'{NAMESPACE}/{topic}', qos.RECORDER)
-            for topic in HEARD}
+            topic: PolledSubscription(
+                node, type_of(topic), f'{NAMESPACE}/{topic}', qos.RECORDER, raw=True,
+                read=WireReader(topic), writers=True) for topic in HEARD}
         self._health = PolledSubscription(node, DiagnosticArray, '/diagnostics', qos.RECORDER)
+        self._name_of = WriterNames(node)
         self.last = {}
         self.heard = {}
         self._stood_safe = False
@@ -195,6 +204,7 @@ class Witness:
         if self.heard.get('valve_signal'):
             self._stood_safe = self.heard['valve_signal'][-1].efforts == self._safe
         self.heard = {topic: [] for topic in HEARD}
+        self.writers = {topic: [] for topic in HEARD}
         self.said = []
 
     def listen(self, duration_s):
@@ -202,7 +212,9 @@ class Witness:
         deadline = time.monotonic() + duration_s
         while True:
             for topic, source in self._sources.items():
-                self.heard[topic] += [from_ros(topic, message) for message, _ in source.take()]
+                for plain, info in source.take():
+                    self.heard[topic].append(plain)
+                    self.writers[topic].append(info['writer'])
             for message, _ in self._health.take():
                 self._note(message)
             left_s = deadline - time.monotonic()
@@ -225,18 +237,49 @@ class Witness:
         return next((status for who, status in self.said if who == name
                      and status.stamp_ns >= since_ns and re.search(words, status.message)), None)
 
-    def safe_since(self, since_ns):
+    def safe_since(self, since_ns, without=()):
         """
         Return the stamp of the first of three safe valve signals in a row, None if none.
 
         The time itself where the valve stood at the safe signal already and nothing else came.
+        What the writers ``without`` sent does not count.
         """
-        after = sorted((one for one in self.heard['valve_signal'] if one.stamp_ns >= since_ns),
-                       key=lambda one: one.stamp_ns)
+        after = sorted((one for one, writer in zip(
+            self.heard['valve_signal'], self.writers['valve_signal'])
+            if one.stamp_ns >= since_ns and writer not in without), key=lambda one: one.stamp_ns)
         if not after and self._stood_safe:
             return since_ns
         safe = [one.efforts == self._safe for one in after]
         return next((after[k].stamp_ns for k in range(len(safe) - 2) if all(safe[k:k + 3])), None)
+
+    def wait_for_node(self, name, timeout_s):
+        """Wait until a node is on the graph; TimeoutError if it does not come."""
+        deadline = time.monotonic() + timeout_s
+        while name not in self._client.node.get_node_names():
+            if time.monotonic() > deadline:
+                raise TimeoutError(f'{name} did not come up within {timeout_s:g} s')
+            self.listen(0.1)
+
+    def wait_for_publishers(self, topic, count, timeout_s):
+        """Wait until a topic has some publishers; TimeoutError if they do not come."""
+        deadline = time.monotonic() + timeout_s
+        while self._client.node.count_publishers(f'{NAMESPACE}/{topic}') < count:
+            if time.monotonic() > deadline:
+                raise TimeoutError(f'{topic} has not {count} publishers after {timeout_s:g} s')
+            self.listen(0.1)
+
+    def new_listener(self, name, topics):
+        """Return a node of the rig's namespace that listens to some topics and does nothing."""
+        node = Node(name, namespace=NAMESPACE, context=self._client.node.context,
+                    enable_rosout=False, start_parameter_services=False)
+        for topic in topics:
+            kind = DiagnosticArray if topic == '/diagnostics' else type_of(topic)
+            node.create_subscription(kind, topic, lambda message: None, qos.CONSUMER)
+        return node
+
+    def is_named(self, writer, name):
+        """Tell whether a writer of ``valve_signal`` is that of a node of the rig."""
+        return self._name_of(f'{NAMESPACE}/valve_signal', writer) == f'{NAMESPACE}/{name}'
 
     def atmosphere_since(self, since_ns):
         """Return the stamp of the first command of atmospheric pressure, None if none."""

@@ -227,6 +227,16 @@ class Series:
 
     """
 
+    SETTLES = ('kill_recorder',)        # cases after which the bag has ended
+
+    def cases(self):
+        """Return key to case of the rows."""
+        return cases_of(self._arguments.valve)
+
+    def play(self, rig, case, rng):
+        """Let one case happen at a moment; return the outcome."""
+        return play(rig, case, SETTLE_S + rng.uniform(0.0, MOMENTS_S))
+
     def __init__(self, arguments):
         self._arguments = arguments
         self._path = Path(arguments.out)
@@ -240,7 +250,7 @@ class Series:
         """Return (key, number) of what is still to do, in an order fixed by the seed."""
         known = {(one['case'], one['number']) for one in self.outcomes
                  if one['valve'] == self._arguments.valve}
-        wanted = self._arguments.only or list(cases_of(self._arguments.valve))
+        wanted = self._arguments.only or list(self.cases())
         left = []
         for number in range(self._arguments.times):
             keys = [key for key in wanted if (key, number) not in known]
@@ -250,19 +260,19 @@ class Series:
 
     def run(self):
         """Play all that is left."""
-        valve, cases = self._arguments.valve, cases_of(self._arguments.valve)
+        valve, cases = self._arguments.valve, self.cases()
         left = self._left()
         try:
             for key, number in tqdm(left, unit='fault', disable=None):
                 if self._rig is None:
                     self._start()
                 rng = random.Random(f'{self._arguments.seed} {valve} {key} {number}')
-                outcome = play(self._rig, cases[key], SETTLE_S + rng.uniform(0.0, MOMENTS_S))
+                outcome = self.play(self._rig, cases[key], rng)
                 outcome.update(valve=valve, case=key, number=number)
                 self._open.append(outcome)
                 if not outcome['restarted']:
                     self._end()
-                elif key == 'kill_recorder':
+                elif key in self.SETTLES:
                     self._settle(killed=True)
         finally:
             self._end()
@@ -340,23 +350,28 @@ def _count(rows, name):
 
 def main():
     """Play, print the table; exit code 1 if anything was not as it must be."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
-    parser.add_argument('--times', type=int, default=3, help='how often each fault strikes')
+    return run_series(Series, table, CASES, 'fault_table.jsonl', __doc__)
+
+
+def run_series(series_class, table_of, keys, out, description, times=3):
+    """Play what the command line asks for, print the table; return the exit code."""
+    parser = argparse.ArgumentParser(description=description.split('\n')[1])
+    parser.add_argument('--times', type=int, default=times, help='how often each fault strikes')
     parser.add_argument('--valve', choices=('ppr', 'hsv'), default='hsv')
     parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--out', default='fault_table.jsonl', help='one line per fault')
-    parser.add_argument('--only', nargs='*', choices=CASES, help='these faults only')
+    parser.add_argument('--out', default=out, help='one line per fault')
+    parser.add_argument('--only', nargs='*', choices=keys, help='these faults only')
     parser.add_argument('--print', action='store_true', help='only print what there is')
     arguments = parser.parse_args()
     if arguments.print:
         outcomes = read_outcomes(Path(arguments.out))
     else:
-        series = Series(arguments)
+        series = series_class(arguments)
         with termination_as_interrupt():
             series.run()
         outcomes = series.outcomes
     outcomes = [one for one in outcomes if one['valve'] == arguments.valve]
-    print(table(outcomes, arguments.valve))
+    print(table_of(outcomes, arguments.valve))
     bad = [one for one in outcomes if not good(one)]
     for one in bad:
         print(f'not as it must be: {json.dumps(one)}', file=sys.stderr)

@@ -17,7 +17,7 @@ A joint: simulated limb with two muscles, driver and watchdog for each, a contro
 
     ros2 launch pam_actuation knee.launch.py valve:=ppr experiment:=joint_sine
 
-Ends by itself when the experiment is over, and when a driver, the joint or the controller ends.
+Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
 Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory.
 """
 

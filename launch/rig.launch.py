@@ -18,8 +18,7 @@ The whole rig: plant or real sensors, driver and watchdog, controller, reference
     ros2 launch pam_actuation rig.launch.py valve:=hsv experiment:=sine_quarter_hz
     ros2 launch pam_actuation rig.launch.py hardware:=my_rig.yaml
 
-Ends by itself when the experiment is over, and when the driver, the plant, the
-sensors or the recorder ends.
+Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
 """
 
 from datetime import datetime
@@ -141,18 +140,16 @@ def generate_launch_description():
         'reference_generator', valve,
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
          'exit_when_finished': True})
-    nodes = [
-        recorder, plant, sensors, driver, watchdog,
-        _node('sofc_controller', valve, control, learning, condition=chosen('sofc')),
-        _node('pid_controller', valve, control, condition=chosen('pid')),
-        reference,
-    ]
+    sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc'))
+    pid = _node('pid_controller', valve, control, condition=chosen('pid'))
+    nodes = [recorder, plant, sensors, driver, watchdog, sofc, pid, reference]
     ends = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
             (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
             (plant, 'the plant ended'), (sensors, 'the sensors ended'),
-            (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'))]
+            (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'),
+            (sofc, 'the controller ended'), (pid, 'the controller ended'))]
     return LaunchDescription(
         [*_arguments(), OpaqueFunction(function=_note_what_is_needed), *nodes, *ends])
 

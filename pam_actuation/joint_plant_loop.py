@@ -54,6 +54,10 @@ class JointPlantLoop(PlantClock):
                         for k, (side, rig) in enumerate(zip(SIDES, rigs))}
         self._noise = np.random.default_rng((seed, len(SIDES)))
 
+    def set_signal(self, side, message, writer=None):
+        """Take a valve signal of one muscle."""
+        self.signals[side].take(message, writer, self.now_ns or 0)
+
     def step(self, count):
         """Advance the joint by some steps with the signals held."""
         for _ in range(count):

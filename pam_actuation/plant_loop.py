@@ -22,15 +22,21 @@ when asked. The simulator node and the offline simulation both use it.
 
 import math
 
-from pam_actuation.messages import Contraction, Force, Pressure, VALVE_NAMES, ValveSignal
+from pam_actuation.messages import (
+    Contraction, Force, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
 from pam_sim.sensors import SensorChain
 
 _NS = 1_000_000_000
+SAFE_COUNTS_NS = 100_000_000     # a safe signal against the openings of others
 
 
 class HeldSignal:
     """
     The valve signal that acts: the last effort of each name, held without limit.
+
+    Where several send, as a driver and somebody who should not, one of them saying *vent* is
+    enough: its safe signal acts for 0.1 s, whatever the others say. Of two openings the later
+    one acts, as on a valve.
 
     Parameters
     ----------
@@ -40,20 +46,37 @@ class HeldSignal:
 
     def __init__(self, valve):
         self._names = VALVE_NAMES[valve]
-        self.efforts = (0.0,) * len(self._names)
+        self._safe = SAFE_EFFORTS[valve]
+        self._last = self.efforts = (0.0,) * len(self._names)
+        self._safe_until_ns = {}        # writer to the time until which its safe signal counts
         self.taken = 0
         self.ignored = 0
 
-    def take(self, message: ValveSignal):
-        """Take efforts by name; anything not finite or unknown is ignored and counted."""
+    def take(self, message: ValveSignal, writer=None, now_ns=0):
+        """
+        Take efforts by name; anything not finite or unknown is ignored and counted.
+
+        ``writer`` is who sent it, None where that is not known; ``now_ns`` the time of the plant.
+        """
         self.taken += 1
-        efforts = list(self.efforts)
+        efforts = list(self._last)
         for name, effort in zip(message.names, message.efforts):
             if name in self._names and math.isfinite(effort):
                 efforts[self._names.index(name)] = float(effort)
             else:
                 self.ignored += 1
-        self.efforts = tuple(efforts)
+        self._last = self.efforts = tuple(efforts)
+        if writer is not None and self._another_vents(writer, now_ns):
+            self.efforts = self._safe
+
+    def _another_vents(self, writer, now_ns):
+        if self._last == self._safe:
+            self._safe_until_ns[writer] = now_ns + SAFE_COUNTS_NS
+        else:
+            self._safe_until_ns.pop(writer, None)
+        self._safe_until_ns = {one: until_ns for one, until_ns in self._safe_until_ns.items()
+                               if now_ns <= until_ns <= now_ns + SAFE_COUNTS_NS}
+        return bool(self._safe_until_ns.keys() - {writer})
 
 
 def muscle_readings(plant, sensors, stamp_ns, time_s):
@@ -211,9 +234,9 @@ class PlantLoop(PlantClock):
         """Return the number of efforts that were not usable."""
         return self._held.ignored
 
-    def set_signal(self, message: ValveSignal):
+    def set_signal(self, message: ValveSignal, writer=None):
         """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
-        self._held.take(message)
+        self._held.take(message, writer, self.now_ns or 0)
 
     def set_external_force(self, message: Force):
         """Take the disturbance force on the load [N]; not finite is ignored."""

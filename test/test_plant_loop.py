@@ -68,6 +68,27 @@ def test_signal_by_name_and_held():
     assert plant.signal == (0.0, 0.2) and plant.signals == 4
 
 
+@pytest.mark.parametrize('valve, opening, safe', [
+    ('ppr', (6.0,), (0.0,)), ('hsv', (1.0, 0.0), (0.0, 1.0))])
+def test_of_several_senders_one_that_vents_is_enough(valve, opening, safe):
+    """A safe signal acts for 0.1 s against the openings of others, not against its own writer's."""
+    plant = make(valve)
+    names = plant.rig.signal_names
+
+    def acts(at_ms, writer, efforts):
+        plant.advance_to(START + at_ms * MS)
+        plant.set_signal(ValveSignal(0, names, efforts), writer)
+        return plant.signal
+
+    assert acts(0, 'driver', opening) == opening
+    assert acts(1, 'driver', safe) == safe
+    assert acts(2, 'stranger', opening) == safe
+    assert acts(90, 'stranger', opening) == safe
+    assert acts(102, 'stranger', opening) == opening
+    assert acts(103, 'driver', safe) == safe and acts(104, 'driver', opening) == opening
+    assert acts(105, 'stranger', opening) == opening
+
+
 def test_ppr_reaches_its_pressure():
     """3 V give 300 kPa gauge and the contraction of the force map."""
     plant = make()

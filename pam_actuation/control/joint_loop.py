@@ -38,7 +38,7 @@ from pam_actuation.control.frozen import FrozenMeasurement, JOINT_SWING_PA
 from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
 from pam_actuation.control.loop import (
-    fresh, measurement_reason, REFERENCE_REASONS, STALL_NS)
+    fresh, measurement_reason, reason_text, REFERENCE_REASONS, STALL_NS)
 from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
@@ -95,6 +95,7 @@ class JointControllerLoop:
         self._refused_trajectories = 0
         self.refusal = ''           # why the newest trajectory was not taken
         self.reason = codes.REASONS[codes.NO_ANGLE]
+        self.two_sensors = ''       # the sentence while two nodes send the angle
         self.ticks = 0
         self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
         self._range = lower, upper
@@ -205,7 +206,7 @@ class JointControllerLoop:
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
         reason = self._reason(now_ns)
-        self.reason = codes.REASONS[reason]
+        self.reason = reason_text(reason, self.two_sensors)
         running = reason in codes.RUNNING
         if stalled or not running:
             controller.pause()
@@ -246,6 +247,8 @@ class JointControllerLoop:
 
     def _reason(self, now_ns):
         """Return the code for the inputs of this tick, one of ``codes.RUNNING`` if usable."""
+        if self.two_sensors:
+            return codes.TWO_SENSORS
         angle = math.nan if self._angle is None else self._angle.angle_rad
         reason = measurement_reason(self._angle, angle, self._range, _REASONS, now_ns)
         if reason != codes.OK:

@@ -29,6 +29,7 @@ contraction the same to the last bit for       vents until it has changed, 2 s a
 0.2 s while the pressure changed by 150 kPa;
 or, where the pressure stands still as well,
 while that followed by the driver did
+what is tracked is sent by two publishers      vents until one of them is silent for 1 s
 force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
@@ -76,6 +77,12 @@ REFERENCE_REASONS = {
 def fresh(message, now_ns):
     """Return whether a message is neither too old nor too far ahead."""
     return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS
+
+
+def reason_text(code, two_sensors):
+    """Return a code as words; of two sensors the sentence that names them."""
+    words = codes.REASONS[code]
+    return f'{words}: {two_sensors}' if code == codes.TWO_SENSORS else words
 
 
 def measurement_reason(message, value, allowed, reasons, now_ns):
@@ -139,6 +146,7 @@ class ControllerLoop:
         self.references = ReferenceBuffer(self.tracked, self._range)
         self.reason = codes.REASONS[self._reasons[0]]
         self.valid = False
+        self.two_sensors = ''       # the sentence while two nodes send what is tracked
         self._frozen = FrozenMeasurement(
             _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
         # Of a muscle whose pressure reading stands still too, by the pressure it should have.
@@ -221,7 +229,7 @@ class ControllerLoop:
         command_pa, values = self._core.run(inputs)
         self._following.sent(now_ns, command_pa)
         self.valid = inputs.reason in codes.RUNNING
-        self.reason = codes.REASONS[inputs.reason]
+        self.reason = reason_text(inputs.reason, self.two_sensors)
         return (Pressure(now_ns, command_pa),
                 ControllerState(now_ns, self._core.names, values))
 
@@ -234,6 +242,8 @@ class ControllerLoop:
 
     def _measured_reason(self, now_ns):
         """Return the code for the newest measurement of what is tracked, OK if usable."""
+        if self.two_sensors:
+            return codes.TWO_SENSORS
         message, value = self._measured()
         reason = measurement_reason(message, value, self._range, self._reasons, now_ns)
         if reason == codes.OK and self._stands_still(now_ns, message.stamp_ns, value):

@@ -31,7 +31,7 @@ from pam_sim.units import P_ATM_PA
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
- FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK) = range(24)
+ FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS) = range(25)
 REASONS = (
     'ok',
     'no contraction measured yet',
@@ -56,7 +56,8 @@ REASONS = (
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
     'force stands still although the pressure changed: sensor frozen',
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
-    'a muscle is not under air although it should be, or its pressure is lost: both vented')
+    'a muscle is not under air although it should be, or its pressure is lost: both vented',
+    'what is tracked is measured twice, vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command

@@ -64,12 +64,21 @@ FAULT_TABLE = (
           'cut off, or sending only invalid values)', VENT, False,
           'next valid command, ' + _RAMP),
     Fault('two_publishers', 'Two publishers on pressure_command',
-          'two or more commands in 0.5 s with a stamp or publisher sequence number that goes '
+          'a publisher (by its GID) is heard again after another one within 1 s; or two or more '
+          'commands in 0.5 s with a stamp or publisher sequence number that goes '
           'backwards, or with equal stamps and different values', VENT, False,
           'no such command for 1 s, ' + _RAMP),
+    Fault('second_driver', 'Second sender of valve_signal',
+          'a message on valve_signal from a writer (by its GID) that is neither the driver nor, '
+          'where it is the safe signal, its valve_watchdog; the watchdog looks for one as well',
+          VENT, False, 'no such message for 1 s, ' + _RAMP),
+    Fault('two_sensors', 'Two publishers on pressure',
+          'a publisher (by its GID) is heard again after another one within 1 s', VENT, False,
+          'no such message for 1 s, ' + _RAMP),
     Fault('second_publisher_seen', 'Second publisher on the graph',
-          'the graph shows more than one publisher of pressure_command, messages are still in '
-          'order', IGNORE, False, 'warning ends with the second publisher'),
+          'the graph shows more than one publisher of pressure_command that sends or was never '
+          'heard (one that was heard and is silent has ended)', IGNORE, False,
+          'warning ends with the second publisher'),
     Fault('command_out_of_order', 'Single command out of order',
           'stamp not newer than the last accepted one', IGNORE, False,
           'message dropped; the former command goes on until its time-out'),

@@ -111,9 +111,14 @@ class DriverLoop:
         """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
         self.safety.on_device(problem)
 
-    def set_command_publishers(self, count):
-        """Tell how many publishers of pressure_command the graph shows."""
+    def set_command_publishers(self, count, names=''):
+        """Tell how many publishers of pressure_command send or may yet, and their names."""
         self.safety.publishers = count
+        self.safety.publisher_names = names and f': {names}'
+
+    def set_sender_fault(self, fault):
+        """Tell of a second sender: (key in ``FAULTS``, sentence), None where there is none."""
+        self.safety.sender_fault = fault
 
     def emergency_stop(self, why='requested'):
         """Latch the emergency stop; return (True, sentence). Vents from the next tick on."""

@@ -117,6 +117,8 @@ class SafetySupervisor:
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
         self.publishers = 1
+        self.publisher_names = ''
+        self.sender_fault = None       # (key, sentence) of a second sender, as senders.py tells
         self.command_stamp_ns = None
         self.command_pa = math.nan
         self.command_duty = None       # of a pair of valves, where it is commanded itself
@@ -309,7 +311,8 @@ class SafetySupervisor:
 
     def _standing_fault(self, now_ns):
         grace_s = self._grace_ns / _NS if now_ns <= self._grace_until_ns else 0.0
-        fault = self._pressure_fault(now_ns, grace_s) or self._command_fault(now_ns, grace_s)
+        fault = (self.sender_fault or self._pressure_fault(now_ns, grace_s)
+                 or self._command_fault(now_ns, grace_s))
         if self._standing is not None:
             # After a pause or a clock change: the same reason until all inputs are back.
             waiting = (self._seen_command and self.command_stamp_ns is None) or (
@@ -408,7 +411,8 @@ class SafetySupervisor:
         lim = self.limits
         if self.publishers > 1:
             self._warn('second_publisher_seen', (
-                f'{self.publishers} publishers of pressure_command are on the graph'), now_ns)
+                f'{self.publishers} publishers of pressure_command are on the graph'
+                f'{self.publisher_names}'), now_ns)
         texts = []
         if target is not None and self._rise.limiting:
             texts.append('resuming, pressure rises at no more than '

@@ -16,25 +16,49 @@
 The last word when the driver has none: vent once its valve signal falls silent.
 
 For a process of its own, beside the driver: what kills or stops that one does not reach
-this one. It speaks only while the driver is silent, and says nothing but the safe signal.
+this one. It speaks only while the driver is silent or a second sender drives the valve, and
+says nothing but the safe signal.
 """
 
+import os
+
+from pam_actuation.drivers.senders import CLEAR_S, is_safe, told, UNNAMED_S
 from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of, ValveSignal
 
-WAITING, HEARS, RESTS, VENTS = (
+WAITING, HEARS, RESTS, VENTS, CONTESTED = (
     'waiting for the first valve signal', 'hears the driver',
     'the driver ended with the signal that vents',
-    'vented because the valve signal fell silent: driver killed or stopped')
+    'vented because the valve signal fell silent', 'vented because two send the valve signal')
+_MS, _NS = 1_000_000, 1_000_000_000
+_LATE_NS = 20_000_000           # between two of its own ticks: it was kept waiting itself
+
+
+class _Other:
+    """A writer that is not the driver's."""
+
+    def __init__(self, now_ns):
+        self.first_ns = self.last_ns = now_ns
+        self.name = ''
+        self.spoke = False          # with a name, or with an opening
+
+    def counts(self, now_ns):
+        """Tell whether it was heard lately, and is not just a node whose name is on its way."""
+        lately = 0 <= now_ns - self.last_ns <= CLEAR_S * _NS
+        return lately and (self.spoke or now_ns - self.first_ns >= UNNAMED_S * _NS)
 
 
 class SignalWatchdog:
     """
     Listen to ``valve_signal``, where its own messages arrive as well.
 
+    The driver is the first that was heard. A node of the same name takes its place once it is
+    silent, as after a restart; another one where it ended in order before that one began. Who
+    else speaks is a second sender: the valve is vented until it is silent for 1 s.
+
     Attributes
     ----------
     state : str
-        One of ``WAITING``, ``HEARS``, ``RESTS``, ``VENTS``.
+        One of ``WAITING``, ``HEARS``, ``RESTS``, ``VENTS``, ``CONTESTED``.
     vents : int
         How often it has vented.
     valve_type : {'ppr', 'hsv'}
@@ -46,45 +70,150 @@ class SignalWatchdog:
         Assumed until the driver is heard.
     timeout_s : float
         Silence [s] from which it vents.
+    name : str
+        Full name of its node; safe signals of a namesake do not count.
+    load : callable
+        Returns what is known of the load of the machine, as words.
+    driver : str
+        Full name of the rig's driver, which takes its place also from another one.
 
     """
 
-    def __init__(self, valve_type, timeout_s):
+    def __init__(self, valve_type, timeout_s, name='', load=lambda: '', driver=''):
         self.state = WAITING
         self.vents = 0
         self.valve_type = valve_type
         self._timeout_ns = round(timeout_s * 1e9)
+        self._name, self._load, self._expected = name, load, driver
         self._heard_ns = None
         self._last = None
         self._own_stamps = set()
+        self._driver, self._driver_name = None, ''
+        self._others = {}           # writer to _Other
+        self._former = set()        # writers of drivers that were replaced
+        self._ticked_ns = None
+        self._late_ns = 0, 0        # longest time between two ticks lately, and when it ended
+        self._why = ''
+        self._silent_ms = 0
 
-    def on_signal(self, message, now_ns):
-        """Take a ValveSignal that was on the topic at a time; its own do not count."""
+    def on_signal(self, message, now_ns, writer=None, name=''):
+        """
+        Take a ValveSignal that was on the topic at a time; its own do not count.
+
+        ``writer`` is the GID of its writer, None where that is not known; ``name`` the full
+        name of its node, '' while that is not known. Returns whether it is the opening of a
+        second sender.
+        """
         if message.stamp_ns in self._own_stamps:
             self._own_stamps.discard(message.stamp_ns)
-            return
+            return False
+        safe = is_safe(message)
+        if safe and name and name == self._name:
+            return False
+        if not self._is_driver(writer, name, now_ns):
+            other = self._others[writer]
+            other.last_ns, other.name = now_ns, name
+            other.spoke |= bool(name) or not safe
+            return not safe
         self._heard_ns, self._last = now_ns, message
         # A signal for the other valve would vent nothing, whatever this one was told.
         self.valve_type = valve_of(message.names) or self.valve_type
+        return False
+
+    def _is_driver(self, writer, name, now_ns):
+        """Tell whether a message is the driver's; let a writer take its place if it may."""
+        if writer is None or writer == self._driver:
+            self._driver_name = name or self._driver_name
+            return True
+        if self._driver is None:
+            self._driver, self._driver_name = writer, name
+            return True
+        self._others = {one: other for one, other in self._others.items()
+                        if 0 <= now_ns - other.last_ns <= CLEAR_S * _NS}
+        first_ns = self._others.setdefault(writer, _Other(now_ns)).first_ns
+        silent_ns = now_ns - self._heard_ns
+        began_after = writer not in self._former and self._heard_ns < first_ns
+        same = name and name in (self._driver_name, self._expected)
+        if same and (began_after or silent_ns > CLEAR_S * _NS) or (
+                began_after and silent_ns > self._timeout_ns and self.state in (HEARS, RESTS)
+                and self._ended_in_order()):
+            self._former.add(self._driver)
+            del self._others[writer]
+            self._driver, self._driver_name = writer, name
+            return True
+        return False
 
     def tick(self, now_ns):
         """Return the safe ValveSignal to send, None while there is nothing to say."""
+        self._note_delay(now_ns)
+        foreign = [one.name for one in self._others.values() if one.counts(now_ns)]
+        if foreign:
+            self._why = f'valve_signal is sent by {told([self._driver_name, *foreign])}'
+            return self._vent(now_ns, CONTESTED)
         if self._heard_ns is None:
             return None
-        if now_ns - self._heard_ns <= self._timeout_ns:
+        silent_ns = now_ns - self._heard_ns
+        if silent_ns <= self._timeout_ns:
             self.state = HEARS
             return None
-        if self.state != VENTS and self._vented():
+        if self.state not in (VENTS, CONTESTED) and self._ended_in_order():
             self.state = RESTS
             return None
         if self.state != VENTS:
+            self._why = (f'(limit {self._timeout_ns * 1e-6:.0f} ms): driver killed or stopped, '
+                         f'or the machine too busy{self._known_of_load(now_ns)}')
+        return self._vent(now_ns, VENTS)
+
+    def _vent(self, now_ns, state):
+        if self.state not in (VENTS, CONTESTED):
             self.vents += 1
-        self.state = VENTS
+        silent_ns = now_ns - self._heard_ns
+        # A figure that changes with every tick would be a flood of messages.
+        if self.state != state or silent_ns >= _NS:
+            self._silent_ms = silent_ns // _MS if silent_ns < _NS else silent_ns // _NS * 1000
+        self.state = state
+        return self.safe_signal(now_ns)
+
+    def safe_signal(self, now_ns):
+        """Return the ValveSignal that vents, to be sent now."""
         self._own_stamps.add(now_ns)
         return ValveSignal(now_ns, VALVE_NAMES[self.valve_type], SAFE_EFFORTS[self.valve_type])
 
-    def _vented(self):
+    @property
+    def text(self):
+        """Return the state as a sentence, with what is known of the reason."""
+        if self.state == CONTESTED:
+            return f'{CONTESTED}: {self._why}, stop all but the driver'
+        if self.state != VENTS:
+            return self.state
+        return f'{VENTS} for {self._silent_ms} ms {self._why}'
+
+    def _note_delay(self, now_ns):
+        before_ns, self._ticked_ns = self._ticked_ns, now_ns
+        longest_ns, since_ns = self._late_ns
+        if not 0 <= now_ns - since_ns <= _NS:
+            longest_ns = 0
+        if before_ns is not None and now_ns - before_ns >= max(longest_ns, _LATE_NS):
+            self._late_ns = now_ns - before_ns, now_ns
+        elif not longest_ns:
+            self._late_ns = 0, now_ns
+
+    def _known_of_load(self, now_ns):
+        known = [self._load()]
+        if self._late_ns[0]:
+            known.append(f'this watchdog itself waited {self._late_ns[0] * 1e-6:.0f} ms for the '
+                         'processor')
+        known = ', '.join(filter(None, known))
+        return known and f' ({known})'
+
+    def _ended_in_order(self):
         """Tell whether the last signal heard is the safe one."""
-        efforts = dict(zip(self._last.names, self._last.efforts))
-        return SAFE_EFFORTS[self.valve_type] == tuple(
-            efforts.get(name) for name in VALVE_NAMES[self.valve_type])
+        return is_safe(self._last)
+
+
+def machine_load():
+    """Return what the system tells of its load, as words."""
+    try:
+        return f'load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores'
+    except OSError:
+        return ''

@@ -22,6 +22,7 @@ from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.refusals import RefusalLog
+from pam_actuation.nodes.senders import SensorEar
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
@@ -75,9 +76,12 @@ class ControllerNode(ManagedNode):
         self._refusals = RefusalLog(self.get_logger())
         self.add_publisher('pressure_command')
         self.add_publisher('controller_state')
+        tracked = self.loop.tracked.topic
         self.inputs = [
-            (topic, self.add_subscription(topic), getattr(self.loop, f'on_{topic}'))
-            for topic in INPUTS]
+            (topic, self.add_subscription(topic, writers=topic == tracked),
+             getattr(self.loop, f'on_{topic}')) for topic in INPUTS]
+        self._ear = SensorEar(self, next(
+            subscription for topic, subscription, _ in self.inputs if topic == tracked))
 
     def inputs_of_a_tick(self):
         """Return the measurements and, of a reference that takes part, what it asks for."""
@@ -115,14 +119,19 @@ class ControllerNode(ManagedNode):
 
     def tick(self):
         """Take the newest inputs, compute, send command and internals."""
-        now_ns = self.now_ns()
-        if self.participants:
-            self._check_step(now_ns)
         for topic, subscription, handler in self.inputs:
             # In lockstep reference and followed pressure are those of the tick before.
             old = self.participants and topic not in MEASURED
-            for message, _ in subscription.take_before(now_ns) if old else subscription.take():
+            taken = subscription.take_before(self.now_ns()) if old else subscription.take()
+            for message, _ in taken:
                 handler(message)
+            if topic == self.loop.tracked.topic:
+                measured = taken
+        # Only now: what arrived while this node waited for the processor is not from the future.
+        now_ns = self.now_ns()
+        if self.participants:
+            self._check_step(now_ns)
+        self.loop.two_sensors = self._ear.took(measured, now_ns)
         command, self.state = self.loop.tick(now_ns, self.learning)
         self.send('pressure_command', command)
         self.send('controller_state', self.state)

@@ -53,6 +53,7 @@ class DiagnosticsReporter:
         self.level = OK
         self.message = 'starting'
         self.values = ()
+        self.remark = ''            # what is wrong besides, such as another node of the same name
         self.silent = True
         self.console = Console(node.get_fully_qualified_name())
         self._said = OK, ''
@@ -74,19 +75,22 @@ class DiagnosticsReporter:
             return
         now_ns = self._node.now_ns()
         self._sent, self._sent_ns = (self.level, self.message), now_ns
+        level, message = self.level, self.message
+        if self.remark:
+            level, message = max(level, WARN), f'{message}; {self.remark}'
         self.publisher.publish(diagnostic_array(Status(
-            now_ns, self.level, self._node.get_fully_qualified_name(), self.message,
+            now_ns, level, self._node.get_fully_qualified_name(), message,
             (*self.values, *self._node.diagnostic_values(), *self._counts()))))
-        self._say(now_ns)
+        self._say(now_ns, level, message)
 
-    def _say(self, now_ns):
+    def _say(self, now_ns, level, message):
         """Tell the terminal what is wrong, or no longer wrong; not each number that changes."""
-        said, self._said = self._said, (self.level, DIGITS.sub('', self.message))
+        said, self._said = self._said, (level, DIGITS.sub('', message))
         node = self._node
         if node.stopping or node.exit_code is not None or node.input_error is not None:
             return              # the node logs itself why it ends; that is to be its last line
-        if self._said != said and (self.level != OK or said[0] != OK):
-            self.console.say(WORDS[self.level], now_ns, self.message)
+        if self._said != said and (level != OK or said[0] != OK):
+            self.console.say(WORDS[level], now_ns, message)
 
     def _counts(self):
         """Return the counts of all publishers; the status being sent counts itself."""

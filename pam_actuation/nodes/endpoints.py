@@ -20,9 +20,11 @@ A control loop needs the newest inputs once per tick, not a callback per message
 arrived when the loop asks, each with the time it was received.
 """
 
+from functools import partial
 import time
 
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.writers import WriterTake
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -55,6 +57,11 @@ class CountedPublisher:
         """Send a ROS message (or serialized bytes) and count it."""
         self._publisher.publish(message)
         self.count += 1
+
+    @property
+    def rclpy_publisher(self):
+        """Return the publisher of rclpy."""
+        return self._publisher
 
     def matched_with(self, subscriber):
         """
@@ -107,17 +114,21 @@ class PolledSubscription:
     read : callable, optional
         Turns what was taken into what ``take`` returns, such as a ``WireReader``; what it
         turns into None is dropped.
+    writers : bool
+        Tell of each message who wrote it; only with ``raw``.
 
     """
 
-    def __init__(self, node, message_type, topic, profile=None, raw=False, read=None):
+    def __init__(self, node, message_type, topic, profile=None, raw=False, read=None,
+                 writers=False):
         self._node = node
         self._subscription = node.create_subscription(
             message_type, topic, _unused, profile or qos.CONSUMER,
             callback_group=_NeverExecuted(), raw=raw,
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
-        self._type = message_type
-        self._raw = raw
+        self._take = partial(self._subscription.handle.take_message, message_type, raw)
+        if writers:
+            self._take = WriterTake(self._subscription.handle, message_type)
         self._read = read
         self._waiting = []
         self._wait_set = None
@@ -132,7 +143,7 @@ class PolledSubscription:
         Return a list of (message, info) in order of arrival, at most ``limit``.
 
         ``info`` is rclpy's dictionary with ``source_timestamp``, ``received_timestamp`` [ns]
-        and ``publication_sequence_number``.
+        and ``publication_sequence_number``, with ``writers`` also ``writer``, a GID.
         """
         self.collect(limit)
         taken, self._waiting = self._waiting, []
@@ -150,7 +161,7 @@ class PolledSubscription:
         handle = self._subscription.handle
         with handle:
             while len(waiting) < limit:
-                item = handle.take_message(self._type, self._raw)
+                item = self._take()
                 if item is None:
                     return
                 self._count_lost(item[1]['publication_sequence_number'])

@@ -25,15 +25,17 @@ from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.refusals import RefusalLog
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.senders import SensorEar
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 from std_msgs.msg import String
 
 GIVING = 'giving the wanted torque'
+MEASURED = 'joint_state'
 INPUTS = {
     'joint_trajectory': 'on_named_trajectory', 'joint_reference': 'on_joint_reference',
     'joint_effort': 'on_named_efforts', 'co_contraction': 'on_co_contraction',
-    'joint_state': 'on_joint_state'}
+    MEASURED: 'on_joint_state'}
 
 
 class JointNode(LearningSwitch, ManagedNode):
@@ -80,8 +82,10 @@ class JointNode(LearningSwitch, ManagedNode):
         for topic in (*self._commands, 'controller_state'):
             self.add_publisher(topic)
         self._inputs = [
-            (topic, self.add_subscription(topic), getattr(self.loop, handler))
-            for topic, handler in INPUTS.items()]
+            (topic, self.add_subscription(topic, writers=topic == MEASURED),
+             getattr(self.loop, handler)) for topic, handler in INPUTS.items()]
+        self._ear = SensorEar(self, next(
+            subscription for topic, subscription, _ in self._inputs if topic == MEASURED))
         self._sides = [
             (topic, k, self.add_subscription(f'{side}/{topic}'), handler)
             for topic, handler in (('followed_pressure', self.loop.on_followed_pressure),
@@ -106,12 +110,17 @@ class JointNode(LearningSwitch, ManagedNode):
     def tick(self):
         """Take the newest inputs, compute, send both commands and internals."""
         for topic, subscription, handler in self._inputs:
-            for message, _ in subscription.take():
+            taken = subscription.take()
+            for message, _ in taken:
                 handler(message)
+            if topic == MEASURED:
+                measured = taken
         for topic, side, subscription, handler in self._sides:
             for message, _ in subscription.take():
                 handler(side, message)
-        commands, state = self.loop.tick(self.now_ns(), self.learning)
+        now_ns = self.now_ns()      # only now, see ControllerNode
+        self.loop.two_sensors = self._ear.took(measured, now_ns)
+        commands, state = self.loop.tick(now_ns, self.learning)
         for topic, command in zip(self._commands, commands):
             self.send(topic, command)
         self.send('controller_state', state)

@@ -14,6 +14,7 @@
 
 """The joint on ROS: valve signals of two muscles in, angle and their measurements out."""
 
+from functools import partial
 import sys
 
 from pam_actuation.nodes import qos
@@ -58,15 +59,14 @@ class JointSimulator(PhysicsNode):
             for topic in topics:
                 self.add_publisher(f'{side}/{topic}')
             self.signals[side] = self.add_subscription(
-                f'{side}/valve_signal', qos.PHYSICS)
+                f'{side}/valve_signal', qos.PHYSICS, writers=True)
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
-        now_ns = self.now_ns()
         arrived = [
-            (message, self.plant.signals[side].take)
-            for side in SIDES for message, _ in self.signals[side].take()]
-        for topic, plain in self.measured(now_ns, arrived).items():
+            (message, partial(self.plant.set_signal, side, writer=info['writer']))
+            for side in SIDES for message, info in self.signals[side].take()]
+        for topic, plain in self.measured(self.now_ns(), arrived).items():
             self.send(topic, plain)
 
 

@@ -40,6 +40,10 @@ class Loop:
         self.next_ns = now_ns + period_ns
         self.clock = clock
 
+    def every(self, period_s):
+        """Change the period, from the next tick on."""
+        self.period_ns = round(period_s * 1e9)
+
     def advance(self, now_ns):
         """Set the time of the next tick, in step with the former ones."""
         late_ns = now_ns - self.next_ns
@@ -77,10 +81,16 @@ class LoopSet:
         return bool(self._loops)
 
     def add(self, period_s, callback, clock=None):
-        """Call ``callback`` every ``period_s`` from now on; ``clock`` if not on ``time``."""
+        """
+        Call ``callback`` every ``period_s`` from now on; ``clock`` if not on ``time``.
+
+        Returns the ``Loop``.
+        """
         clock = clock or self.time
         with self.lock:
-            self._loops.append(Loop(round(period_s * 1e9), callback, clock.now_ns(), clock))
+            loop = Loop(round(period_s * 1e9), callback, clock.now_ns(), clock)
+            self._loops.append(loop)
+        return loop
 
     def clear(self):
         """End all loops."""

@@ -199,15 +199,16 @@ class ManagedNode(LifecycleNode):
         publisher, writer = self._writers[topic]
         publisher.publish(writer.fill(plain))
 
-    def add_subscription(self, topic, profile=None, plain=True):
+    def add_subscription(self, topic, profile=None, plain=True, writers=False):
         """
         Create and return a polled subscription of a topic of the rig.
 
-        It gives plain messages; without ``plain`` the bytes, as they came.
+        It gives plain messages; without ``plain`` the bytes, as they came. With ``writers`` the
+        info of each tells who wrote it.
         """
         subscription = PolledSubscription(
             self, type_of(topic), topic, profile, raw=True,
-            read=WireReader(topic) if plain else None)
+            read=WireReader(topic) if plain else None, writers=writers)
         self.subscriptions_polled.append(subscription)
         return subscription
 
@@ -283,10 +284,14 @@ class ManagedNode(LifecycleNode):
             else:
                 self._farewell()
 
+    def last_status(self, why):
+        """Return level, message and values of the last status of all."""
+        return ERROR if self.exit_code else OK, why, self.diagnostics.values
+
     def _end_work(self, why):
-        self.diagnostics.level = ERROR if self.exit_code else OK
-        self.diagnostics.message = why
-        self.diagnostics.send()
+        diagnostics = self.diagnostics
+        diagnostics.level, diagnostics.message, diagnostics.values = self.last_status(why)
+        diagnostics.send()
         self._farewell()
         self.stop()
 
@@ -380,9 +385,17 @@ class ManagedNode(LifecycleNode):
         self.diagnostics.silent = False
         # Also while a simulated time stands still.
         steady = None if self.simulated_time is None else SteadyTime()
-        self.loops.add(self.value('diagnostics_period_s'), self.diagnostics.send, steady)
+        self.loops.add(self.value('diagnostics_period_s'), self._report, steady)
         self.diagnostics.update(OK, 'active')
         self.get_logger().info('active')
+
+    def _report(self):
+        own = self.get_name(), self.get_namespace()
+        count = self.get_node_names_and_namespaces().count(own)
+        # What was killed before this node began is not on its graph.
+        self.diagnostics.remark = '' if count < 2 else (
+            f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one')
+        self.diagnostics.send()
 
     def _await_subscriber(self):
         subscriber = self.value('await_subscriber')

@@ -14,6 +14,7 @@
 
 """The rig on ROS: valve signal in, measured pressure, contraction and force out."""
 
+from functools import partial
 import sys
 
 from pam_actuation.nodes import lockstep
@@ -69,7 +70,7 @@ class PlantSimulator(PhysicsNode):
             self.add_publisher(topic)
         if rig.valve == 'hsv':
             self.add_publisher('supply_pressure')
-        self.signals = self.add_subscription('valve_signal', qos.PHYSICS)
+        self.signals = self.add_subscription('valve_signal', qos.PHYSICS, writers=True)
         self.disturbances = self.add_subscription('external_force', qos.PHYSICS)
         if self.uses_simulated_time:
             self._clock_services = [
@@ -123,11 +124,11 @@ class PlantSimulator(PhysicsNode):
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""
-        now_ns = self.now_ns()
         arrived = [(message, self.plant.set_external_force)
                    for message, _ in self.disturbances.take()]
-        arrived += [(message, self.plant.set_signal) for message, _ in self.signals.take()]
-        messages = self.measured(now_ns, arrived)
+        arrived += [(message, partial(self.plant.set_signal, writer=info['writer']))
+                    for message, info in self.signals.take()]
+        messages = self.measured(self.now_ns(), arrived)
         if not messages:
             return
         if self.participants:

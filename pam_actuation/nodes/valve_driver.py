@@ -29,6 +29,9 @@ from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.senders import ANSWER_PERIOD_S
+from pam_actuation.nodes.senders import DriverEar
+from pam_actuation.nodes.senders import IDLE_PERIOD_S
 from pam_actuation.nodes.timing import Latency
 from pam_sim.errors import InputError
 from std_srvs.srv import Trigger
@@ -72,6 +75,7 @@ class ValveDriver(ManagedNode):
 
     loop = None
     output = None
+    _not_vented = ''        # why not, at the end
     _stopped = None         # what a latched stop is carried over from
     _safety_services = ()
 
@@ -109,11 +113,12 @@ class ValveDriver(ManagedNode):
         self._latencies = {'command': Latency(), 'pressure': Latency()}
         self.add_publisher('valve_signal')
         self.add_publisher('followed_pressure')
-        self.commands = self.add_subscription('pressure_command')
+        self.commands = self.add_subscription('pressure_command', writers=True)
         self.raw_commands = None
         if self.value('accept_valve_command'):
-            self.raw_commands = self.add_subscription('valve_command')
-        self.pressures = self.add_subscription('pressure')
+            self.raw_commands = self.add_subscription('valve_command', writers=True)
+        self.pressures = self.add_subscription('pressure', writers=True)
+        self.ear = DriverEar(self)
         self.supplies = self.add_subscription('supply_pressure')
         self._safety_services = [
             self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
@@ -165,6 +170,8 @@ class ValveDriver(ManagedNode):
         else:
             self.add_loop(self.loop.period_s, poll_s=COMMAND_POLL_S)
         self.loops.add(GRAPH_PERIOD_S, self._look_at_graph)
+        self.ear.begin()
+        self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
 
     def due(self, since_last_s):
         """Tell whether a command or the clock asks for a tick (PPR, polled)."""
@@ -172,10 +179,13 @@ class ValveDriver(ManagedNode):
         return self._commanded or since_last_s >= EARLY_SHARE * self.loop.period_s
 
     def _take_commands(self):
-        taken = [(message, info['publication_sequence_number'])
-                 for message, info in self.commands.take()]
+        arrived = self.commands.take()
+        self.ear.took('pressure_command', arrived)
+        taken = [(message, info['publication_sequence_number']) for message, info in arrived]
         if self.raw_commands is not None:
-            raw = [(message, None) for message, _ in self.raw_commands.take()]
+            arrived = self.raw_commands.take()
+            self.ear.took('valve_command', arrived)
+            raw = [(message, None) for message, _ in arrived]
             # One sender takes turns on the two topics: they are one sequence by stamp.
             taken = sorted(taken + raw, key=lambda item: item[0].stamp_ns) if raw else taken
         for plain, sequence in taken:
@@ -188,11 +198,17 @@ class ValveDriver(ManagedNode):
     def tick(self):
         """Take what arrived, decide, send."""
         self._take_commands()
-        for message, _ in self.pressures.take():
+        arrived = self.pressures.take()
+        self.ear.took('pressure', arrived)
+        for message, _ in arrived:
             self.loop.on_pressure(message)
         for message, _ in self.supplies.take():
             self.loop.on_supply(message)
+        self.ear.listen()
         now_ns = self.now_ns()
+        fault = self.ear.fault(now_ns)
+        self.loop.set_sender_fault(fault)
+        self._answering.every(ANSWER_PERIOD_S if fault else IDLE_PERIOD_S)
         signal, status = self.loop.tick(now_ns)
         problem = self.output.send(signal.efforts)
         self.loop.on_device(problem)
@@ -209,17 +225,32 @@ class ValveDriver(ManagedNode):
         """Send the signal that vents, again if the device refuses it."""
         if self.loop is None:
             return
-        problem = self.output.vent(TRIES)
+        problem = self._not_vented = self.output.vent(TRIES)
         self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
         if problem:
             self.result_code = 1
             self.get_logger().error(f'the valve did not take the signal that vents: {problem}')
             self.diagnostics.update(ERROR, f'not vented: {problem}')
 
+    def last_status(self, why):
+        """Return level, message and values of the last status: that it ended, and vented."""
+        ended = {'state': 'ended', 'target_kpa_gauge': 'vent'}
+        values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values)
+        level, message, _ = super().last_status(why)
+        if self._not_vented:
+            return ERROR, f'{message}, not vented: {self._not_vented}', values
+        return level, f'{message}, vented', values
+
+    def _answer(self):
+        """Send the safe signal right after each opening of a second sender."""
+        if self.loop.safety.sender_fault and self.ear.listen():
+            self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
+
     def _look_at_graph(self):
-        counts = [self.count_publishers(subscription.topic)
-                  for subscription in (self.commands, self.raw_commands) if subscription]
-        self.loop.set_command_publishers(max(counts))
+        self.loop.set_command_publishers(*max(
+            self.ear.publishers(topic, subscription.topic) for topic, subscription in (
+                ('pressure_command', self.commands), ('valve_command', self.raw_commands))
+            if subscription))
 
     def _on_emergency_stop(self, request, response):
         with self.loops.lock:

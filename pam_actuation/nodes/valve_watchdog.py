@@ -16,11 +16,15 @@
 
 import sys
 
-from pam_actuation.drivers.watchdog import SignalWatchdog, VENTS, WAITING
+from pam_actuation.drivers.watchdog import (
+    CONTESTED, machine_load, SignalWatchdog, VENTS, WAITING)
 from pam_actuation.nodes.diagnostics import ERROR, OK, WARN
+from pam_actuation.nodes.endpoints import full_name
+from pam_actuation.nodes.lockstep import DRIVER
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.senders import ANSWER_PERIOD_S, IDLE_PERIOD_S, WriterNames
 
 PERIOD_S = 0.01     # the wire asks for 100 Hz or more
 
@@ -29,8 +33,10 @@ class ValveWatchdog(ManagedNode):
     """
     Send the safe valve signal while the driver, a process of its own, is silent.
 
-    It covers a driver that was killed or stopped, for whatever listens to ``valve_signal``. What
-    hangs on a device of the driver's computer is vented by a process of the driver.
+    It covers a driver that was killed or stopped, for whatever listens to ``valve_signal``, and
+    a second sender beside the driver or in its place: each of his openings is answered with the
+    safe signal. What hangs on a device of the driver's computer is vented by a process of the
+    driver.
     """
 
     NAME = 'valve_watchdog'
@@ -48,24 +54,46 @@ class ValveWatchdog(ManagedNode):
     def setup(self):
         """Create the topic, which it hears and, if need be, speaks on."""
         self._told = self.value('valve_type')
-        self.watchdog = SignalWatchdog(self._told, self.value('timeout_s'))
+        self.watchdog = SignalWatchdog(
+            self._told, self.value('timeout_s'), self.get_fully_qualified_name(), machine_load,
+            full_name(self.get_namespace(), DRIVER))
         self.add_publisher('valve_signal')
-        self.signals = self.add_subscription('valve_signal')
+        self.signals = self.add_subscription('valve_signal', writers=True)
+        self._name_of = WriterNames(self)
 
     def start(self):
         """Look at a steady rate."""
         self.add_loop(PERIOD_S)
+        self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
+
+    def _listen(self):
+        """Take what was said; return the time after and whether a second sender opens."""
+        opens, taken = False, self.signals.take()
+        # Only now: what arrived while this node waited for the processor is not from the future.
+        now_ns = self.now_ns()
+        for message, info in taken:
+            writer = info['writer']
+            name = '' if writer is None else self._name_of(self.signals.topic, writer)
+            opens |= self.watchdog.on_signal(message, now_ns, writer, name)
+        return now_ns, opens
+
+    def _answer(self):
+        """Send the safe signal right after each opening of a second sender."""
+        if self.watchdog.state == CONTESTED:
+            now_ns, opens = self._listen()
+            if opens:
+                self.send('valve_signal', self.watchdog.safe_signal(now_ns))
 
     def tick(self):
-        """Take what was said; if the driver is silent, vent."""
-        now_ns = self.now_ns()
-        for message, _ in self.signals.take():
-            self.watchdog.on_signal(message, now_ns)
+        """Take what was said; if the driver is silent or not alone, vent."""
+        now_ns, _ = self._listen()
         signal = self.watchdog.tick(now_ns)
         if signal is not None:
             self.send('valve_signal', signal)
-        level = {VENTS: ERROR, WAITING: WARN}.get(self.watchdog.state, OK)
-        text, heard = self.watchdog.state, self.watchdog.valve_type
+        contested = self.watchdog.state == CONTESTED
+        self._answering.every(ANSWER_PERIOD_S if contested else IDLE_PERIOD_S)
+        level = {VENTS: ERROR, CONTESTED: ERROR, WAITING: WARN}.get(self.watchdog.state, OK)
+        text, heard = self.watchdog.text, self.watchdog.valve_type
         if heard != self._told:
             level = max(level, WARN)
             text += (f'; it drives {heard}, this watchdog was told {self._told}, which is '

@@ -107,7 +107,8 @@ def test_the_safe_signal_is_the_last_one(rig, valve, number):
     time.sleep(0.2)
     assert last_signal(rig) == SAFE[valve]
     final = rig.health['valve_driver'][-1]
-    assert final.message == f'stopped by {number.name}'
+    assert final.message == f'stopped by {number.name}, vented'
+    assert final.values['state'] == 'ended' and final.values['target_kpa_gauge'] == 'vent'
     count = len(pressures)
     wait_for(lambda: len(pressures) > count + 100, 3.0, 'the plant')
     assert last_pressure(rig) < before - 100e3       # the air really leaves
