@@ -44,7 +44,7 @@ class Fault:
     resume: str
 
 
-_RAMP = 'then a slow rise from the measured pressure'
+_RAMP = 'then a slow rise from atmospheric pressure'
 
 FAULT_TABLE = (
     Fault('emergency_stop', 'Emergency stop',
