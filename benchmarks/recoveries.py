@@ -21,7 +21,8 @@ Plant, driver, watchdog, controller and reference run as processes over DDS. The
 8.9 mm; at random moments a sensor is lost or the controller stopped, for a random time, and comes
 back. In a second series random orders of stop, continue, restart, emergency stop and command
 patterns follow each other. Told are the largest excursion beyond the reference, and the largest
-rise of the measured pressure after a vent: over any 0.2 s until the driver has followed commands
+rise of the measured pressure after a vent (of the driver, or atmosphere commanded by the
+controller): over any 0.2 s until the driver has followed commands
 under pressure for 1 s in all. Each outcome is a line of ``--out``; started again with the same
 file, it goes on where it was. ``--print`` only prints the table.
 """
@@ -224,6 +225,18 @@ def _followed_until(heard, from_ns):
     return 2 ** 62
 
 
+def _with_atmosphere(said, commands):
+    """Return (stamp, vented) with what a controller vents by commanding atmospheric pressure."""
+    events = [(stamp, 0, vented) for stamp, vented in said]
+    events += [(one.stamp_ns, 1, one.pressure_pa <= P_ATM_PA) for one in commands]
+    state, merged = [said[0][1], False], []
+    for stamp, which, vented in sorted(events):
+        before, state[which] = any(state), vented
+        if not merged or any(state) != before:
+            merged.append((stamp, any(state)))
+    return merged
+
+
 def play(rig, case, rng):
     """Let one case happen; return the outcome."""
     _, with_controller, act, counts = CASES[case]
@@ -239,6 +252,8 @@ def play(rig, case, rng):
         witness.listen(COMES_BACK_S)
     said += [(status.stamp_ns, status.values['state'] != 'ok')
              for name, status in witness.said if name == DRIVER and 'state' in status.values]
+    if with_controller:
+        said = _with_atmosphere(said, witness.heard['pressure_command'])
     vents = sum(b and not a for (_, a), (_, b) in zip(said, said[1:]))
     # What it was before is no vent: only what follows one counts.
     first = next((k for k, (_, vented) in enumerate(said) if vented), None)
