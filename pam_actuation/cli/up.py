@@ -29,7 +29,8 @@ def add_arguments(parser):
     parser.add_argument('--model', default='', metavar='NAME',
                         help='rig or joint: preset, or path of a model file')
     parser.add_argument('--controller', default='', metavar='NAME',
-                        help='controller preset or file (default: that of valve and experiment)')
+                        help='controller preset or file, or none: one of your own commands the '
+                             'pressure (default: that of valve and experiment)')
     parser.add_argument('--experiment', default='', metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', default='sim', metavar='NAME',
@@ -93,11 +94,12 @@ def _write_policy(args, nodes):
 
 def _nodes(args):
     """Return the nodes that are asked for."""
+    from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller,
                'experiment': args.experiment}
     if args.namespace is not None:
-        options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
+        options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     if args.what == 'rig':

@@ -25,6 +25,7 @@ import shutil
 import sys
 import textwrap
 
+from pam_actuation.namespaces import namespace_of
 from pam_actuation.resources import node_page
 from pam_sim.errors import InputError
 
@@ -57,25 +58,26 @@ def answer(name, arguments):
         if any(one in HELP for one in arguments):
             _show(help_text(name))
             return EXIT_DONE
-        check(arguments)
+        in_order(arguments)
     except InputError as error:
         print(f'{name}: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
     return None
 
 
-def check(arguments):
+def in_order(arguments):
     """
-    Refuse arguments that nobody would read.
+    Return the arguments with the namespace as ROS takes it.
 
     Raises
     ------
     InputError
-        There is one outside of ``--ros-args ... --``.
+        The namespace is none, or an argument stands outside of ``--ros-args ... --``, where
+        nobody would read it.
 
     """
-    of_ros = False
-    for one in arguments:
+    of_ros, ordered = False, []
+    for before, one in zip(['', *arguments], arguments):
         if one == '--ros-args':
             of_ros = True
         elif one == '--':
@@ -84,6 +86,11 @@ def check(arguments):
             raise InputError(
                 'is not known, allowed are --help and what stands behind --ros-args, such as '
                 '--ros-args -r __ns:=/leg -p NAME:=VALUE', f'argument {one}')
+        node, sign, namespace = one.partition('__ns:=')
+        if sign and before in ('-r', '--remap'):
+            one = f'{node}{sign}{namespace_of(namespace) or "/"}'
+        ordered.append(one)
+    return ordered
 
 
 def help_text(name, width=None):

@@ -114,6 +114,8 @@ def run(node_class, args=None):
 
 def _run(node_class, args, stopper):
     try:
+        if args is None:
+            args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
         prepare_middleware()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()

@@ -25,10 +25,10 @@ Ctrl-C and when a node dies.
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
-import re
 import time
 
 from pam_actuation.interrupts import undisturbed
+from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
@@ -44,7 +44,6 @@ OVERDUE_S = 5.0               # the reference may finish this much late
 FINISHED = 'finished'
 STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
-NAMESPACE = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 @dataclass
@@ -115,7 +114,7 @@ class RigSession:
                 f'live nodes need ROS 2 ({error.name} is missing): source its setup file or '
                 'install the extra ros, pip install "pam_actuation[ros]"') from None
         self.plan = plan
-        self.namespace = namespace
+        self.namespace = namespace_of(namespace)
         self.processes = {}
         self._lock = DomainLock(domain_id)
         self.domain_id = self._lock.domain_id
@@ -323,11 +322,9 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
 
     """
-    namespace = '/' + namespace.strip('/')
-    if not NAMESPACE.fullmatch(namespace):
-        raise InputError(
-            f'{namespace!r} is not allowed, it must be names of letters, digits and _ '
-            'joined by /', 'namespace')
+    namespace = namespace_of(namespace)
+    if not namespace:
+        raise InputError('is needed, such as /muscle', 'namespace')
     bag = None
     if with_recorder:
         if out_dir is None:
