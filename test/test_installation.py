@@ -34,7 +34,7 @@ FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller', 'va
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',
-    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs')
+    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/nodes')
 
 # Raises on any import of ROS, as on a machine without it.
 NO_ROS = """

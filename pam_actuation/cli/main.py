@@ -19,8 +19,7 @@ import importlib
 import os
 import sys
 
-from pam_actuation.cli.common import EXIT_BAD_INPUT
-from pam_sim.errors import InputError
+from pam_actuation import interrupts
 
 VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
          'info', 'models', 'nodes', 'valves', 'rules')
@@ -50,23 +49,50 @@ def main(argv=None):
     """
     Run one verb.
 
+    Parameters
+    ----------
+    argv : list of str, optional
+        Arguments; default: those of the process, which is then ended by Ctrl-C with exit code
+        130 and one line, whatever it is doing.
+
     Returns
     -------
     int
-        0 done, 1 finding, 2 bad input.
+        0 done, 1 finding, 2 bad input, 130 interrupted.
 
     """
+    if argv is not None:
+        return _run_verb(argv)
+    interrupts.leave_at_once('pam')
+    try:
+        try:
+            code = _run_verb(None, interrupts.Worker)
+        finally:
+            interrupts.ignore()
+    except KeyboardInterrupt:       # while the verb said its last words
+        code = interrupts.EXIT_INTERRUPTED
+    if code == interrupts.EXIT_INTERRUPTED:
+        interrupts.end_interrupted()
+    return code
+
+
+def _run_verb(argv, begin=lambda: None):
+    """Parse, call ``begin``, run the verb; return the exit code."""
+    # Here and not above: an early Ctrl-C finds main() at work, see interrupts.
+    from pam_actuation.cli.common import EXIT_BAD_INPUT
+    from pam_sim.errors import InputError
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     args = build_parser().parse_args(argv)
+    begin()
     try:
         return args.call(args)
     except InputError as mistake:
         print(f'pam {args.verb}: {mistake}', file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print(f'pam {args.verb}: stopped', file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as stop:
+        print(f'pam {args.verb}: {str(stop) or "stopped"}', file=sys.stderr)
+        return interrupts.EXIT_INTERRUPTED
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()
         return 0

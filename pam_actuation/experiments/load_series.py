@@ -28,6 +28,7 @@ import numpy as np
 
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.parallel import in_processes
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.units import GRAVITY_M_PER_S2
@@ -122,9 +123,9 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
     if there:
         raise InputError('exists already; give another folder', str(there[0]))
     rig.pack()     # compiled once here, or every process would compile for itself
-    runs = joblib.Parallel(n_jobs=jobs, return_as='generator')(
+    runs = in_processes(jobs, (
         joblib.delayed(simulate_load)(rig, float(load), path, seed, experiment)
-        for load, path in zip(loads, targets))
+        for load, path in zip(loads, targets)))
     bags = []
     for bag in runs:
         bags.append(bag)

@@ -27,6 +27,8 @@ import sys
 import threading
 import traceback
 
+from pam_actuation import interrupts
+from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.transport import prepare_middleware
 from pam_sim.errors import InputError
@@ -35,7 +37,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+SIGNALS = {number: number.name for number in interrupts.ENDING}
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
@@ -99,8 +101,21 @@ def run(node_class, args=None):
         Exit code.
 
     """
+    answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
+    if answered is not None:
+        return answered
     stopper = _Stopper()
     try:
+        return _run(node_class, args, stopper)
+    finally:
+        # What comes now, as by an impatient user, must not change the exit code any more.
+        interrupts.ignore(SIGNALS)
+
+
+def _run(node_class, args, stopper):
+    try:
+        if args is None:
+            args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
         prepare_middleware()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()

@@ -25,9 +25,10 @@ Ctrl-C and when a node dies.
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
-import re
 import time
 
+from pam_actuation.interrupts import undisturbed
+from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
@@ -41,8 +42,8 @@ START_TIMEOUT_S = 60.0        # a busy machine compiles for long
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
 FINISHED = 'finished'
+STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
-NAMESPACE = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 @dataclass
@@ -53,7 +54,7 @@ class Result:
     Attributes
     ----------
     bag : str
-        Folder of the recording, '' without recorder.
+        Folder of the recording, '' without recorder, or if it ended before it recorded.
     duration_s : float
         Time from the activation of the reference to the end of the experiment [s].
     failure : str
@@ -77,6 +78,11 @@ class Result:
     recorded: dict = field(default_factory=dict)
     exit_codes: dict = field(default_factory=dict)
     cpu_share: dict = field(default_factory=dict)
+
+    @property
+    def stopped(self):
+        """Tell whether the user ended it, by Ctrl-C or SIGTERM."""
+        return self.failure == STOPPED
 
     @property
     def complete(self):
@@ -108,13 +114,14 @@ class RigSession:
                 f'live nodes need ROS 2 ({error.name} is missing): source its setup file or '
                 'install the extra ros, pip install "pam_actuation[ros]"') from None
         self.plan = plan
-        self.namespace = namespace
+        self.namespace = namespace_of(namespace)
         self.processes = {}
         self._lock = DomainLock(domain_id)
         self.domain_id = self._lock.domain_id
         self.client = None
         self._cpu = {}
         self._active = set()
+        self._may_record = False
         self._active_since = None
         self.ended_at = None
 
@@ -124,10 +131,11 @@ class RigSession:
 
     def __exit__(self, *_):
         """End all processes of this session."""
-        end_all(self.processes.values())
-        if self.client is not None:
-            self.client.close()
-        self._lock.release()
+        with undisturbed():
+            end_all(self.processes.values())
+            if self.client is not None:
+                self.client.close()
+            self._lock.release()
 
     def start(self):
         """
@@ -147,6 +155,7 @@ class RigSession:
         self.client = self._new_client(self.domain_id)
         self.change(self.processes, 'configure', START_TIMEOUT_S)
         for name in self.processes:
+            self._may_record |= name == RECORDER
             self.change([name], 'activate')
             self._active.add(name)
         self._active_since = time.monotonic()
@@ -247,6 +256,8 @@ class RigSession:
 
     def fill(self, result):
         """Enter counts, exit codes and findings into a Result."""
+        if not self._may_record or not os.path.isdir(result.bag):
+            result.bag = ''         # there is none, or only that of an earlier run
         if self.client is None:
             return
         result.published = self.client.published()
@@ -311,11 +322,9 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
 
     """
-    namespace = '/' + namespace.strip('/')
-    if not NAMESPACE.fullmatch(namespace):
-        raise InputError(
-            f'{namespace!r} is not allowed, it must be names of letters, digits and _ '
-            'joined by /', 'namespace')
+    namespace = namespace_of(namespace)
+    if not namespace:
+        raise InputError('is needed, such as /muscle', 'namespace')
     bag = None
     if with_recorder:
         if out_dir is None:
@@ -344,9 +353,10 @@ def run_guarded(session, result, progress):
     except SessionFailed as error:
         result.failure = str(error)
     except KeyboardInterrupt:
-        result.failure = 'stopped by the user'
+        result.failure = STOPPED
     if begin is not None:
         result.duration_s = time.monotonic() - begin
-    problems = session.finish()
-    session.fill(result)
-    result.findings += problems
+    with undisturbed():
+        problems = session.finish()
+        session.fill(result)
+        result.findings += problems
