@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.recorder import RECORDING_RECORD
@@ -77,8 +78,8 @@ class BagInfo:
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good
     bag; ``notes`` are harmless ones. ``complete`` is False when messages are
-    known to be missing, True when every topic of the rig has been checked, None
-    where that is not known.
+    known to be missing or the run stopped early, True when every topic of the rig has
+    been checked, None where that is not known.
     """
 
     path: str
@@ -110,9 +111,19 @@ class BagInfo:
         return sum(topic.missed_at_start or 0 for topic in self.topics)
 
     @property
+    def missing(self):
+        """Return whether messages are known to be missing."""
+        return bool(self.recovered or self.lost or self.dropped or self.missed_at_start)
+
+    @property
+    def ending(self):
+        """Return how far the run came and why it ended, an ``Ending``."""
+        return ending_of(self.metadata)
+
+    @property
     def complete(self):
         """Return whether all published messages are in the bag, None if unknown."""
-        if self.recovered or self.lost or self.dropped or self.missed_at_start:
+        if self.missing or self.ending.early:
             return False
         # Diagnostics come from every node there is, also from those not of the rig.
         rig = [
@@ -136,7 +147,8 @@ class BagInfo:
         """Return everything as plain data for JSON."""
         return {
             **asdict(self), 'lost': self.lost, 'dropped': self.dropped,
-            'missed_at_start': self.missed_at_start, 'complete': self.complete}
+            'missed_at_start': self.missed_at_start, 'complete': self.complete,
+            'ending': {**asdict(self.ending), 'sentence': self.ending.sentence}}
 
 
 def bag_info(path, recover=False):
@@ -178,6 +190,8 @@ def bag_info(path, recover=False):
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles)
     remarks += missing
+    if ending_of(bag.experiment).early:
+        remarks.append(ending_of(bag.experiment).sentence)
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,

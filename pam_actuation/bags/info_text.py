@@ -36,6 +36,7 @@ def render_text(info):
     lines = [info.path, _headline(info)]
     lines += [
         f'{key}: {info.metadata[key]}' for key in _SHORT_TEXTS if info.metadata.get(key)]
+    lines.append(info.ending.sentence)
     lines += ['', *_table([_TABLE, *(_row(topic) for topic in info.topics)])]
     ranges = [line for topic in info.topics for line in _range_lines(topic)]
     if ranges:
@@ -92,6 +93,9 @@ def _range_lines(topic):
 def _verdict(info):
     if info.complete:
         text = 'Complete: every message that was published is here.'
+    elif not info.missing and info.ending.early:
+        text = (
+            'Stopped early; of what was published until then nothing is known to be missing.')
     elif info.complete is None:
         text = 'Nothing is known to be missing; not every topic could be checked.'
     else:

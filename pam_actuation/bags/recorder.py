@@ -22,12 +22,13 @@ the disk cannot follow, the newest messages are dropped and counted.
 
 from collections import deque
 import contextlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 import os
 import threading
 import time
 
 from pam_actuation.bags import disk
+from pam_actuation.bags.ending import ERROR
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
@@ -268,8 +269,12 @@ class RecorderCore:
         with self._disk:
             self._writer.add_metadata(name, values)
 
-    def close(self):
-        """Write what is queued, finish the bag and return the RecordingSummary."""
+    def close(self, ending=None):
+        """
+        Write what is queued, finish the bag and return the RecordingSummary.
+
+        The ``Ending`` of the run goes into the bag; one that stopped early replaces no other.
+        """
         if self._summary is not None:
             return self._summary
         with self._wake:
@@ -281,7 +286,13 @@ class RecorderCore:
         try:
             if self.write_error:
                 self._count_what_is_kept()
+            if ending is not None and ending.texts():
+                if self.write_error:
+                    ending = replace(ending, ended=ERROR, because=self.write_error)
+                self._writer.add_to_experiment(ending.texts())
             self._writer.add_metadata(RECORDING_RECORD, _as_texts(self.counts, self.write_error))
+            if self.write_error or ending is not None and ending.early:
+                self._writer.replace_nothing()
             self._writer.close()
         except OSError as error:
             self._fail(error)

@@ -85,7 +85,7 @@ def _plan(args):
 
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.protocols import plan
-    from pam_actuation.report.page import write_text
+    from pam_sim.files import write_text
     from pam_sim import load_rig
     from pam_sim.effects.registry import get_effect
     from pam_sim.located_yaml import dump_yaml

@@ -64,8 +64,8 @@ def main(argv=None):
     except InputError as mistake:
         print(f'pam {args.verb}: {mistake}', file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print(f'pam {args.verb}: stopped', file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f'pam {args.verb}: stopped' + (f'; {stop}' if str(stop) else ''), file=sys.stderr)
         return 130
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()

@@ -48,10 +48,10 @@ def _pages(args, entries):
     written = []
     if args.html is not None:
         from pam_actuation.models import page
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         written.append(str(write_text(args.html, page.page(entries))))
     if args.markdown is not None:
         from pam_actuation.models import markdown
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         written.append(str(write_text(args.markdown, markdown.page(entries))))
     return written

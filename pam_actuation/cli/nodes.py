@@ -40,7 +40,7 @@ def run(args):
     if args.name is not None and args.name not in texts:
         raise InputError(f'no node {args.name!r}, known are {", ".join(texts)}', 'name')
     if args.markdown is not None:
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         Path(args.markdown).mkdir(parents=True, exist_ok=True)
         written = [str(write_text(Path(args.markdown) / f'{name}.md', text))
                    for name, text in texts.items()]

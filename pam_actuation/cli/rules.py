@@ -63,7 +63,7 @@ def run(args):
         payload['saved'] = args.save
         shown += f'\n\nrule file: {args.save}'
     if args.html is not None:
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         from pam_actuation.rules.page import page
         payload['page'] = str(write_text(args.html, page(found, view, args.top)))
         shown += f'\n\npage: {payload["page"]}'

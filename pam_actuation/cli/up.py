@@ -76,7 +76,7 @@ def run(args):
 
 def _write_policy(args, nodes):
     from pam_actuation.nodes.policy import policy
-    from pam_actuation.report.page import write_text
+    from pam_sim.files import write_text
     path = str(write_text(args.policy, policy(nodes)))
     emit(args, {'policy': path, 'nodes': len(nodes)}, f'policy of {len(nodes)} nodes: {path}')
     return EXIT_DONE

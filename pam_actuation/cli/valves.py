@@ -38,7 +38,7 @@ def add_arguments(parser):
 
 def run(args):
     """Measure, print both tables, write the page asked for."""
-    from pam_actuation.report.page import write_text
+    from pam_sim.files import write_text
     from pam_actuation.valves.compare import compare, STAGES
     from pam_actuation.valves.energy import power_arguments
     from pam_actuation.valves.present import as_page, as_text

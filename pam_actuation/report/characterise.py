@@ -28,9 +28,10 @@ from pathlib import Path
 import numpy as np
 
 from pam_actuation.report import figures, svg
-from pam_actuation.report.page import paragraph, plot, render, Section, table, write_text
+from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 
 ISOBARS = 6                 # pressures in the figure of force against contraction
 HOLD_COLUMNS = ('load_n', 'load_u_n', 'branch', 'pressure_pa', 'pressure_u_pa',

@@ -27,10 +27,11 @@ import tempfile
 import numpy as np
 
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import next_experiment
 from pam_actuation.messages import Contraction, Force, Pressure
-from pam_actuation.report.page import render, write_text
+from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
 from pam_actuation.report.sections.provenance import provenance
@@ -38,6 +39,7 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
@@ -83,6 +85,7 @@ def write_gap(runs, model, out_dir, certify=None, **options):
     if len(result.rivals) > 1:
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise)
+    result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     save_gap(result, certify or runs[0], out_dir)
     return result
 

@@ -17,9 +17,6 @@
 from dataclasses import dataclass
 import html
 import json
-import os
-from pathlib import Path
-import tempfile
 
 from pam_actuation.report.assets import CSS, SCRIPT
 from pam_sim.errors import InputError
@@ -142,21 +139,3 @@ def plotly_script():
         raise InputError(
             'a page needs the Python package plotly: pip install "plotly>=5.15"') from error
     return get_plotlyjs().replace('</script', '<\\/script')
-
-
-def write_text(path, content):
-    """Write a text file atomically: a reader sees the old file or the whole new one."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    try:
-        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return path

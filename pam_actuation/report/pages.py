@@ -15,8 +15,9 @@
 """The page about one experiment or several runs of it."""
 
 import numpy as np
+from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import render, signed, write_text
+from pam_actuation.report.page import paragraph, render, Section, signed
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -28,6 +29,7 @@ from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
@@ -94,7 +96,7 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
                 for run in runs]
     named = list(zip(titles, measured))
-    sections = [metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
+    sections = [_early(runs), metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -114,6 +116,12 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
         'what was asked, what it did, and how well.', [s for s in sections if s],
         run_numbers(named), FOOTER))
     return {title: summary(m) for title, m in named}
+
+
+def _early(runs):
+    """Return the section that warns of runs that stopped early, None without any."""
+    found = early_sentences(runs)
+    return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None
 
 
 def default_titles(runs):

@@ -15,12 +15,13 @@
 """The page of a tuning: what was searched, what came out, how the recordings judge it."""
 
 from pam_actuation.report import figures
-from pam_actuation.report.page import paragraph, plot, render, Section, table, write_text
+from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.tuning import tuning_section
 from pam_actuation.tuning.problem import rebuild
+from pam_sim.files import write_text
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '

@@ -14,6 +14,7 @@
 
 """Where the numbers of a page come from: bags, rig, controller, versions, seed."""
 
+from pam_actuation.bags.ending import ending_of
 from pam_actuation.report import signals
 from pam_actuation.report.page import Section, table, text
 
@@ -38,6 +39,7 @@ def provenance(runs, key='provenance', title='Where this comes from'):
               ('Valve', lambda run: _meta(run, 'valve').upper()),
               ('Namespace', lambda run: run.namespace),
               ('Duration', lambda run: f'{signals.duration_s(run):.1f} s'),
+              ('Planned and reached', lambda run: ending_of(run.metadata).sentence),
               ('Messages', lambda run: _counts(run)),
               ('Random seed', lambda run: _meta(run, 'seed')),
               ('pam_actuation version', lambda run: _meta(run, 'software_version'))]
