@@ -16,14 +16,15 @@
 Files that are written whole or not at all, and only where nothing is lost.
 
 Every writer of the two packages ends here. A target is looked at before the work
-starts (``check_file``, ``check_folder``) and written through a temporary file beside it
-(``whole_file``, ``write_text``). Only regular files are replaced: never a device, a pipe,
-a folder or what a symbolic link points to.
+starts (``check_file``, ``check_folder``) and written through temporary files beside it
+(``whole_file``, ``whole_files``, ``write_text``). Only regular files are replaced: never a
+device, a pipe, a folder or what a symbolic link points to.
 """
 
 import contextlib
 import os
 from pathlib import Path
+import shutil
 import stat
 import tempfile
 
@@ -31,14 +32,14 @@ from pam_sim.errors import InputError
 
 LONGEST_NAME = 100            # of an experiment or muscle: the file system takes 255 bytes in all
 LONGEST_PART_BYTES = 255      # that file systems take between two slashes
-_TRIED_BYTES = 4096
+_TRIED_BYTES = _LOOKED_AT = 4096
 _SHOWN = 120
 _KINDS = ((stat.S_ISLNK, 'a symbolic link'), (stat.S_ISDIR, 'a folder'),
           (stat.S_ISBLK, 'a device'), (stat.S_ISCHR, 'a device'), (stat.S_ISFIFO, 'a pipe'),
           (stat.S_ISSOCK, 'a socket'))
 
 
-def check_file(path, overwrite=True, parents=True):
+def check_file(path, overwrite=True, parents=True, ours=''):
     """
     Look whether a file can be written, before the work whose result it shall hold.
 
@@ -50,6 +51,9 @@ def check_file(path, overwrite=True, parents=True):
         Whether a regular file that is there already may be replaced.
     parents : bool
         Whether folders on the way to it that are missing are made when it is written.
+    ours : str
+        Words at the beginning of a file that was made here, may be replaced in any case and
+        be made again.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def check_file(path, overwrite=True, parents=True):
     if mode is None and os.fspath(path).endswith(os.sep):
         raise InputError(
             'cannot be written: this is the name of a folder; give that of a file', shown(path))
-    if mode is not None and not overwrite:
+    if mode is not None and not (overwrite or holds(target, ours)):
         raise InputError(
             'exists already; give another name, or allow to replace it (--overwrite)',
             shown(target))
@@ -85,7 +89,7 @@ def check_file(path, overwrite=True, parents=True):
     return target
 
 
-def check_folder(path, names=(), overwrite=True):
+def check_folder(path, names=(), overwrite=True, ours=''):
     """
     Look whether results can be written into a folder, before the work that makes them.
 
@@ -97,6 +101,8 @@ def check_folder(path, names=(), overwrite=True):
         Files that will be written into it.
     overwrite : bool
         Whether regular files of these names may be replaced. Others are never touched.
+    ours
+        As for ``check_file``.
 
     Returns
     -------
@@ -115,9 +121,20 @@ def check_folder(path, names=(), overwrite=True):
         _try_to_write(folder)
         return folder
     for name in names:
-        check_file(folder / name, overwrite)
+        check_file(folder / name, overwrite, ours=ours)
     _try_to_write(folder / 'any')
     return folder
+
+
+def holds(path, words):
+    """Return whether a file has these words near its beginning; line ends count as spaces."""
+    if not words:
+        return False
+    try:
+        with open(path, encoding='utf-8') as stream:
+            return words in ' '.join(stream.read(_LOOKED_AT).split())
+    except (OSError, ValueError):
+        return False
 
 
 def make_folder(path):
@@ -169,6 +186,40 @@ def whole_file(path, suffix='', parents=True):
         if temporary is not None:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
+
+
+@contextlib.contextmanager
+def whole_files(folder):
+    """
+    Give a folder whose files all go into ``folder`` when the block ends well, else none.
+
+    Raises
+    ------
+    InputError
+        As ``check_folder``, and whatever the file system refuses while the block writes.
+
+    """
+    folder = check_folder(folder)
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    make_folder(folder)
+    written, temporary = False, None
+    try:
+        temporary = Path(tempfile.mkdtemp(prefix='.unfinished-', dir=folder))
+        yield temporary
+        names = sorted(path.name for path in temporary.iterdir())
+        for name in names:
+            check_file(folder / name)
+        for name in names:
+            os.replace(temporary / name, folder / name)
+        written = True
+    except OSError as error:
+        raise cannot_write(folder, error) from None
+    finally:
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
+        for path in () if written else made:
+            with contextlib.suppress(OSError):
+                path.rmdir()
 
 
 def write_text(path, content, parents=True):

@@ -28,6 +28,7 @@ COMPLETE, INTERRUPTED, ERROR, VENTED = 'complete', 'interrupted', 'error', 'vent
 EARLY = {INTERRUPTED: 'interrupted', ERROR: 'an error ended it', VENTED: 'the driver had vented'}
 # How the reference generator begins its word on /diagnostics.
 PLAYING, FINISHED = 'playing', 'finished'
+ENDED_FILE, RECORDED_FILE = 'ended.json', 'recorded.json'     # between session and recorder
 REFERENCE, DRIVER = 'reference_generator', 'valve_driver'
 _LEVEL_ERROR = 2
 
@@ -158,7 +159,7 @@ class EndWatch:
         if reached_s is not None and planned_s is not None:
             reached_s = planned_s if self._finished else min(reached_s, planned_s)
         if told is not None and told.early:
-            return Ending(planned_s, reached_s, told.ended, told.because)
+            return Ending(planned_s, reached_s or 0.0, told.ended, told.because)
         if self._heard_ns is None and told is None:
             return Ending(planned_s)                # nobody played an experiment
         if self._vented:

@@ -15,7 +15,7 @@
 """``pam characterise``: lookup surfaces from recordings or tables of static points."""
 
 from pam_actuation.cli.common import (
-    add_recover_option, add_seed_option, emit, EXIT_DONE, progress)
+    add_overwrite_option, add_recover_option, add_seed_option, emit, EXIT_DONE, progress)
 from pam_actuation.cli.options import count, number, out_path, source
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
@@ -53,14 +53,17 @@ def add_arguments(parser):
                         help='air beside the muscle (default: of the rig, else 0)')
     parser.add_argument('--note', action='append', default=[], metavar='TEXT',
                         help='a line for the provenance, may be repeated')
+    add_overwrite_option(parser)
     add_recover_option(parser)
 
 
 def run(args):
     """Characterise and say what was written."""
     from pam_actuation import __version__
-    from pam_actuation.report.characterise import save_characterisation, summary
+    from pam_actuation.report.characterise import FILES, save_characterisation, summary
     from pam_sim.characterise import against_rig
+    from pam_sim.files import check_folder
+    check_folder(args.out, FILES, args.overwrite)
     rig, bags = _simulated(args) if args.simulate else (None, args.source)
     result = _characterised(args, bags)
     if rig is not None:
@@ -88,13 +91,14 @@ def _simulated(args):
     loads = args.load_n or LOADS_N
     with progress(args, len(loads), ' bags', 'simulating') as bar:
         bags = simulate_loads(rig, Path(args.out) / 'bags', args.seed, loads, args.jobs,
-                              experiment=args.experiment,
+                              experiment=args.experiment, overwrite=args.overwrite,
                               progress=lambda done: bar.update(done - bar.n))
     return rig, bags
 
 
 def _characterised(args, sources):
     """Return the Characterisation of bags or of one table."""
+    from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
     from pam_sim.characterise import characterise_runs, characterise_table
     from pam_sim.characterise.tables import read_measured_table
@@ -110,7 +114,9 @@ def _characterised(args, sources):
                 bar.update()
         # Simulated loads are read off the load cell like any others.
         loads = None if args.simulate else args.load_n
-        return characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
+        result = characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
+        result.remarks += early_sentences(runs)
+        return result
     if len(sources) > 1:
         raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
     return characterise_table(read_measured_table(tables[0]), _dimensions(args, []),

@@ -84,7 +84,7 @@ def add_experiment_options(parser):
     add_rig_options(parser)
     add_controller_options(parser)
     add_seed_option(parser, 'seed of the sensor noise')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
+    add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
 
 
 def load_setup(args):
@@ -125,6 +125,37 @@ def add_seed_option(parser, text):
     """Add the option of the seed, said to be that of ``text``."""
     parser.add_argument(
         '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
+
+
+def add_overwrite_option(parser, what='files that are there already'):
+    """Add the option without which no verb replaces ``what``."""
+    parser.add_argument('--overwrite', action='store_true', help=f'replace {what}')
+
+
+def check_outputs(args, *paths):
+    """
+    Look whether the files that the options name can be written, before the work starts.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``overwrite``.
+    paths : str or None
+        None: not asked for.
+
+    Raises
+    ------
+    InputError
+        As ``pam_sim.files.check_file``; two results in one file.
+
+    """
+    from pam_sim.errors import InputError
+    from pam_sim.files import check_file
+    wanted = [os.path.abspath(check_file(path, args.overwrite))
+              for path in paths if path is not None]
+    for path in wanted:
+        if wanted.count(path) > 1:
+            raise InputError('two results cannot go into one file', path)
 
 
 def add_recover_option(parser):

@@ -37,8 +37,9 @@ def add_arguments(parser):
 def run(args):
     """Run the demo and print where the bags and the page are."""
     from pam_actuation.cli.common import progress
-    from pam_actuation.demo import Demo
+    from pam_actuation.demo import check_place, Demo
     out = args.out or os.path.join('runs', f'demo-{time.strftime("%Y%m%d-%H%M%S")}')
+    check_place(out)
     with progress(args, 100, '%', 'demo') as bar:
         said = []
 

@@ -16,7 +16,8 @@
 
 import json
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
+from pam_actuation.cli.common import (
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress)
 from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
@@ -54,14 +55,16 @@ def add_arguments(parser):
     parser.add_argument('--materiality', type=number(0.01, 1000.0), default=1.0, metavar='S',
                         help='an effect is named when it moves a signal by more than S standard '
                         'deviations of its sensor (default: %(default)g)')
+    add_overwrite_option(parser)
 
 
 def run(args):
     """Find the gap; exit code 1 where there is one."""
     from pam_actuation.bags.load import load_run
-    from pam_actuation.report.gap import write_gap
+    from pam_actuation.report.gap import FILES, write_gap
     from pam_sim.effects.registry import get_effect
     from pam_sim.errors import InputError
+    from pam_sim.files import check_folder
     if args.explain is not None:
         return _explain(args)
     if args.plan:
@@ -71,6 +74,7 @@ def run(args):
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
+    check_folder(args.out, FILES, args.overwrite)
     runs = [load_run(path, namespace=args.namespace) for path in args.run]
     certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
     with progress(args, 1.0, '', 'gap') as bar:
@@ -87,24 +91,26 @@ def _plan(args):
 
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.protocols import plan
-    from pam_sim.files import write_text
     from pam_sim import load_rig
     from pam_sim.effects.registry import get_effect
+    from pam_sim.files import check_folder, whole_files, write_text
     from pam_sim.located_yaml import dump_yaml
     rig = load_rig(args.model, valve=args.valve)
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
+    if args.out is not None:
+        check_folder(args.out, ('plan.json', 'experiment.yaml'), args.overwrite)
     experiments = [load_experiment(one) for one in args.run]
     with progress(args, 1.0, '', 'plan') as bar:
         found = plan(rig, experiments, not args.no_force, args.materiality, names,
                      progress=lambda done: bar.update(done - bar.n))
     text = found.text()
     if args.out is not None:
-        folder = Path(args.out)
-        write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
-        write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
-        text += f'\nrun it with: pam run {folder / "experiment.yaml"}'
+        with whole_files(args.out) as folder:
+            write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
+            write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
+        text += f'\nrun it with: pam run {Path(args.out) / "experiment.yaml"}'
     emit(args, found.to_dict(), text)
     return EXIT_DONE
 

@@ -22,6 +22,7 @@ import sys
 from pam_actuation.cli.common import EXIT_BAD_INPUT
 from pam_actuation.cli.options import Parser
 from pam_sim.errors import InputError
+from pam_sim.files import reason, shown
 
 VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
          'info', 'models', 'nodes', 'valves', 'rules')
@@ -64,7 +65,9 @@ def main(argv=None):
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code
     try:
-        return args.call(args)
+        code = args.call(args)
+        sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
+        return code
     except InputError as mistake:
         print(f'pam {args.verb}: {mistake}', file=sys.stderr)
         return EXIT_BAD_INPUT
@@ -74,6 +77,10 @@ def main(argv=None):
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()
         return 0
+    except OSError as error:  # the file system refuses where nobody looked before
+        place = f'{shown(str(error.filename))}: ' if error.filename else ''
+        print(f'pam {args.verb}: {place}{reason(error)}', file=sys.stderr)
+        return EXIT_BAD_INPUT
 
 
 if __name__ == '__main__':

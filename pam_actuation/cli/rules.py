@@ -19,7 +19,8 @@ import shutil
 import sys
 
 from pam_actuation.cli.common import (
-    add_recover_option, add_rig_options, emit, EXIT_DONE, progress)
+    add_overwrite_option, add_recover_option, add_rig_options, check_outputs, emit, EXIT_DONE,
+    progress)
 from pam_actuation.cli.options import count, out_path, source
 
 HELP = 'Show the rules of a controller: tables, what changed, how often each fired, in words.'
@@ -42,6 +43,7 @@ def add_arguments(parser):
                         help='write the rules to a rule file, for --rules of other verbs')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in a bag')
     add_rig_options(parser)
+    add_overwrite_option(parser)
     add_recover_option(parser)
 
 
@@ -52,6 +54,7 @@ def run(args):
     from pam_sim.errors import InputError
     if args.save is not None and not args.save.endswith('.json'):
         raise InputError('a rule file ends in .json', f'--save {args.save}')
+    check_outputs(args, args.html, args.save)
     found = _find(args, args.rules)
     against = None if args.against is None else _find(args, args.against)
     view = view_of(found, against)
@@ -64,8 +67,8 @@ def run(args):
         payload['saved'] = args.save
         shown += f'\n\nrule file: {args.save}'
     if args.html is not None:
-        from pam_sim.files import write_text
         from pam_actuation.rules.page import page
+        from pam_sim.files import write_text
         payload['page'] = str(write_text(args.html, page(found, view, args.top)))
         shown += f'\n\npage: {payload["page"]}'
     emit(args, payload, shown)

@@ -37,10 +37,12 @@ def add_arguments(parser):
 
 def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
     experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
+    check_bag_target(out, args.overwrite)
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
         result = run_experiment(
             experiment, rig, controller, rig.valve, out, learning=not args.freeze,

@@ -34,9 +34,11 @@ def add_arguments(parser):
 
 def run(args):
     """Simulate and say what was recorded."""
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
     experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
+    check_bag_target(out, args.overwrite)
     started = time.perf_counter()
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
         result = simulate_experiment(

@@ -17,8 +17,8 @@
 import os
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_seed_option, default_controller, emit, EXIT_DONE, EXIT_FINDING,
-    progress)
+    add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
+    default_controller, emit, EXIT_DONE, EXIT_FINDING, progress)
 from pam_actuation.cli.options import count, out_path, source
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
@@ -64,6 +64,7 @@ def add_arguments(parser):
     parser.add_argument('--out', type=out_path, default='tuned.yaml', metavar='FILE.yaml',
                         help='controller to write; its rules and the report go beside it '
                         '(default: %(default)s)')
+    add_overwrite_option(parser)
 
 
 def run(args):
@@ -77,7 +78,8 @@ def run(args):
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
     from pam_sim import load_rig
     from pam_sim.errors import InputError
-    stem = _checked(args)
+    from pam_sim.files import whole_files
+    written = _targets(args)
     runs = [load_run(bag) for bag in args.bag]
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
@@ -97,11 +99,12 @@ def run(args):
             held_out_rigs=others, patience=args.patience, cluster=args.cluster,
             learn_rules=not args.freeze)
     recordings = check_recordings(runs, rig, result.controller)
-    written = {'controller': args.out, 'report': f'{stem}.html'}
-    if result.controller.rules is not None:
-        written['rules'] = f'{stem}_rules.json'
-    result.save(args.out, written.get('rules'))
-    tuning_report(written['report'], result, recordings, rig, experiments, runs)
+    if result.controller.rules is None:
+        del written['rules']
+    with whole_files(os.path.dirname(os.path.abspath(args.out))) as folder:
+        files = {what: folder / os.path.basename(path) for what, path in written.items()}
+        result.save(files['controller'], files.get('rules'))
+        tuning_report(files['report'], result, recordings, rig, experiments, runs)
     emit(args, {**{key: os.fspath(path) for key, path in written.items()}, **result.to_dict(),
                 'recordings': [one.to_dict() for one in recordings]},
          '\n'.join([result.text(), *(f'  {text}' for one in recordings for text in one.lines()),
@@ -110,13 +113,16 @@ def run(args):
     return EXIT_DONE if result.improved and not wrong else EXIT_FINDING
 
 
-def _checked(args):
-    """Return the path of ``--out`` without its ending; raise InputError without its folder."""
+def _targets(args):
+    """Return what will be written to which file; raise InputError where that cannot be."""
     from pam_sim.errors import InputError
     folder = os.path.dirname(os.path.abspath(args.out))
     if not os.path.isdir(folder):
         raise InputError('the folder does not exist', folder)
-    return os.path.splitext(args.out)[0]
+    stem = os.path.splitext(args.out)[0]
+    targets = {'controller': args.out, 'report': f'{stem}.html', 'rules': f'{stem}_rules.json'}
+    check_outputs(args, *targets.values())
+    return targets
 
 
 def _first(runs, key):

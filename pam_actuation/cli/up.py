@@ -14,7 +14,8 @@
 
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import (
+    add_overwrite_option, check_outputs, emit, EXIT_DONE, EXIT_FINDING)
 from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
 
@@ -46,12 +47,17 @@ def add_arguments(parser):
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
     parser.add_argument('--policy', type=out_path, metavar='FILE', default=None,
                         help='start nothing; write the access policy of these nodes (SROS2)')
+    add_overwrite_option(parser, 'a policy that is there already')
 
 
 def run(args):
     """Bring up, watch, take down; exit code 1 if a node ended or did not end in order."""
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
+    check_outputs(args, args.policy)
+    if args.record and args.policy is None:
+        check_bag_target(args.record)
     nodes = _nodes(args)
     if args.policy is not None:
         return _write_policy(args, nodes)

@@ -14,7 +14,8 @@
 
 """``pam valves compare``: the regulator and the on/off pair, measured on the same rig."""
 
-from pam_actuation.cli.common import add_seed_option, emit, EXIT_DONE, progress
+from pam_actuation.cli.common import (
+    add_overwrite_option, add_seed_option, check_outputs, emit, EXIT_DONE, progress)
 from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Compare the valve types on one rig: accuracy, response, air, ripple, power, power loss.'
@@ -36,16 +37,18 @@ def add_arguments(parser):
     parser.add_argument(
         '--power', action='append', default=[], metavar='NAME=VALUE',
         help='a power number: ppr_power_w, hsv_peak_power_w, hsv_peak_time_s, hsv_hold_power_w')
+    add_overwrite_option(parser)
 
 
 def run(args):
     """Measure, print both tables, write the page asked for."""
-    from pam_sim.files import write_text
     from pam_actuation.valves.compare import compare, STAGES
     from pam_actuation.valves.energy import power_arguments
     from pam_actuation.valves.present import as_page, as_text
     from pam_actuation.valves.table42 import statements
     from pam_sim import load_rig
+    from pam_sim.files import write_text
+    check_outputs(args, args.html)
     rig, power = load_rig(args.rig), power_arguments(args.power)
     with progress(args, STAGES, description='valves') as bar:
         result = compare(rig, args.seed, power, args.hold, progress=bar.update)

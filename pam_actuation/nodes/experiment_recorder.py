@@ -14,14 +14,21 @@
 
 """The recorder on ROS: every message of the rig, as it came, into a bag."""
 
+import contextlib
 import importlib
 import json
+import os
 import sys
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.bags import layout
-from pam_actuation.bags.codecs import TOPIC_TYPES
+from pam_actuation.bags.codecs import decode, TOPIC_TYPES
+from pam_actuation.bags.ending import Ending
+from pam_actuation.bags.ending import ENDED_FILE
+from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.ending import EndWatch
+from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter, check_limits
@@ -34,6 +41,7 @@ from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.plant_simulator import MAX_SEED
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 
 TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
 CHECK_EVERY = 10            # ticks between two looks at the counts
@@ -57,7 +65,8 @@ class ExperimentRecorder(ManagedNode):
     FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (
         NodeParameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
-        NodeParameter('overwrite', False, 'Replace an existing bag.'),
+        NodeParameter(
+            'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
         NodeParameter(
             'topics', list(TOPIC_TYPES), 'Topics to record, relative to the namespace '
             '(diagnostics is /diagnostics).'),
@@ -75,6 +84,10 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter(
             'metadata_file', '', 'JSON file of texts for the record pam_experiment. Empty: '
             'made from the parameters below.'),
+        NodeParameter(
+            'notes_folder', '', 'Folder in which whoever started this node may say why the run '
+            'ended (ended.json) and in which the node says what it recorded (recorded.json). '
+            'Empty: none.'),
         NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
         NodeParameter('rig', '', 'Rig preset, or path of its file.'),
         NodeParameter('controller', '', 'Controller preset, or path of its file.'),
@@ -149,6 +162,7 @@ class ExperimentRecorder(ManagedNode):
             max_file_bytes=self.value('max_bagfile_size_bytes'),
             max_file_s=self.value('max_bagfile_duration_s'))
         self.core = RecorderCore(writer)
+        self.watch = EndWatch(self.get_namespace().rstrip('/'))
         self.known = set()
         if self._recorded or not self.value('autostart'):
             for source in self.sources.values():
@@ -188,8 +202,7 @@ class ExperimentRecorder(ManagedNode):
         An experiment without a record is not worth its risk; whoever started the rig sees
         this node end and stops the others, which vents.
         """
-        summary = self.core.close()
-        self.core = None
+        summary = self._close()
         self.fail(f'{summary.write_error} ({summary.written} messages kept, '
                   f'{summary.dropped} not written)')
 
@@ -215,16 +228,44 @@ class ExperimentRecorder(ManagedNode):
                 self.core.add_topic(name, self.types[topic])
                 self.known.add(name)
             self.core.receive_all(name, messages)
+            if topic == 'diagnostics':
+                self._listen(messages)
             taken += len(messages)
         return taken
+
+    def _listen(self, messages):
+        """Follow how the run goes by what the other nodes say."""
+        for data, _ in messages:
+            with contextlib.suppress(InputError):
+                self.watch.hear(decode('diagnostics', data))
+
+    def _ending(self):
+        """Return how the run ended, by what was heard and by who started this node."""
+        told = None
+        if self.value('notes_folder'):
+            path = os.path.join(self.value('notes_folder'), ENDED_FILE)
+            with contextlib.suppress(OSError, ValueError, TypeError), open(path) as stream:
+                told = Ending(**json.load(stream))
+        return self.watch.ending(ending_of(self.metadata).planned_s, told)
+
+    def _close(self):
+        """Finish the bag; return the summary."""
+        summary = self.core.close(self._ending())
+        self.core = None
+        if self.value('notes_folder'):
+            try:
+                write_text(os.path.join(self.value('notes_folder'), RECORDED_FILE),
+                           json.dumps(summary.to_dict()))
+            except InputError as error:
+                self.get_logger().warning(str(error))
+        return summary
 
     def stop(self):
         """Take the last messages, finish the bag, say whether it is complete."""
         if self.core is None:
             return
         self._take_last()
-        summary = self.core.close()
-        self.core = None
+        summary = self._close()
         if summary.complete:
             self.get_logger().info(
                 f'{summary.written} messages recorded, none lost: {summary.path}')

@@ -39,7 +39,7 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
-from pam_sim.files import write_text
+from pam_sim.files import check_folder, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
@@ -47,6 +47,7 @@ from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
 MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
+FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
@@ -75,11 +76,12 @@ def write_gap(runs, model, out_dir, certify=None, **options):
     Raises
     ------
     InputError
-        No recording, or a mistake in the model.
+        No recording, a mistake in the model, or a folder that cannot be written.
 
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
+    check_folder(out_dir)
     rig = model_for(runs[0], model)
     result = find_gap(runs, rig, certify, **options)
     if len(result.rivals) > 1:
@@ -104,9 +106,11 @@ def save_gap(result, run, out_dir):
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
     """
-    out_dir = Path(out_dir)
-    if out_dir.exists() and not out_dir.is_dir():
-        raise InputError('is a file; give a folder for the results', str(out_dir))
+    with whole_files(out_dir) as folder:
+        _save_into(folder, result, run)
+
+
+def _save_into(out_dir, result, run):
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)

@@ -91,7 +91,7 @@ def key_numbers(numbers):
     return f'<div class="numbers">{cells}</div>'
 
 
-def render(title, lead, sections, numbers=(), footer=''):
+def render(title, lead, sections, numbers=(), footer='', of=''):
     """
     Return the whole page as text.
 
@@ -105,6 +105,8 @@ def render(title, lead, sections, numbers=(), footer=''):
         See ``key_numbers``; shown above all sections.
     footer : str
         Last line.
+    of : str
+        What the page is of, for programs; not shown.
 
     """
     links = ''.join(f'<a href="#{text(s.key)}">{text(s.title)}</a>' for s in sections
@@ -117,6 +119,7 @@ def render(title, lead, sections, numbers=(), footer=''):
                      f'{section.body}</{tag}>')
     return ('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<meta name="generator" content="pam_actuation {text(of)}">'
             f'<title>{text(title)}</title><style>{CSS}</style></head><body>'
             f'<header class="top"><h1>{text(title)}</h1>{paragraph(lead, "lead")}'
             f'<nav>{links}</nav>{key_numbers(numbers) if numbers else ""}</header>'

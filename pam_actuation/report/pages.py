@@ -56,7 +56,7 @@ def muscle_volume(run):
 
 
 def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,
-                      overlay=None, replays=None, gap=None, page_title=None):
+                      overlay=None, replays=None, gap=None, page_title=None, of=''):
     """
     Write the HTML page of one or several runs.
 
@@ -78,6 +78,8 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
         Gap of the first run against a model.
     page_title : str, optional
         Heading; by default made of the experiment's name.
+    of : str
+        Words in the head of the page that tell which bags it shows.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     write_text(out_path, render(
         page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
         'what was asked, what it did, and how well.', [s for s in sections if s],
-        run_numbers(named), FOOTER))
+        run_numbers(named), FOOTER, of))
     return {title: summary(m) for title, m in named}
 
 
@@ -170,10 +172,10 @@ def summary(m):
             'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
 
 
-def bag_report(runs, out_path, titles=None):
+def bag_report(runs, out_path, titles=None, of=''):
     """
     Write the page of some bags; as ``experiment_report``, and return the main numbers.
 
     A gap result or rules are not computed here; the page shows what was recorded.
     """
-    return experiment_report(runs, out_path, titles=titles)
+    return experiment_report(runs, out_path, titles=titles, of=of)

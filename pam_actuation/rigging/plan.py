@@ -22,7 +22,7 @@ import shutil
 import tempfile
 
 from pam_actuation.bags.metadata import experiment_metadata
-from pam_sim.errors import InputError
+from pam_actuation.bags.place import check_bag_target
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
     'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
@@ -101,8 +101,8 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     elif not hasattr(controller, 'to_yaml'):
         controller = load_controller(controller or preset_for(experiment, rig), rig)
     check_tracked(experiment, controller)
-    if bag is not None and os.path.exists(bag) and not overwrite:
-        raise InputError('exists already; choose another folder or allow to replace it', str(bag))
+    if bag is not None:
+        check_bag_target(bag, overwrite)
     _compile(rig, controller)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(experiment, rig, controller, '', {}, folder)
@@ -146,6 +146,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
             topics += ['controller_state', 'pressure_command']
         nodes[RECORDER] = {
             'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
+            'notes_folder': str(plan.folder),
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
     nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
     nodes[DRIVER] = {
