@@ -18,6 +18,7 @@ from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S, TR
 from pam_actuation.experiments.limits import check_rig
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
+from pam_sim.files import check_name
 from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located
 
 KEYS = (
@@ -149,7 +150,8 @@ def load_experiment(source):
     Raises
     ------
     InputError
-        No such experiment, or a mistake in the file, with file and line.
+        No such experiment, or a mistake in the file, with file and line; a name that cannot be
+        that of a file.
 
     """
     if '\n' not in str(source):
@@ -157,7 +159,8 @@ def load_experiment(source):
     data = load_yaml(source)
     data.check_keys(KEYS)
     return Experiment(
-        data.require('name', str), data.get('description', str, ''),
+        check_name(data.require('name', str), '`name`', data.where('name')),
+        data.get('description', str, ''),
         data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
         _segments(data.require('segments', list)), data.where('segments'),
         _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())),
