@@ -85,7 +85,7 @@ def check_file(path, overwrite=True, parents=True, ours=''):
         raise InputError(
             f'cannot be written: the folder {shown(target.parent)} does not exist',
             shown(target))
-    _try_to_write(target)
+    try_to_write(target)
     return target
 
 
@@ -118,17 +118,28 @@ def check_folder(path, names=(), overwrite=True, ours=''):
     if not folder.is_dir():
         if _mode(folder) is not None:
             raise InputError('is a file; give a folder for the results', shown(folder))
-        _try_to_write(folder)
+        try_to_write(folder)
         return folder
     for name in names:
         check_file(folder / name, overwrite, ours=ours)
-    _try_to_write(folder / 'any')
+    try_to_write(folder / 'any')
     return folder
+
+
+def refuse_pipe(path):
+    """Raise InputError for a pipe or socket with a name, which would be waited for for ever."""
+    mode = None
+    with contextlib.suppress(OSError, ValueError):
+        mode = os.stat(path).st_mode
+    # The shell names its own pipes /dev/fd/…; somebody writes into those.
+    if mode is not None and (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)) \
+            and not os.fspath(path).startswith(('/dev/', '/proc/')):
+        raise InputError(f'cannot be read: it is {_kind(mode)}; give a file', shown(path))
 
 
 def holds(path, words):
     """Return whether a file has these words near its beginning; line ends count as spaces."""
-    if not words:
+    if not words or not os.path.isfile(path):
         return False
     try:
         with open(path, encoding='utf-8') as stream:
@@ -230,6 +241,35 @@ def write_text(path, content, parents=True):
     return Path(path)
 
 
+def try_to_write(path):
+    """
+    Write a little beside ``path``, or into the nearest folder there is, and remove it again.
+
+    Raises
+    ------
+    InputError
+        The system refuses, or what should be a folder is none.
+
+    """
+    folder = Path(os.path.abspath(path)).parent
+    while not folder.is_dir():
+        if _mode(folder) is not None:
+            raise InputError(
+                f'cannot be written: {shown(folder)} is no folder', shown(path))
+        folder = folder.parent
+    handle = name = None
+    try:
+        handle, name = tempfile.mkstemp(prefix='.unfinished-', dir=folder)
+        if os.write(handle, bytes(_TRIED_BYTES)) < _TRIED_BYTES:
+            raise OSError(0, 'no space left on the device')
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    finally:
+        if name is not None:
+            os.close(handle)
+            os.unlink(name)
+
+
 def cannot_write(path, error):
     """Return the InputError for an OSError that came while writing ``path``."""
     return InputError(f'cannot be written: {reason(error)}', shown(path))
@@ -273,6 +313,10 @@ def _checked_path(path, what):
     text = os.fspath(path)
     if not text.strip():
         raise InputError(f'"{text}" is no name of a {what}', 'output')
+    if text.startswith('~'):
+        raise InputError(
+            'cannot be written: ~ is not replaced by the home folder here; write that out',
+            shown(text))
     if '\0' in text:
         raise InputError(f'has a character that no {what} can have', repr(shown(text)))
     if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in Path(text).parts):
@@ -296,24 +340,3 @@ def _mode(path):
 
 def _kind(mode):
     return next((words for matches, words in _KINDS if matches(mode)), 'no regular file')
-
-
-def _try_to_write(path):
-    """Write a little into the nearest folder there is, and remove it again."""
-    folder = Path(os.path.abspath(path)).parent
-    while not folder.is_dir():
-        if _mode(folder) is not None:
-            raise InputError(
-                f'cannot be written: {shown(folder)} is no folder', shown(path))
-        folder = folder.parent
-    handle = name = None
-    try:
-        handle, name = tempfile.mkstemp(prefix='.unfinished-', dir=folder)
-        if os.write(handle, bytes(_TRIED_BYTES)) < _TRIED_BYTES:
-            raise OSError(0, 'no space left on the device')
-    except OSError as error:
-        raise cannot_write(path, error) from None
-    finally:
-        if name is not None:
-            os.close(handle)
-            os.unlink(name)

@@ -28,7 +28,7 @@ import stat
 
 from pam_actuation.bags import disk, layout
 from pam_sim.errors import InputError
-from pam_sim.files import check_folder, make_folder, reason, shown
+from pam_sim.files import make_folder, reason, shown, try_to_write
 
 # Added to the name of a bag while it is written beside the one it replaces, when it ended
 # early and may not, and to the name of the former bag while they change places.
@@ -62,7 +62,7 @@ def check_bag_target(directory, overwrite=False):
     """
     directory = _absolute(directory)
     _bag_in(directory, overwrite)
-    check_folder(directory if directory.is_dir() and not overwrite else directory.parent)
+    try_to_write(directory / 'any' if directory.is_dir() and not overwrite else directory)
     return directory
 
 
@@ -139,6 +139,8 @@ def _absolute(directory):
     text = os.fspath(directory)
     if not text.strip() or '\0' in text:
         raise InputError(f'{text!r} is no name of a folder; give one for the bag', 'output')
+    if text.startswith('~'):
+        raise InputError('~ is not replaced by the home folder here; write that out', shown(text))
     try:
         if stat.S_ISLNK(os.lstat(text.rstrip(os.sep) or os.sep).st_mode):
             raise InputError('is a symbolic link; give the name of a new folder', shown(text))

@@ -108,6 +108,8 @@ def load_setup(args):
     experiment = load_experiment(args.experiment)
     rig = load_rig(args.rig, valve=args.valve)
     if not experiment.tracked:
+        if args.controller or args.rules:       # of no use here, but not to be wrong either
+            load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules)
         return experiment, rig, None
     experiment.check_reachable(rig)
     controller = load_controller(

@@ -69,7 +69,7 @@ def main(argv=None):
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
         return code
     except InputError as mistake:
-        print(f'pam {args.verb}: {mistake}', file=sys.stderr)
+        print(f'pam {args.verb}: {" ".join(str(mistake).split())}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as stop:
         print(f'pam {args.verb}: stopped' + (f'; {stop}' if str(stop) else ''), file=sys.stderr)

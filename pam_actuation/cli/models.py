@@ -38,10 +38,13 @@ def run(args):
     """List the catalogue, or one entry in full; write the pages asked for."""
     from pam_actuation.models.text import in_full, overview
     from pam_sim.catalogue import catalogue, find
+    from pam_sim.errors import InputError
     from pam_sim.files import check_file
     if args.markdown is not None:
         check_file(args.markdown, args.overwrite, ours='by `pam models --markdown')
     check_outputs(args, args.html)
+    if args.html is not None and args.html == args.markdown:
+        raise InputError('two pages cannot go into one file', args.html)
     entries = catalogue()
     if args.name is not None:
         entries = find(entries, args.name)

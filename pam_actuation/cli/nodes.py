@@ -40,12 +40,12 @@ def run(args):
     if args.markdown is not None:
         check_folder(args.markdown)
     try:
-        from pam_actuation.nodes.pages import pages
+        from pam_actuation.nodes.pages import pages, VARIANTS
     except ImportError as error:
         raise InputError(f'the nodes need ROS 2 ({error.name} is missing)') from None
+    if args.name is not None and args.name not in VARIANTS:
+        raise InputError(f'no node {args.name!r}, known are {", ".join(VARIANTS)}', 'name')
     texts = {Path(file).stem: text for file, text in pages().items()}
-    if args.name is not None and args.name not in texts:
-        raise InputError(f'no node {args.name!r}, known are {", ".join(texts)}', 'name')
     if args.markdown is not None:
         files = {f'{name}.md': text for name, text in texts.items()}
         folder = check_folder(

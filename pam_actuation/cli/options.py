@@ -24,6 +24,8 @@ import math
 import os
 import re
 
+from pam_sim.files import shown
+
 LONGEST_NAME_BYTES = 255      # of one file or folder, on every file system in use
 HIGHEST_SEED = 2**32 - 1
 _DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
@@ -130,11 +132,11 @@ def _check_text(text, wanted):
 
 def _check_range(value, text, lowest, highest, allowed):
     if lowest is not None and value < lowest or highest is not None and value > highest:
-        raise argparse.ArgumentTypeError(f'is {text}; allowed is {allowed}')
+        raise argparse.ArgumentTypeError(f'is {shown(text)}; allowed is {allowed}')
 
 
 def _refused(text, why, allowed):
     """Return the error of a text that is no number of the kind wanted."""
     if _DECIMAL_COMMA.fullmatch(text.strip()):
         why += ': write a decimal point, not a comma'
-    return argparse.ArgumentTypeError(f'{text!r} {why}; allowed is {allowed}')
+    return argparse.ArgumentTypeError(f'{shown(text)!r} {why}; allowed is {allowed}')

@@ -115,10 +115,8 @@ def run(args):
 
 def _targets(args):
     """Return what will be written to which file; raise InputError where that cannot be."""
-    from pam_sim.errors import InputError
-    folder = os.path.dirname(os.path.abspath(args.out))
-    if not os.path.isdir(folder):
-        raise InputError('the folder does not exist', folder)
+    from pam_sim.files import check_file
+    check_file(args.out, args.overwrite, parents=False)
     stem = os.path.splitext(args.out)[0]
     targets = {'controller': args.out, 'report': f'{stem}.html', 'rules': f'{stem}_rules.json'}
     check_outputs(args, *targets.values())

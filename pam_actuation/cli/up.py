@@ -15,9 +15,10 @@
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, check_outputs, emit, EXIT_DONE, EXIT_FINDING)
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING)
 from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
+from pam_sim.files import check_file
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
 EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'
@@ -55,8 +56,9 @@ def run(args):
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
-    check_outputs(args, args.policy)
-    if args.record and args.policy is None:
+    if args.policy is not None:
+        check_file(args.policy, args.overwrite, ours='Made from the code, as docs/security.md')
+    elif args.record:
         check_bag_target(args.record)
     nodes = _nodes(args)
     if args.policy is not None:

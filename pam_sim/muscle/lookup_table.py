@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from pam_sim.errors import InputError
-from pam_sim.files import whole_file
+from pam_sim.files import refuse_pipe, whole_file
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
@@ -113,6 +113,7 @@ def read_commented_csv(path):
         The file cannot be read as text.
 
     """
+    refuse_pipe(path)
     try:
         lines = Path(path).read_text(encoding='utf-8').splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -32,7 +32,7 @@ from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
-from pam_sim.files import write_text
+from pam_sim.files import refuse_pipe, write_text
 
 SCHEMA = 2
 VALVES = ('ppr', 'hsv')
@@ -267,6 +267,7 @@ def load_rules(path, expected=None):
 
     """
     path = os.fspath(path)
+    refuse_pipe(path)
     try:
         with open(path, 'rb') as stream:
             data = stream.read(MAX_BYTES + 1)
