@@ -23,6 +23,7 @@ import tempfile
 
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
+from pam_sim.errors import InputError
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
     'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
@@ -102,6 +103,9 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
         controller = load_controller(controller or preset_for(experiment, rig), rig)
     check_tracked(experiment, controller)
     if bag is not None:
+        if os.path.exists(bag) and not overwrite:
+            raise InputError(
+                'exists already; choose another folder or allow to replace it', str(bag))
         check_bag_target(bag, overwrite)
     _compile(rig, controller)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
