@@ -15,6 +15,7 @@
 """``pam gap``: what a model misses in recordings, added to it and proved."""
 
 import json
+import os
 
 from pam_actuation.cli.common import (
     add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress)
@@ -33,7 +34,8 @@ def add_arguments(parser):
                         help='model YAML or rig preset to hold against the recording '
                         '(default: %(default)s)')
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
-                        help='folder for the results')
+                        help='folder for the results; those of the same bags and model are '
+                        'made again')
     parser.add_argument('--explain', type=source, default=None, metavar='EFFECT',
                         help='say what an effect is, from which size on it shows and what looks '
                         'like it; in the bag, or without one in a simulated identification')
@@ -62,6 +64,7 @@ def run(args):
     """Find the gap; exit code 1 where there is one."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.gap import FILES, write_gap
+    from pam_actuation.report.origin import is_of, origin
     from pam_sim.effects.registry import get_effect
     from pam_sim.errors import InputError
     from pam_sim.files import check_folder
@@ -74,12 +77,14 @@ def run(args):
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
-    check_folder(args.out, FILES, args.overwrite)
+    page = os.path.join(args.out, 'report.html')
+    of = origin(args.run, page, 'gap', args.model, args.certify)
+    check_folder(args.out, FILES, args.overwrite or is_of(page, of))
     runs = [load_run(path, namespace=args.namespace) for path in args.run]
     certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
     with progress(args, 1.0, '', 'gap') as bar:
         result = write_gap(
-            runs, args.model, args.out, certify, effects=names, seconds=args.seconds,
+            runs, args.model, args.out, certify, of, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
     emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING

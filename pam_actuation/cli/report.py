@@ -37,13 +37,13 @@ def run(args):
     """Load the bags and write the page."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
-    from pam_actuation.report.default_page import default_page, marker
+    from pam_actuation.report.origin import default_page, origin
     from pam_actuation.report.pages import bag_report
     out = args.out or default_page(args.bag, args.overwrite)
     if args.out:
         check_outputs(args, args.out)
     runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
-    summary = bag_report(runs, out, of=marker(args.bag, out))
+    summary = bag_report(runs, out, of=origin(args.bag, out))
     early = early_sentences(runs)
     emit(args, {'report': out, 'remarks': early, **summary},
          '\n'.join([*(f'remark: {text}' for text in early), f'report: {out}']))

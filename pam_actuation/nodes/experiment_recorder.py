@@ -24,8 +24,8 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.bags import layout
 from pam_actuation.bags.codecs import decode, TOPIC_TYPES
-from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ENDED_FILE
+from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.ending import EndWatch
 from pam_actuation.bags.ending import RECORDED_FILE

@@ -52,7 +52,7 @@ FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
 
-def write_gap(runs, model, out_dir, certify=None, **options):
+def write_gap(runs, model, out_dir, certify=None, of='', **options):
     """
     Find the gap between recordings and a model and write the result folder.
 
@@ -66,6 +66,8 @@ def write_gap(runs, model, out_dir, certify=None, **options):
         Folder for the results; made if needed.
     certify : pam_sim.run.Run, optional
         Recording for the proof; by default blocks of the first one.
+    of : str
+        Words in the head of the page that tell of what it is.
     options
         As of :func:`pam_sim.gap.find_gap`.
 
@@ -88,7 +90,7 @@ def write_gap(runs, model, out_dir, certify=None, **options):
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise)
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
-    save_gap(result, certify or runs[0], out_dir)
+    save_gap(result, certify or runs[0], out_dir, of)
     return result
 
 
@@ -100,17 +102,17 @@ def model_for(run, model):
     return load_rig(model, valve=(recorded_valve(run) or None) if named else None)
 
 
-def save_gap(result, run, out_dir):
+def save_gap(result, run, out_dir, of=''):
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
     """
     with whole_files(out_dir) as folder:
-        _save_into(folder, result, run)
+        _save_into(folder, result, run, of)
 
 
-def _save_into(out_dir, result, run):
+def _save_into(out_dir, result, run, of):
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)
@@ -121,7 +123,7 @@ def _save_into(out_dir, result, run):
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
-        [gap_section(result), provenance([('recording', run)])], footer=FOOTER))
+        [gap_section(result), provenance([('recording', run)])], footer=FOOTER, of=of))
 
 
 def write_compare(result, namespace, path):

@@ -87,8 +87,8 @@ def test_no_verb_replaces_what_is_there_and_says_so_at_once(verb, bags, tmp_path
     """The searches of tune and gap would take minutes: refused before they begin."""
     file, folder = tmp_path / 'mine.html', tmp_path / 'mine'
     folder.mkdir()
-    for path in (file, tmp_path / 'mine.yaml', tmp_path / 'mine.json', *(folder / name for name in (
-            'model.yaml', 'experiment.yaml', 'report.html', 'valve_driver.md'))):
+    for path in (file, tmp_path / 'mine.yaml', tmp_path / 'mine.json', folder / 'model.yaml',
+                 folder / 'experiment.yaml', folder / 'report.html'):
         path.write_text('mine')
     before = listed(tmp_path)
     bag = bags / 'first'
@@ -155,3 +155,17 @@ def test_the_name_of_an_experiment_leads_nowhere_else(arguments, tmp_path, monke
     said = call(capsys, *arguments, 'evil.yaml', code=2)
     assert 'evil.yaml:1' in said and '../../evil' in said
     assert [path.name for path in tmp_path.rglob('*')] == ['a', 'b', 'evil.yaml']
+
+
+def test_a_gap_is_made_again_for_the_same_bags_and_model_only(bags, tmp_path, capsys):
+    """The short bag is refused as data, which is a result, too."""
+    folder, model = tmp_path / 'gap', ['--model', 'dmsp_5_300_hanging_mass']
+    for _ in range(2):
+        call(capsys, 'gap', bags / 'first', *model, '--out', folder, code=1)
+    before = listed(folder)
+    for other in ([bags / 'second', *model], [bags / 'first', '--model', folder / 'model.yaml'],
+                  [bags / 'first', *model, '--certify', bags / 'second']):
+        assert 'exists already' in call(capsys, 'gap', *other, '--out', folder, code=2)
+    assert listed(folder) == before
+    call(capsys, 'gap', bags / 'second', *model, '--out', folder, '--overwrite', code=1)
+    assert listed(folder) != before

@@ -214,7 +214,7 @@ def main():
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--processes', type=int, default=PROCESSES,
                         help='calls made again as real processes')
-    parser.add_argument('--verbose', action='store_true', help='print every call before it is made')
+    parser.add_argument('--verbose', action='store_true', help='print every call')
     args = parser.parse_args()
     started = time.perf_counter()
 

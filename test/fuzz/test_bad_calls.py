@@ -14,8 +14,8 @@
 
 """A sample of bad calls: exit code 2, one line, nothing written, nothing deleted."""
 
-from bad_calls import Call, in_this_process, judge, make, run
 from bad_call_place import changes, look, prepare
+from bad_calls import Call, in_this_process, judge, make, run
 import pytest
 
 

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The file ``pam report`` writes to by itself: one that is free, or the page of the same bags."""
+"""
+Of what a page is: words in its head, by which results of the same bags are made again.
+
+Whatever else is there already is replaced only when the user says so.
+"""
 
 import os
 
@@ -22,10 +26,42 @@ from pam_sim.files import check_file, holds
 LONGEST = 100
 
 
-def marker(bags, page):
-    """Return the words in a page that tell of which bags it is; ``page`` is its path."""
+def origin(bags, page, kind='report', model='', certify=None):
+    """
+    Return the words in the head of a page that tell of what it is.
+
+    Parameters
+    ----------
+    bags : list of path
+        The recordings on it.
+    page : path
+        The file; paths are told as seen from its folder, which may move with them.
+    kind : str
+        ``report`` or ``gap``.
+    model : str
+        Preset or path of the model held against them.
+    certify : path, optional
+        The recording of the proof.
+
+    """
     folder = os.path.dirname(os.path.abspath(page))
-    return 'report of ' + ' and '.join(os.path.relpath(bag, folder) for bag in bags)
+
+    def seen(path):
+        return os.path.relpath(path, folder) if os.path.exists(path) else str(path)
+
+    words = [f'{kind} of ' + ' and '.join(map(seen, bags))]
+    words += [f'model {seen(model)}'] if model else []
+    words += [f'certify {seen(certify)}'] if certify else []
+    return ', '.join(words)
+
+
+def is_of(page, words):
+    """Return whether a page is there and its head tells these words of ``origin``."""
+    return holds(page, _as_written(words))
+
+
+def _as_written(words):
+    return f'{text(words)}">'
 
 
 def default_page(bags, overwrite=False):
@@ -45,8 +81,8 @@ def default_page(bags, overwrite=False):
     names = [os.path.splitext(os.path.basename(os.path.abspath(bag)))[0] for bag in bags]
     own = os.path.join(folder, f'report_{"_".join(names)[:LONGEST]}.html')
     page = os.path.join(folder, 'report.html')
-    of = text(marker(bags, page)) + '">'       # as it stands in the head
-    if os.path.lexists(page) and not overwrite and not holds(page, of):
+    of = origin(bags, page)
+    if os.path.lexists(page) and not overwrite and not is_of(page, of):
         page = own
-    check_file(page, overwrite, ours=of)
+    check_file(page, overwrite, ours=_as_written(of))
     return page
