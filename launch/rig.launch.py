@@ -70,6 +70,9 @@ def _arguments():
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and experiment.'),
         DeclareLaunchArgument(
+            'accept_other_rig', default_value='false', choices=['true', 'false'],
+            description='Whether to take a controller file that was made for another rig.'),
+        DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),
         DeclareLaunchArgument(
@@ -114,7 +117,9 @@ def generate_launch_description():
     """Return nodes, arguments and the two ways to end."""
     valve = {'valve_type': _text('valve')}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
-    control = {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)}
+    control = {
+        'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME), 'accept_other_rig':
+        ParameterValue(LaunchConfiguration('accept_other_rig'), value_type=bool)}
     learning = {'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
 
     def chosen(name):

@@ -73,6 +73,7 @@ def experiment_metadata(experiment=None, rig=None, controller=None, valve='', se
         'experiment': _yaml(experiment),
         'rig': _yaml(rig),
         'controller': _yaml(controller),
+        'controller_other_rig': getattr(controller, 'other_rig', ''),
     }
     texts.update({key: str(value) for key, value in more.items()})
     return {key: text for key, text in texts.items() if text}

@@ -76,6 +76,14 @@ def add_controller_options(
         '--rules', type=source, default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
+    add_other_rig_option(parser)
+
+
+def add_other_rig_option(parser):
+    """Add the option that lets a controller run on a rig it was not made for."""
+    parser.add_argument(
+        '--accept-other-rig', action='store_true',
+        help='take a controller that was made for another rig; the bag says so')
 
 
 def add_experiment_options(parser):
@@ -111,7 +119,8 @@ def load_setup(args):
         return experiment, rig, None
     experiment.check_reachable(rig)
     controller = load_controller(
-        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules)
+        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules,
+        accept_other_rig=args.accept_other_rig)
     check_tracked(experiment, controller)
     return experiment, rig, controller
 

@@ -82,7 +82,7 @@ def run(args):
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
         args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
-        rig, rules_file=args.rules)
+        rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
     if tracked_by(controller) != CONTRACTION:
         raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
                          'contraction can be tuned', 'controller')

@@ -14,7 +14,7 @@
 
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import add_other_rig_option, emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
 
@@ -31,6 +31,7 @@ def add_arguments(parser):
                         help='rig or joint: preset, or path of a model file')
     parser.add_argument('--controller', type=source, default=None, metavar='NAME',
                         help='controller preset or file (default: that of valve and experiment)')
+    add_other_rig_option(parser)
     parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
@@ -88,7 +89,7 @@ def _nodes(args):
     """Return the nodes that are asked for."""
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller or '',
-               'experiment': args.experiment or ''}
+               'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig}
     if args.namespace is not None:
         options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
     if args.model:

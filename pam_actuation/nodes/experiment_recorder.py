@@ -137,7 +137,8 @@ class ExperimentRecorder(ManagedNode):
             rig = load_rig(self.value('rig'), valve=valve)
         if self.value('controller'):
             from pam_actuation.control.config import load_controller
-            controller = load_controller(self.value('controller'), rig)
+            # A recorder refuses none: it says which one ran.
+            controller = load_controller(self.value('controller'), rig, accept_other_rig=True)
         return experiment_metadata(
             experiment, rig, controller, valve, self.value('seed'), origin='live')
 

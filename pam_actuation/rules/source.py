@@ -73,7 +73,8 @@ def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
         return FoundRules(path.name, 'rule file', load_rules(path))
     if path.is_dir() or path.suffix in _BAG_ENDINGS or path.name == 'metadata.yaml':
         return _of_recording(path, namespace, recover, progress)
-    controller = load_controller(name, None if rig is None else rig())
+    controller = load_controller(
+        name, None if rig is None else rig(), accept_other_rig=True)     # it is read, not run
     if controller.rules is None:
         raise InputError(f'a {controller.kind} controller has no rules', name)
     return FoundRules(path.stem, 'controller', controller.rules)
