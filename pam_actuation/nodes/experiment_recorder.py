@@ -228,12 +228,13 @@ class ExperimentRecorder(ManagedNode):
         self.core = None
         if summary.complete:
             self.get_logger().info(
-                f'{summary.written} messages recorded, none lost: {summary.path}')
+                f'{summary.written} messages recorded, none lost{_before(summary)}: '
+                f'{summary.path}')
             return
         self.result_code = 1
         self.get_logger().error(summary.write_error or (
             f'{summary.lost} messages lost and {summary.dropped} dropped, '
-            f'{summary.written} recorded: {summary.path}'))
+            f'{summary.written} recorded{_before(summary)}: {summary.path}'))
 
     def _take_last(self):
         begin = last = time.monotonic()
@@ -262,6 +263,12 @@ class ExperimentRecorder(ManagedNode):
             if counts.lost:
                 rows.append((f'lost.{name}', counts.lost))
         return (*values, *rows)
+
+
+def _before(summary):
+    """Return in words how many messages came too early for the recorder, '' for none."""
+    early = sum(counts.missed_at_start or 0 for counts in summary.counts.values())
+    return f', {early} sent before the recorder was connected' if early else ''
 
 
 def parse_extra_topic(text):
