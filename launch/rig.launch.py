@@ -46,8 +46,8 @@ from pam_actuation.rigging.layouts import played
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
 # Noted from the arguments.
-HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW = (
-    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals')
+HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
+    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals', 'recorded_seed')
 
 
 def _arguments():
@@ -126,7 +126,8 @@ def generate_launch_description():
         return IfCondition(EqualsSubstitution(LaunchConfiguration(CONTROLLER), name))
 
     recorder = _node(
-        RECORDER, valve, seed,
+        RECORDER, valve,
+        {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
          'controller': _text(CONTROLLER_NAME)},
         condition=IfCondition(LaunchConfiguration('record')))
@@ -172,7 +173,9 @@ def _note_what_is_needed(context):
         given('experiment'), given('rig'), given('valve'), given('controller_file'),
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     noted = {HARDWARE_FILE: str(find_config('hardware', given('hardware'))),
-             CONTROLLER: kind if name else 'none', CONTROLLER_NAME: name, RAW: str(raw).lower()}
+             CONTROLLER: kind if name else 'none', CONTROLLER_NAME: name, RAW: str(raw).lower(),
+             # Real sensors have no seed.
+             RECORDED_SEED: given('seed') if given('hardware') == 'sim' else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
 
 

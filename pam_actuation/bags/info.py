@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
@@ -133,7 +134,8 @@ class BagInfo:
     def to_dict(self):
         """Return everything as plain data for JSON."""
         return {
-            **asdict(self), 'lost': self.lost, 'dropped': self.dropped,
+            **asdict(self), 'rig': recorded_rig_title(self.metadata),
+            'lost': self.lost, 'dropped': self.dropped,
             'missed_at_start': self.missed_at_start, 'complete': self.complete}
 
 
@@ -176,6 +178,9 @@ def bag_info(path, recover=False):
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles)
     remarks += missing
+    if bag.experiment.get('controller_other_rig'):
+        notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
+                     'this was accepted.')
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,

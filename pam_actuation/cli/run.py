@@ -38,6 +38,7 @@ def add_arguments(parser):
 def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.rigging.session import run_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
@@ -49,7 +50,7 @@ def run(args):
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {published} published'
-    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {recorded} messages '
+    lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
              f'recorded{counted}', f'bag: {result.bag}']
     remarks = list(experiment.remarks(rig.valve))
     lines += [f'remark: {text}' for text in remarks]

@@ -35,6 +35,7 @@ def add_arguments(parser):
 def run(args):
     """Simulate and say what was recorded."""
     from pam_actuation.experiments.offline import simulate_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
     started = time.perf_counter()
@@ -47,7 +48,7 @@ def run(args):
     result['remarks'] = list(experiment.remarks(rig.valve))
     remarks = ''.join(f'remark: {text}\n' for text in result['remarks'])
     emit(args, result, (
-        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig.name} '
-        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{remarks}'
+        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
+        f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{remarks}'
         f'next: pam report {result["bag"]}'))
     return EXIT_DONE

@@ -93,7 +93,8 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
             **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'})
             for node in nodes]
         nodes.append(NodeSpec('experiment_recorder', namespace, {
-            **described, 'output': record, 'experiment': experiment, 'controller': name}))
+            **described, **({'seed': 0} if hardware == 'sim' else {}),
+            'output': record, 'experiment': experiment, 'controller': name}))
     return nodes
 
 
