@@ -77,8 +77,19 @@ def run(args):
         result = write_gap(
             runs, args.model, args.out, certify, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
-    emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
+    emit(args, result.to_dict(), '\n'.join(
+        [result.text(), f'results: {args.out}', *_next_lines(result, args.out)]))
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+
+
+def _next_lines(result, out):
+    """Return in words what to measure next and how; nothing where that is not known."""
+    if not result.next_experiment:
+        return []
+    from pathlib import Path
+    from pam_actuation.report.gap import next_command
+    return [f'what to measure next: {result.next_experiment["why"]}',
+            f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
 
 
 def _plan(args):
