@@ -21,6 +21,7 @@ node reports in /diagnostics as ``published.<full topic>``.
 """
 
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -168,12 +169,14 @@ def bag_info(path, recover=False):
             'The recording broke off and was made a whole bag again; '
             f'{recovery.get("unreadable_bytes", "?")} bytes were not readable.')
     topics = []
+    length_m = cache(lambda: plausibility.recorded_length_m(bag.experiment))
     for name in sorted(bag.topics):
         topic = bag.topics[name]
         info, stamp_ns, values = _topic_info(topic, remarks)
         _add_counts(info, topic, recording, *published.of(name))
         remarks += _loss_remarks(info)
-        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values)
+        remarks += plausibility.topic_remarks(
+            topic, info, stamp_ns, values, length_m)
         topics.append(info)
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles)

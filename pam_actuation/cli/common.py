@@ -40,7 +40,40 @@ def emit(args, payload, text):
         The result for people.
 
     """
+    implausible = getattr(args, 'implausible', [])
+    if implausible:
+        payload = {**payload, 'implausible': implausible}
+        new = [sentence for sentence in implausible if sentence.rstrip('.') not in text]
+        text = '\n'.join([text, *(f'warning: {sentence}' for sentence in new)])
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
+
+
+def note_implausible(args, runs, must_be_right=False):
+    """
+    Note what cannot be right in loaded bags: ``emit`` says it, and the verb ends with 1.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the verb.
+    runs : list of RecordedRun
+        What ``load_run`` returned.
+    must_be_right : bool
+        Refuse values that mean something else than they say, a wrong unit for instance.
+
+    Raises
+    ------
+    InputError
+        As above, with the first such sentence.
+
+    """
+    from pam_sim.errors import InputError
+    for run in runs:
+        if must_be_right and run.unusable:
+            raise InputError(run.unusable[0].rstrip('.'), run.path)
+        several = f'{run.path}: ' if len(runs) > 1 else ''
+        found = [f'{several}{sentence}' for sentence in run.implausible]
+        args.implausible = [*getattr(args, 'implausible', []), *found]
 
 
 def progress(args, total, unit='', description=''):

@@ -16,7 +16,7 @@
 
 import json
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
+from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress
 from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
@@ -73,6 +73,7 @@ def run(args):
         get_effect(name, '--effects')
     runs = [load_run(path, namespace=args.namespace) for path in args.run]
     certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
+    note_implausible(args, [*runs, *([certify] if certify else [])])
     with progress(args, 1.0, '', 'gap') as bar:
         result = write_gap(
             runs, args.model, args.out, certify, effects=names, seconds=args.seconds,
@@ -132,6 +133,7 @@ def _explain(args):
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], namespace=args.namespace)
+        note_implausible(args, [run], must_be_right=True)
         rig = model_for(run, args.model)
     else:
         rig = load_rig(args.model)

@@ -19,7 +19,7 @@ import importlib
 import os
 import sys
 
-from pam_actuation.cli.common import EXIT_BAD_INPUT
+from pam_actuation.cli.common import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import Parser
 from pam_sim.errors import InputError
 
@@ -64,7 +64,9 @@ def main(argv=None):
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code
     try:
-        return args.call(args)
+        code = args.call(args)
+        # A verb that did its work on data that cannot be right has found something.
+        return EXIT_FINDING if code == EXIT_DONE and getattr(args, 'implausible', ()) else code
     except InputError as mistake:
         print(f'pam {args.verb}: {mistake}', file=sys.stderr)
         return EXIT_BAD_INPUT

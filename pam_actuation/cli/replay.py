@@ -15,7 +15,7 @@
 """``pam replay``: step controller, driver and plant offline on what was recorded."""
 
 from pam_actuation.cli.common import (
-    add_other_rig_option, add_recover_option, emit, EXIT_DONE, EXIT_FINDING)
+    add_other_rig_option, add_recover_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible)
 from pam_actuation.cli.options import out_path, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
@@ -52,6 +52,7 @@ def run(args):
     from pam_actuation.replay.compare import replay_run
     from pam_actuation.replay.settings import changed_controller
     recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
+    note_implausible(args, [recorded])
     result = replay_run(recorded, changed_controller(
         recorded, args.changes, args.accept_other_rig), args.only, args.chain)
     if args.out:

@@ -16,7 +16,7 @@
 
 import os
 
-from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE
+from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, note_implausible
 from pam_actuation.cli.options import out_path, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
@@ -37,6 +37,7 @@ def run(args):
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.pages import bag_report
     runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
+    note_implausible(args, runs)
     first = os.path.abspath(args.bag[0]).rstrip(os.sep)
     out = args.out or os.path.join(os.path.dirname(first), 'report.html')
     summary = bag_report(runs, out)

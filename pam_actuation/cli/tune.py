@@ -18,7 +18,7 @@ import os
 
 from pam_actuation.cli.common import (
     add_controller_options, add_seed_option, default_controller, emit, EXIT_DONE, EXIT_FINDING,
-    progress)
+    note_implausible, progress)
 from pam_actuation.cli.options import count, out_path, source
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
@@ -79,6 +79,7 @@ def run(args):
     from pam_sim.errors import InputError
     stem = _checked(args)
     runs = [load_run(bag) for bag in args.bag]
+    note_implausible(args, runs, must_be_right=True)
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
         args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),

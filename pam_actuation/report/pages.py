@@ -16,7 +16,7 @@
 
 import numpy as np
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import render, signed, write_text
+from pam_actuation.report.page import paragraph, render, Section, signed, table, write_text
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -94,7 +94,8 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
                 for run in runs]
     named = list(zip(titles, measured))
-    sections = [metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
+    sections = [_implausible(list(zip(titles, runs))),
+                metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -114,6 +115,17 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
         'what was asked, what it did, and how well.', [s for s in sections if s],
         run_numbers(named), FOOTER))
     return {title: summary(m) for title, m in named}
+
+
+def _implausible(runs):
+    """Return the section on values that cannot be right, None where there are none."""
+    found = [(title, sentence) for title, run in runs
+             for sentence in getattr(run, 'implausible', ())]
+    if not found:
+        return None
+    return Section('implausible', 'What cannot be right in the data', paragraph(
+        'Numbers and plots below rest on these values all the same.') + table(
+            ['recording', 'what was read'], found))
 
 
 def default_titles(runs):
