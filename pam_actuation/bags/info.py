@@ -181,6 +181,7 @@ def bag_info(path, recover=False):
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles)
     remarks += missing
+    notes += [text + '.' for text in bag.experiment.get('remarks', '').splitlines()]
     if bag.experiment.get('controller_other_rig'):
         notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
                      'this was accepted.')

@@ -158,6 +158,15 @@ def load_setup(args):
     return experiment, rig, controller
 
 
+def tell_remarks(args, experiment, valve, rig=None, controller=None):
+    """Return what a person should read before an experiment runs; say it on stderr."""
+    remarks = list(experiment.remarks(valve, rig, controller))
+    if not args.json:
+        for text in remarks:
+            print(f'remark: {text}', file=sys.stderr, flush=True)
+    return remarks
+
+
 def default_controller(args, valve):
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'

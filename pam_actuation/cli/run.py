@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import count, out_path
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
@@ -40,6 +40,7 @@ def run(args):
     from pam_actuation.rigging.session import run_experiment
     from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
@@ -52,7 +53,6 @@ def run(args):
     counted = '' if result.failure else f', {published} published'
     lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
              f'recorded{counted}', f'bag: {result.bag}']
-    remarks = list(experiment.remarks(rig.valve))
     lines += [f'remark: {text}' for text in remarks]
     if result.failure:
         lines.append(f'not completed: {result.failure}')

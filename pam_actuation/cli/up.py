@@ -14,7 +14,8 @@
 
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
-from pam_actuation.cli.common import add_other_rig_option, emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import (
+    add_other_rig_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
 from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
 
@@ -54,6 +55,7 @@ def run(args):
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     nodes = _nodes(args)
+    _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
     failure, problems = '', []
@@ -75,6 +77,18 @@ def run(args):
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
     return EXIT_FINDING if failure or problems else EXIT_DONE
+
+
+def _tell_remarks(args):
+    """Say what a person should read before the experiment is played."""
+    if not args.experiment:
+        return
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    rig = None
+    if args.what == 'rig':
+        rig = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
+    tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
 
 
 def _write_policy(args, nodes):

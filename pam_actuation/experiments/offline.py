@@ -212,8 +212,8 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     check_tracked(experiment, controller)
     metadata = experiment_metadata(
         experiment=experiment.to_yaml(), rig=rig.to_yaml(),
-        controller=controller.to_yaml() if controller is not None else '', valve=rig.valve,
-        experiment_name=experiment.name, seed=seed)
+        controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
+        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)))
     writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
     recorder = _Recorder(writer, namespace)
     try:

@@ -147,7 +147,8 @@ class ExperimentRecorder(ManagedNode):
             controller = load_controller(self.value('controller'), rig, accept_other_rig=True)
         return experiment_metadata(
             experiment, rig, controller, valve, None if seed == UNKNOWN_SEED else seed,
-            origin='live')
+            origin='live', remarks='\n'.join(
+                experiment.remarks(rig.valve, rig, controller)) if experiment and rig else '')
 
     def start(self):
         """Open the bag; wait until the publishers asked for are connected."""

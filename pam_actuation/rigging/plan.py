@@ -137,7 +137,8 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     if bag is not None:
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
-            learning=str(bool(learning)).lower())
+            learning=str(bool(learning)).lower(),
+            remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)))
         wanted = ReferenceLoop(plan.experiment, valve=rig.valve).topics
         topics = ['pressure', 'contraction', 'force', 'valve_signal', *wanted]
         if rig.valve == 'hsv':
