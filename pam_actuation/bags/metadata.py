@@ -75,6 +75,7 @@ def experiment_metadata(experiment=None, rig=None, controller=None, valve='', se
         'experiment': _yaml(experiment),
         'rig': _yaml(rig),
         'controller': _yaml(controller),
+        'controller_other_rig': getattr(controller, 'other_rig', ''),
         **Ending(getattr(experiment, 'duration_s', None)).texts(),
     }
     texts.update({key: str(value) for key, value in more.items()})

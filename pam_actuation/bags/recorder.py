@@ -29,6 +29,8 @@ import time
 
 from pam_actuation.bags import disk
 from pam_actuation.bags.ending import ERROR
+from pam_actuation.bags.losses import (
+    DIAGNOSTICS, missing_messages, PublishedCounts, SentTimes)
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
@@ -43,7 +45,8 @@ class TopicCounts:
 
     ``received`` = ``written`` + ``dropped`` once the recorder is closed.
     ``dropped`` came too fast or after a write error; ``lost`` never arrived, by
-    gaps in the publishers' sequence numbers, and ``missed_at_start`` were
+    gaps in the publishers' sequence numbers and, once the recorder is closed, by
+    what the nodes say they have published; ``missed_at_start`` were
     published before the first one that arrived. The last two are None where the
     middleware gives no numbers or they cannot be told apart by publisher.
     """
@@ -165,6 +168,8 @@ class RecorderCore:
         self._disk = threading.Lock()            # guards the writer; never taken inside _wake
         self._counts = {}
         self._checks = {}
+        self._published = PublishedCounts()
+        self._sent = {}
         self._closing = False
         self._summary = None
         self.write_error = ''
@@ -185,6 +190,7 @@ class RecorderCore:
             self._writer.add_topic(full_name, type_name, qos)
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
+            self._sent.setdefault(full_name, SentTimes())
             watch = full_name != '/diagnostics' if check_sequence is None else check_sequence
             if watch:
                 self._checks.setdefault(full_name, SequenceCheck())
@@ -221,9 +227,12 @@ class RecorderCore:
             if self.write_error or self._closing or len(self._queue) >= self._max_queued:
                 counts.dropped += 1
                 return False
-            self._queue.append((
-                full_name, data, receive_timestamp_ns,
-                source_timestamp_ns or receive_timestamp_ns))
+            sent_ns = source_timestamp_ns or receive_timestamp_ns
+            self._queue.append((full_name, data, receive_timestamp_ns, sent_ns))
+            self._sent[full_name].add(sent_ns, receive_timestamp_ns)
+            if full_name == DIAGNOSTICS:
+                for name in self._published.hear(data, sent_ns) & self._sent.keys():
+                    self._sent[name].trim(self._published.of(name)[1])
             if len(self._queue) == WAKE_AT:
                 self._wake.notify()
             return True
@@ -286,6 +295,7 @@ class RecorderCore:
         try:
             if self.write_error:
                 self._count_what_is_kept()
+            self._count_what_never_came()
             if ending is not None and ending.texts():
                 if self.write_error:
                     ending = replace(ending, ended=ERROR, because=self.write_error)
@@ -318,6 +328,17 @@ class RecorderCore:
             for name, counts in self._counts.items():
                 counts.written = kept.get(name, 0)
                 counts.dropped = counts.received - counts.written
+
+    def _count_what_never_came(self):
+        """Hold what arrived against what the nodes say they have published."""
+        with self._wake:
+            for name, counts in self._counts.items():
+                published, sent_ns = self._published.of(name)
+                by_then = counts.written if name == DIAGNOSTICS else min(
+                    counts.written, self._sent[name].up_to(sent_ns))
+                counts.lost = missing_messages(
+                    counts.lost, published, by_then,
+                    counts.dropped + (counts.missed_at_start or 0))
 
     def _run(self):
         flushed = time.monotonic()

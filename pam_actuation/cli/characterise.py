@@ -15,7 +15,8 @@
 """``pam characterise``: lookup surfaces from recordings or tables of static points."""
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, add_seed_option, emit, EXIT_DONE, progress)
+    add_overwrite_option, add_recover_option, add_seed_option, emit, EXIT_DONE,
+    note_implausible, progress)
 from pam_actuation.cli.options import count, number, out_path, source
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
@@ -112,6 +113,7 @@ def _characterised(args, sources):
             for path in sources:
                 runs.append(load_run(path, args.namespace, recover=args.recover))
                 bar.update()
+        note_implausible(args, runs, must_be_right=True)
         # Simulated loads are read off the load cell like any others.
         loads = None if args.simulate else args.load_n
         result = characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)

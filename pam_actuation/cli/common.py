@@ -40,7 +40,40 @@ def emit(args, payload, text):
         The result for people.
 
     """
+    implausible = getattr(args, 'implausible', [])
+    if implausible:
+        payload = {**payload, 'implausible': implausible}
+        new = [sentence for sentence in implausible if sentence.rstrip('.') not in text]
+        text = '\n'.join([text, *(f'warning: {sentence}' for sentence in new)])
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
+
+
+def note_implausible(args, runs, must_be_right=False):
+    """
+    Note what cannot be right in loaded bags: ``emit`` says it, and the verb ends with 1.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the verb.
+    runs : list of RecordedRun
+        What ``load_run`` returned.
+    must_be_right : bool
+        Refuse values that mean something else than they say, a wrong unit for instance.
+
+    Raises
+    ------
+    InputError
+        As above, with the first such sentence.
+
+    """
+    from pam_sim.errors import InputError
+    for run in runs:
+        if must_be_right and run.unusable:
+            raise InputError(run.unusable[0].rstrip('.'), run.path)
+        several = f'{run.path}: ' if len(runs) > 1 else ''
+        found = [f'{several}{sentence}' for sentence in run.implausible]
+        args.implausible = [*getattr(args, 'implausible', []), *found]
 
 
 def progress(args, total, unit='', description=''):
@@ -76,6 +109,14 @@ def add_controller_options(
         '--rules', type=source, default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
+    add_other_rig_option(parser)
+
+
+def add_other_rig_option(parser):
+    """Add the option that lets a controller run on a rig it was not made for."""
+    parser.add_argument(
+        '--accept-other-rig', action='store_true',
+        help='take a controller that was made for another rig; the bag says so')
 
 
 def add_experiment_options(parser):
@@ -109,13 +150,24 @@ def load_setup(args):
     rig = load_rig(args.rig, valve=args.valve)
     if not experiment.tracked:
         if args.controller or args.rules:       # of no use here, but not to be wrong either
-            load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules)
+            load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules,
+                            accept_other_rig=True)
         return experiment, rig, None
     experiment.check_reachable(rig)
     controller = load_controller(
-        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules)
+        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules,
+        accept_other_rig=args.accept_other_rig)
     check_tracked(experiment, controller)
     return experiment, rig, controller
+
+
+def tell_remarks(args, experiment, valve, rig=None, controller=None):
+    """Return what a person should read before an experiment runs; say it on stderr."""
+    remarks = list(experiment.remarks(valve, rig, controller))
+    if not args.json:
+        for text in remarks:
+            print(f'remark: {text}', file=sys.stderr, flush=True)
+    return remarks
 
 
 def default_controller(args, valve):

@@ -18,7 +18,7 @@ import json
 import os
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress)
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
 from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
@@ -82,12 +82,24 @@ def run(args):
     check_folder(args.out, FILES, args.overwrite or is_of(page, of))
     runs = [load_run(path, namespace=args.namespace) for path in args.run]
     certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
+    note_implausible(args, [*runs, *([certify] if certify else [])])
     with progress(args, 1.0, '', 'gap') as bar:
         result = write_gap(
             runs, args.model, args.out, certify, of, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
-    emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
+    emit(args, result.to_dict(), '\n'.join(
+        [result.text(), f'results: {args.out}', *_next_lines(result, args.out)]))
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+
+
+def _next_lines(result, out):
+    """Return in words what to measure next and how; nothing where that is not known."""
+    if not result.next_experiment:
+        return []
+    from pathlib import Path
+    from pam_actuation.report.gap import next_command
+    return [f'what to measure next: {result.next_experiment["why"]}',
+            f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
 
 
 def _plan(args):
@@ -132,6 +144,7 @@ def _explain(args):
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], namespace=args.namespace)
+        note_implausible(args, [run], must_be_right=True)
         rig = model_for(run, args.model)
     else:
         rig = load_rig(args.model)

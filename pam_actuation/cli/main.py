@@ -19,7 +19,7 @@ import importlib
 import os
 import sys
 
-from pam_actuation.cli.common import EXIT_BAD_INPUT
+from pam_actuation.cli.common import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import Parser
 from pam_sim.errors import InputError
 from pam_sim.files import reason, shown
@@ -67,7 +67,8 @@ def main(argv=None):
     try:
         code = args.call(args)
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
-        return code
+        # A verb that did its work on data that cannot be right has found something.
+        return EXIT_FINDING if code == EXIT_DONE and getattr(args, 'implausible', ()) else code
     except InputError as mistake:
         print(f'pam {args.verb}: {" ".join(str(mistake).split())}', file=sys.stderr)
         return EXIT_BAD_INPUT

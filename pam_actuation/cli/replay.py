@@ -15,7 +15,8 @@
 """``pam replay``: step controller, driver and plant offline on what was recorded."""
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, EXIT_FINDING)
+    add_other_rig_option, add_overwrite_option, add_recover_option, check_outputs, emit,
+    EXIT_DONE, EXIT_FINDING, note_implausible)
 from pam_actuation.cli.options import out_path, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
@@ -42,6 +43,7 @@ def add_arguments(parser):
     parser.add_argument(
         '--out', type=out_path, default=None, metavar='FILE',
         help='write the replayed signals as an .npz file')
+    add_other_rig_option(parser)
     add_overwrite_option(parser, 'a file that is there already')
     add_recover_option(parser)
 
@@ -53,8 +55,9 @@ def run(args):
     from pam_actuation.replay.settings import changed_controller
     check_outputs(args, args.out)
     recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
-    result = replay_run(recorded, changed_controller(recorded, args.changes), args.only,
-                        args.chain)
+    note_implausible(args, [recorded])
+    result = replay_run(recorded, changed_controller(
+        recorded, args.changes, args.accept_other_rig), args.only, args.chain)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

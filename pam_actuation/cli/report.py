@@ -15,7 +15,7 @@
 """``pam report``: one HTML page about one or several bags."""
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE)
+    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
 from pam_actuation.cli.options import out_path, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
@@ -43,6 +43,7 @@ def run(args):
     if args.out:
         check_outputs(args, args.out)
     runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
+    note_implausible(args, runs)
     summary = bag_report(runs, out, of=origin(args.bag, out))
     early = early_sentences(runs)
     emit(args, {'report': out, 'remarks': early, **summary},

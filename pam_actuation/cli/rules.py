@@ -57,6 +57,7 @@ def run(args):
     check_outputs(args, args.html, args.save)
     found = _find(args, args.rules)
     against = None if args.against is None else _find(args, args.against)
+    args.implausible = [*found.implausible, *(against.implausible if against else ())]
     view = view_of(found, against)
     shown = as_text(found, view, args.top, *_terminal())
     payload = {'title': found.title, 'kind': found.kind, **view.to_dict()}

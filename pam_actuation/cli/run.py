@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import count, out_path
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
@@ -39,7 +39,9 @@ def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     check_bag_target(out, args.overwrite)
@@ -51,9 +53,8 @@ def run(args):
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {published} published'
-    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {recorded} messages '
+    lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
              f'recorded{counted}', f'bag: {result.bag}']
-    remarks = list(experiment.remarks(rig.valve))
     lines += [f'remark: {text}' for text in remarks]
     if result.failure:
         lines.append(f'not completed: {result.failure}')

@@ -18,7 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import out_path
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
@@ -36,7 +36,9 @@ def run(args):
     """Simulate and say what was recorded."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
     check_bag_target(out, args.overwrite)
     started = time.perf_counter()
@@ -46,10 +48,10 @@ def run(args):
             overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n))
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
-    result['remarks'] = list(experiment.remarks(rig.valve))
-    remarks = ''.join(f'remark: {text}\n' for text in result['remarks'])
+    result['remarks'] = remarks
+    told = ''.join(f'remark: {text}\n' for text in remarks)
     emit(args, result, (
-        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig.name} '
-        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{remarks}'
+        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
+        f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{told}'
         f'next: pam report {result["bag"]}'))
     return EXIT_DONE

@@ -18,7 +18,7 @@ import os
 
 from pam_actuation.cli.common import (
     add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
-    default_controller, emit, EXIT_DONE, EXIT_FINDING, progress)
+    default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
 from pam_actuation.cli.options import count, out_path, source
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
@@ -81,10 +81,11 @@ def run(args):
     from pam_sim.files import whole_files
     written = _targets(args)
     runs = [load_run(bag) for bag in args.bag]
+    note_implausible(args, runs, must_be_right=True)
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
         args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
-        rig, rules_file=args.rules)
+        rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
     if tracked_by(controller) != CONTRACTION:
         raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
                          'contraction can be tuned', 'controller')

@@ -15,7 +15,7 @@
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING)
+    add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
 from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
@@ -33,6 +33,7 @@ def add_arguments(parser):
                         help='rig or joint: preset, or path of a model file')
     parser.add_argument('--controller', type=source, default=None, metavar='NAME',
                         help='controller preset or file (default: that of valve and experiment)')
+    add_other_rig_option(parser)
     parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
@@ -61,6 +62,7 @@ def run(args):
     elif args.record:
         check_bag_target(args.record)
     nodes = _nodes(args)
+    _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
     failure, problems = '', []
@@ -84,6 +86,18 @@ def run(args):
     return EXIT_FINDING if failure or problems else EXIT_DONE
 
 
+def _tell_remarks(args):
+    """Say what a person should read before the experiment is played."""
+    if not args.experiment:
+        return
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    rig = None
+    if args.what == 'rig':
+        rig = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
+    tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
+
+
 def _write_policy(args, nodes):
     from pam_actuation.nodes.policy import policy
     from pam_sim.files import write_text
@@ -96,7 +110,7 @@ def _nodes(args):
     """Return the nodes that are asked for."""
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller or '',
-               'experiment': args.experiment or ''}
+               'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig}
     if args.namespace is not None:
         options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
     if args.model:

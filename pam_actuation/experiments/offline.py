@@ -227,8 +227,8 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     check_tracked(experiment, controller)
     metadata = experiment_metadata(
         experiment=experiment, rig=rig.to_yaml(),
-        controller=controller.to_yaml() if controller is not None else '', valve=rig.valve,
-        experiment_name=experiment.name, seed=seed)
+        controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
+        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)))
     writer = None
     try:
         with held_interrupt() as stopped:

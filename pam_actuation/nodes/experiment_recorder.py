@@ -43,6 +43,7 @@ from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
+UNKNOWN_VALVE, UNKNOWN_SEED = 'unknown', -1
 TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
 CHECK_EVERY = 10            # ticks between two looks at the counts
 QUIET_S = 0.15              # nothing for this long: all that was sent has arrived
@@ -91,8 +92,12 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
         NodeParameter('rig', '', 'Rig preset, or path of its file.'),
         NodeParameter('controller', '', 'Controller preset, or path of its file.'),
-        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
-        NodeParameter('seed', 0, 'Seed of the simulated sensors.', 0, MAX_SEED),
+        NodeParameter(
+            'valve_type', UNKNOWN_VALVE, 'Valve of the rig; unknown: that of the rig, else the '
+            'bag does not say it.', choices=('ppr', 'hsv', UNKNOWN_VALVE)),
+        NodeParameter(
+            'seed', UNKNOWN_SEED, 'Seed of the simulated sensors; -1: none, the bag does not '
+            'say one.', UNKNOWN_SEED, MAX_SEED),
     )
 
     core = None
@@ -140,19 +145,23 @@ class ExperimentRecorder(ManagedNode):
                     return json.load(stream)
             except (OSError, ValueError) as error:
                 raise InputError(f'cannot be read: {error}', path) from None
-        valve = self.value('valve_type')
+        valve, seed = self.value('valve_type'), self.value('seed')
+        valve = '' if valve == UNKNOWN_VALVE else valve
         experiment = rig = controller = None
         if self.value('experiment'):
             from pam_actuation.experiments import load_experiment
             experiment = load_experiment(self.value('experiment'))
         if self.value('rig'):
             from pam_sim import load_rig
-            rig = load_rig(self.value('rig'), valve=valve)
+            rig = load_rig(self.value('rig'), valve=valve or None)
         if self.value('controller'):
             from pam_actuation.control.config import load_controller
-            controller = load_controller(self.value('controller'), rig)
+            # A recorder refuses none: it says which one ran.
+            controller = load_controller(self.value('controller'), rig, accept_other_rig=True)
         return experiment_metadata(
-            experiment, rig, controller, valve, self.value('seed'), origin='live')
+            experiment, rig, controller, valve, None if seed == UNKNOWN_SEED else seed,
+            origin='live', remarks='\n'.join(
+                experiment.remarks(rig.valve, rig, controller)) if experiment and rig else '')
 
     def start(self):
         """Open the bag; wait until the publishers asked for are connected."""
@@ -268,12 +277,13 @@ class ExperimentRecorder(ManagedNode):
         summary = self._close()
         if summary.complete:
             self.get_logger().info(
-                f'{summary.written} messages recorded, none lost: {summary.path}')
+                f'{summary.written} messages recorded, none lost{_before(summary)}: '
+                f'{summary.path}')
             return
         self.result_code = 1
         self.get_logger().error(summary.write_error or (
             f'{summary.lost} messages lost and {summary.dropped} dropped, '
-            f'{summary.written} recorded: {summary.path}'))
+            f'{summary.written} recorded{_before(summary)}: {summary.path}'))
 
     def _take_last(self):
         begin = last = time.monotonic()
@@ -302,6 +312,12 @@ class ExperimentRecorder(ManagedNode):
             if counts.lost:
                 rows.append((f'lost.{name}', counts.lost))
         return (*values, *rows)
+
+
+def _before(summary):
+    """Return in words how many messages came too early for the recorder, '' for none."""
+    early = sum(counts.missed_at_start or 0 for counts in summary.counts.values())
+    return f', {early} sent before the recorder was connected' if early else ''
 
 
 def parse_extra_topic(text):

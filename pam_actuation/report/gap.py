@@ -22,6 +22,7 @@ not at all.
 import json
 import os
 from pathlib import Path
+import shlex
 import tempfile
 
 import numpy as np
@@ -123,7 +124,13 @@ def _save_into(out_dir, result, run, of):
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
-        [gap_section(result), provenance([('recording', run)])], footer=FOOTER, of=of))
+        [gap_section(result, command=next_command(result, 'next_experiment.yaml')),
+         provenance([('recording', run)])], footer=FOOTER, of=of))
+
+
+def next_command(result, path):
+    """Return the command that runs the next experiment on the rig that was recorded."""
+    return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
 
 
 def write_compare(result, namespace, path):

@@ -17,7 +17,7 @@
 import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import paragraph, render, Section, signed
+from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -98,7 +98,8 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
                 for run in runs]
     named = list(zip(titles, measured))
-    sections = [_early(runs), metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
+    sections = [_early(runs), _implausible(list(zip(titles, runs))),
+                metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -124,6 +125,17 @@ def _early(runs):
     """Return the section that warns of runs that stopped early, None without any."""
     found = early_sentences(runs)
     return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None
+
+
+def _implausible(runs):
+    """Return the section on values that cannot be right, None where there are none."""
+    found = [(title, sentence) for title, run in runs
+             for sentence in getattr(run, 'implausible', ())]
+    if not found:
+        return None
+    return Section('implausible', 'What cannot be right in the data', paragraph(
+        'Numbers and plots below rest on these values all the same.') + table(
+            ['recording', 'what was read'], found))
 
 
 def default_titles(runs):

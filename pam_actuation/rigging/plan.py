@@ -128,7 +128,7 @@ def _compile(rig, controller):
     DriverLoop(rig.valve)
     if controller is not None:
         from pam_actuation.control.config import load_controller
-        spare = load_controller(controller.to_yaml(), rig)
+        spare = load_controller(controller.to_yaml(), rig, accept_other_rig=True)
         spare.step(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -141,7 +141,8 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     if bag is not None:
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
-            learning=str(bool(learning)).lower())
+            learning=str(bool(learning)).lower(),
+            remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)))
         wanted = ReferenceLoop(plan.experiment, valve=rig.valve).topics
         topics = ['pressure', 'contraction', 'force', 'valve_signal', *wanted]
         if rig.valve == 'hsv':
@@ -159,6 +160,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     if controller is not None:
         nodes[plan.controller_node] = {
             'rig': rig_file, 'valve_type': rig.valve,
+            'accept_other_rig': bool(controller.other_rig),
             'controller': _write(plan.folder / 'controller.yaml', controller.to_yaml())}
         if controller.kind == 'sofc':
             nodes[plan.controller_node]['learning'] = learning

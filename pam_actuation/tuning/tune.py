@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 import time
 
 from pam_actuation.control.config import controller_to_yaml
+from pam_actuation.control.made_for import facts_of
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.initial_rules import initial_rules
@@ -272,6 +273,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     improved = held_after < held_before
     if not improved:
         tuned, rules = rebuild(controller, {}), ''
+    tuned.made_for, tuned.other_rig = facts_of(rigs[0]), ''
     changed = {name: (value, tuned.settings[name]) for name, value in before.items()
                if tuned.settings[name] != value}
     rollouts = done[0] + len(train) + 2 * len(test) + extra
