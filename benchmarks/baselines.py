@@ -23,12 +23,12 @@ of each controller, and writes the presets of ``config/controllers``.
 import argparse
 
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.files import write_atomically
 from pam_actuation.experiments import load_experiment
 from pam_actuation.resources import config_dir
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
+from pam_sim.files import write_text
 from pam_sim.located_yaml import dump_yaml
 
 RIG = 'dmsp_5_300_realistic'
@@ -105,7 +105,7 @@ def tune_presets(valve, jobs):
             rollouts=result.rollouts, seed=SEED, before=result.held_out_before,
             after=result.held_out_after)
         path = config_dir() / 'controllers' / f'{preset(kind, valve)}.yaml'
-        write_atomically(path, head + dump_yaml({
+        write_text(path, head + dump_yaml({
             'controller': start.kind, 'settings': settings}))
         print(f'{path}: {result.text()}', flush=True)
 

@@ -58,6 +58,9 @@ def _arguments():
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and joint.'),
         DeclareLaunchArgument(
+            'accept_other_rig', default_value='false', choices=['true', 'false'],
+            description='Whether to take a controller file that was made for another rig.'),
+        DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),
         DeclareLaunchArgument(
@@ -96,6 +99,8 @@ def generate_launch_description():
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
     control = {
         'controller': _text(LaunchConfiguration('controller_file')),
+        'accept_other_rig': ParameterValue(
+            LaunchConfiguration('accept_other_rig'), value_type=bool),
         'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
     drivers = [
         _node('valve_driver', valve, {'rig': _text(LaunchConfiguration('joint'), '/', side)},

@@ -47,8 +47,8 @@ from pam_sim.errors import InputError
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
 # Noted from the arguments.
-HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW = (
-    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals')
+HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
+    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals', 'recorded_seed')
 
 
 def _arguments():
@@ -70,6 +70,9 @@ def _arguments():
         DeclareLaunchArgument(
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and experiment.'),
+        DeclareLaunchArgument(
+            'accept_other_rig', default_value='false', choices=['true', 'false'],
+            description='Whether to take a controller file that was made for another rig.'),
         DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),
@@ -113,14 +116,17 @@ def generate_launch_description():
     """Return nodes, arguments and the two ways to end."""
     valve = {'valve_type': _text('valve')}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
-    control = {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)}
+    control = {
+        'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME), 'accept_other_rig':
+        ParameterValue(LaunchConfiguration('accept_other_rig'), value_type=bool)}
     learning = {'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
 
     def chosen(name):
         return IfCondition(EqualsSubstitution(LaunchConfiguration(CONTROLLER), name))
 
     recorder = _node(
-        RECORDER, valve, seed,
+        RECORDER, valve,
+        {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
          'controller': _text(CONTROLLER_NAME)},
         condition=IfCondition(LaunchConfiguration('record')))
@@ -169,7 +175,9 @@ def _note_what_is_needed(context):
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     noted = {HARDWARE_FILE: str(find_config('hardware', given('hardware'))),
              CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
-             RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace'))}
+             RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
+             # Real sensors have no seed.
+             RECORDED_SEED: given('seed') if given('hardware') == 'sim' else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
 
 

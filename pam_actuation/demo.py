@@ -29,16 +29,18 @@ import joblib
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.place import check_bag_target
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.parallel import in_processes
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.report.demo_page import demo_report, DemoPart
-from pam_actuation.report.gap import free_run_overlay, write_gap
+from pam_actuation.report.gap import FILES, free_run_overlay, write_gap
 from pam_actuation.rigging.session import run_experiment
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import check_folder, make_folder
 
 RIG = 'dmsp_5_300_realistic'
 NOMINAL = 'dmsp_5_300_hanging_mass'
@@ -57,6 +59,14 @@ TEXT_HSV = (
     'The same muscle on a pair of high-speed on/off valves: the driver closes an inner pressure '
     'loop with pulse width modulation and shuts both valves at the set point, so that the '
     'controller sees the same interface.')
+
+
+def check_place(folder):
+    """Look whether the demo can write into a folder; InputError where not, or over a file."""
+    check_folder(folder, ('report.html', 'tuned.yaml'), overwrite=False)
+    check_folder(os.path.join(folder, 'gap'), FILES, overwrite=False)
+    for name in TITLES:
+        check_bag_target(os.path.join(folder, name))
 
 
 @dataclass
@@ -118,7 +128,7 @@ class Demo:
     def run(self):
         """Run all steps and return the DemoResult."""
         started = time.perf_counter()
-        os.makedirs(self.result.folder, exist_ok=True)
+        make_folder(self.result.folder)
         steps = self._steps()
         total = sum(seconds for seconds, _, _ in steps)
         done = 0.0

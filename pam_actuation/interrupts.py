@@ -79,6 +79,36 @@ def undisturbed():
 
 
 @contextmanager
+def held():
+    """
+    Hold SIGINT and SIGTERM back; give a function that tells whether one came.
+
+    The block asks it between its steps and ends itself. A second signal is not held back.
+    In another thread than the main one, which gets no signals, nothing is held back.
+    """
+    came = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield came.is_set
+        return
+    before = {}
+
+    def note(number, frame):
+        if came.is_set():
+            raise KeyboardInterrupt
+        came.set()
+
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # What is ignored, as in a process in the background, stays ignored.
+            if signal.getsignal(number) not in (signal.SIG_IGN, None):
+                before[number] = signal.signal(number, note)
+        yield came.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
 def kept_from_children():
     """
     Keep SIGINT from the processes that are started meanwhile; what comes for this one waits.

@@ -27,6 +27,7 @@ import os
 import re
 
 from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe
 import yaml
 
 # Bounds of what is read at all. The largest file of this kind holds some 10 kB and 500 values.
@@ -326,6 +327,7 @@ def load_yaml(path_or_text, name=None):
 
 def _read(path, name):
     """Return the bytes of a file, or what shows that it is too large."""
+    refuse_pipe(path)
     try:
         with open(path, 'rb') as file:
             return file.read(MAX_BYTES + 1)

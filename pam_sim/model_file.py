@@ -21,7 +21,7 @@ from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import dump_yaml, Located
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
-from pam_sim.named_files import NamedFiles
+from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
 from pam_sim.rig import EffectSetting, Rig, rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -53,6 +53,8 @@ def load_rig(source, valve=None, fidelity=None):
     -------
     Rig
 
+    A rig whose file states no ``name`` is called after the file.
+
     Raises
     ------
     InputError
@@ -63,7 +65,7 @@ def load_rig(source, valve=None, fidelity=None):
         rig = source
     else:
         data, name = _PRESETS.locate(source, 'rig')
-        rig = _from_mapping(data, name, (name,) if name else ())
+        rig = _from_mapping(data, name or file_stem(source), (name,) if name else ())
     for value, choices, what in ((valve, VALVES, 'valve'), (fidelity, hsv.FIDELITIES, 'fidelity')):
         if value is not None and value not in choices:
             raise InputError(f'{what} `{value}` is not known; allowed: {", ".join(choices)}')
@@ -144,6 +146,15 @@ def _base(rig):
     if rig.muscle == replace(nominal, law=rig.muscle.law):
         return {'rig': f'{_MUSCLE}_{rig.load}', 'law': rig.muscle.law.plain()}
     return {'muscle': rig.muscle.plain(), 'load': rig.load}
+
+
+def rig_title(rig):
+    """Return the name of a rig for people, with the preset or muscle it is made from."""
+    base = f'{rig.muscle.name}_{rig.load}'
+    made_of = [] if rig.name == base else [base]
+    if rig.effects:
+        made_of.append(f'{len(rig.effects)} effects' if len(rig.effects) > 1 else '1 effect')
+    return f'{rig.name} ({", ".join(made_of)})' if made_of else rig.name
 
 
 def rig_to_yaml(rig):

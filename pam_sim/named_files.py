@@ -23,6 +23,14 @@ from pam_sim.located_yaml import load_yaml, Located
 _HERE = Path(__file__).parent
 
 
+def file_stem(source):
+    """Return the name of a file without folder and ending; None for a text or a mapping."""
+    if isinstance(source, Located) or isinstance(source, str) and (
+            '\n' in source or ': ' in source) and not os.path.exists(source):
+        return None
+    return Path(source).stem
+
+
 class NamedFiles:
     """
     The YAML files of a folder.

@@ -21,13 +21,17 @@ node reports in /diagnostics as ``published.<full topic>``.
 """
 
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
+from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import read_bag
@@ -35,11 +39,8 @@ from pam_sim.errors import InputError
 
 __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
 
-DIAGNOSTICS = 'diagnostics'
-PUBLISHED = 'published.'
 # An interval between stamps this many times the usual one counts as a gap.
 GAP_FACTOR = 2.5
-COUNT_DIGITS = 18
 
 
 @dataclass
@@ -77,8 +78,8 @@ class BagInfo:
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good
     bag; ``notes`` are harmless ones. ``complete`` is False when messages are
-    known to be missing, True when every topic of the rig has been checked, None
-    where that is not known.
+    known to be missing or the run stopped early, True when every topic of the rig has
+    been checked, None where that is not known.
     """
 
     path: str
@@ -110,9 +111,19 @@ class BagInfo:
         return sum(topic.missed_at_start or 0 for topic in self.topics)
 
     @property
+    def missing(self):
+        """Return whether messages are known to be missing."""
+        return bool(self.recovered or self.lost or self.dropped or self.missed_at_start)
+
+    @property
+    def ending(self):
+        """Return how far the run came and why it ended, an ``Ending``."""
+        return ending_of(self.metadata)
+
+    @property
     def complete(self):
         """Return whether all published messages are in the bag, None if unknown."""
-        if self.recovered or self.lost or self.dropped or self.missed_at_start:
+        if self.missing or self.ending.early:
             return False
         # Diagnostics come from every node there is, also from those not of the rig.
         rig = [
@@ -135,8 +146,10 @@ class BagInfo:
     def to_dict(self):
         """Return everything as plain data for JSON."""
         return {
-            **asdict(self), 'lost': self.lost, 'dropped': self.dropped,
-            'missed_at_start': self.missed_at_start, 'complete': self.complete}
+            **asdict(self), 'rig': recorded_rig_title(self.metadata),
+            'lost': self.lost, 'dropped': self.dropped,
+            'missed_at_start': self.missed_at_start, 'complete': self.complete,
+            'ending': {**asdict(self.ending), 'sentence': self.ending.sentence}}
 
 
 def bag_info(path, recover=False):
@@ -168,16 +181,24 @@ def bag_info(path, recover=False):
             'The recording broke off and was made a whole bag again; '
             f'{recovery.get("unreadable_bytes", "?")} bytes were not readable.')
     topics = []
+    length_m = cache(lambda: plausibility.recorded_length_m(bag.experiment))
     for name in sorted(bag.topics):
         topic = bag.topics[name]
         info, stamp_ns, values = _topic_info(topic, remarks)
-        _add_counts(info, topic, recording, published.get(name))
+        _add_counts(info, topic, recording, *published.of(name))
         remarks += _loss_remarks(info)
-        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values)
+        remarks += plausibility.topic_remarks(
+            topic, info, stamp_ns, values, length_m)
         topics.append(info)
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles)
     remarks += missing
+    if ending_of(bag.experiment).early:
+        remarks.append(ending_of(bag.experiment).sentence)
+    notes += [text + '.' for text in bag.experiment.get('remarks', '').splitlines()]
+    if bag.experiment.get('controller_other_rig'):
+        notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
+                     'this was accepted.')
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
@@ -244,54 +265,28 @@ def _has_header(topic):
 
 
 def _published(bag):
-    """
-    Return what the nodes last reported: full topic to (published, send time of the report).
-
-    Reports of several nodes on one topic add up; the latest report's time counts.
-    """
-    last = {}
+    """Return the PublishedCounts of a bag's diagnostics."""
+    published = PublishedCounts()
     topic = bag.topics.get('/diagnostics')
-    if topic is None or not is_rig_topic(topic):
-        return {}
-    for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
-        try:
-            statuses = codecs.decode(DIAGNOSTICS, raw)
-        except InputError:
-            continue
-        for status in statuses:
-            for key, text in status.values:
-                number = _count(text)
-                if key.startswith(PUBLISHED) and number is not None:
-                    last[status.name, key[len(PUBLISHED):]] = (number, sent_ns)
-    published = {}
-    for (_, name), (number, sent_ns) in last.items():
-        before, before_ns = published.get(name, (0, 0))
-        published[name] = (before + number, max(before_ns, sent_ns))
+    if topic is not None and is_rig_topic(topic):
+        for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
+            published.hear(raw, sent_ns)
     return published
 
 
-def _count(text):
-    """Return the number a text is, None where it is no number of messages."""
-    return int(text) if text.isdecimal() and len(text) <= COUNT_DIGITS else None
-
-
-def _add_counts(info, topic, recording, published):
+def _add_counts(info, topic, recording, published, sent_ns):
     def recorded(key):
-        return _count(recording.get(f'{topic.name}.{key}', ''))
+        return count_of(recording.get(f'{topic.name}.{key}', ''))
 
-    info.lost = recorded('lost')
     info.dropped = recorded('dropped')
     info.missed_at_start = recorded('missed_at_start')
-    if published is None:
-        return
-    info.published, sent_ns = published
-    # Where the bag knows send times, a node that died early is checked too: what it had
-    # published by its last report must be there from that time.
+    info.published = published
     by_then = info.count
+    # Not every bag knows send times.
     if topic.name != '/diagnostics' and (topic.publish_time_ns != topic.log_time_ns).any():
         by_then = int((topic.publish_time_ns <= sent_ns).sum())
-    elsewhere = (info.dropped or 0) + (info.missed_at_start or 0)
-    info.lost = max(info.lost or 0, info.published - by_then - elsewhere)
+    info.lost = missing_messages(
+        recorded('lost'), published, by_then, (info.dropped or 0) + (info.missed_at_start or 0))
 
 
 def _loss_remarks(info):

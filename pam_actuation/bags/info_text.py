@@ -16,6 +16,7 @@
 
 import datetime
 
+from pam_actuation.bags.facts import recorded, recorded_rig_title
 from pam_sim.units import gauge_kpa
 
 _DISPLAY = {
@@ -28,14 +29,13 @@ _DISPLAY = {
     'vent_duty': (1.0, '', 3),
 }
 _TABLE = ('topic', 'messages', 'rate', 'longest gap', 'jitter', 'published', 'lost', 'dropped')
-_SHORT_TEXTS = ('experiment_name', 'valve', 'seed', 'software_version')
 
 
 def render_text(info):
     """Return the text of a BagInfo, lines of unlimited width, no trailing newline."""
     lines = [info.path, _headline(info)]
-    lines += [
-        f'{key}: {info.metadata[key]}' for key in _SHORT_TEXTS if info.metadata.get(key)]
+    lines += [f'{key}: {text}' for key, text in _facts(info).items()]
+    lines.append(info.ending.sentence)
     lines += ['', *_table([_TABLE, *(_row(topic) for topic in info.topics)])]
     ranges = [line for topic in info.topics for line in _range_lines(topic)]
     if ranges:
@@ -44,6 +44,15 @@ def render_text(info):
     lines += [f'- {remark}' for remark in info.remarks]
     lines += [f'Note: {note}' for note in info.notes]
     return '\n'.join(lines)
+
+
+def _facts(info):
+    """Return what the bag says of its run; what it does not say is told as that."""
+    return {
+        'experiment_name': recorded(info.metadata, 'experiment_name'),
+        'rig': recorded_rig_title(info.metadata),
+        'valve': recorded(info.metadata, 'valve'), 'seed': recorded(info.metadata, 'seed'),
+        'software_version': recorded(info.metadata, 'software_version')}
 
 
 def _headline(info):
@@ -92,6 +101,9 @@ def _range_lines(topic):
 def _verdict(info):
     if info.complete:
         text = 'Complete: every message that was published is here.'
+    elif not info.missing and info.ending.early:
+        text = (
+            'Stopped early; of what was published until then nothing is known to be missing.')
     elif info.complete is None:
         text = 'Nothing is known to be missing; not every topic could be checked.'
     else:

@@ -20,10 +20,12 @@ used is returned, what is odd is said in ``remarks``.
 """
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 
 from pam_actuation.bags import codecs, series
+from pam_actuation.bags.plausibility import recorded_length_m, topic_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.messages import VALVE_NAMES, valve_of
 from pam_sim.errors import InputError
@@ -61,6 +63,23 @@ class RecordedRun(Run):
         """Return 'ppr' or 'hsv' by the valve signal, else by the metadata, else ''."""
         names = self.topics['valve_signal'].values if 'valve_signal' in self.topics else {}
         return valve_of(names) or self.metadata.get('valve', '')
+
+    @cached_property
+    def findings(self):
+        """Return what cannot be right in the values, a tuple of Implausible; looked for once."""
+        length_m = cache(lambda: recorded_length_m(self.metadata))
+        return tuple(found for short, series in self.topics.items() for found in topic_findings(
+            f'{self.namespace}/{short}', series.values, length_m))
+
+    @property
+    def implausible(self):
+        """Return a sentence on everything in the values that cannot be right."""
+        return tuple(found.sentence for found in self.findings)
+
+    @property
+    def unusable(self):
+        """Return those of them after which the values mean something else, a unit say."""
+        return tuple(found.sentence for found in self.findings if found.unusable)
 
 
 def load_run(path, namespace=None, recover=False):

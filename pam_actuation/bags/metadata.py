@@ -16,6 +16,7 @@
 
 import importlib.metadata
 
+from pam_actuation.bags.ending import Ending
 from pam_sim.errors import InputError
 
 # Units of the values on the wire, per topic; the text goes into every bag.
@@ -45,7 +46,8 @@ def experiment_metadata(experiment=None, rig=None, controller=None, valve='', se
     Parameters
     ----------
     experiment, rig, controller : object or str, optional
-        YAML text, or anything with ``to_yaml()``; left out where there is none.
+        YAML text, or anything with ``to_yaml()``; left out where there is none. An
+        experiment with ``duration_s`` says the planned length.
     valve : str
         'ppr' or 'hsv'; by default that of the rig.
     seed : int, optional
@@ -73,6 +75,8 @@ def experiment_metadata(experiment=None, rig=None, controller=None, valve='', se
         'experiment': _yaml(experiment),
         'rig': _yaml(rig),
         'controller': _yaml(controller),
+        'controller_other_rig': getattr(controller, 'other_rig', ''),
+        **Ending(getattr(experiment, 'duration_s', None)).texts(),
     }
     texts.update({key: str(value) for key, value in more.items()})
     return {key: text for key, text in texts.items() if text}

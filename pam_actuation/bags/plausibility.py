@@ -14,6 +14,8 @@
 
 """Sentences on what in a bag cannot be right, for people who look for the reason."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pam_actuation.bags import codecs
@@ -33,9 +35,38 @@ MAX_CONTRACTION = 0.25                 # of the length, data sheet limit
 CONTRACTION_MARGIN_M = 1e-3
 MAX_GAUGE_PA = 800e3
 MAX_VOLTAGE = 10.0
+LEAST_PA = 5e3                         # absolute: no rig has such a vacuum
+MOST_PA = 1e7
+LEAST_KPA = -200.0                     # gauge in kPa with noise; noise in Pa reaches further
+MOST_SUPPLY_PA = 2e6
+_PRESSURE_UNITS = (
+    (1.6, 'MPa', 'Multiply them by 1000000'), (16.0, 'bar', 'Multiply them by 100000'),
+    (150.0, 'kPa or psi', 'Multiply kPa by 1000, psi by 6894.8'),
+    (LEAST_PA, 'kPa', 'Multiply them by 1000'))
+LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
+MOST_M = 0.5                           # and none of the usual ones by this
+MOST_N = 1e5
 
 
-def topic_remarks(topic, info, stamp_ns, values):
+@dataclass(frozen=True)
+class Implausible:
+    """A sentence on values that cannot be right; ``unusable`` values mean something else."""
+
+    sentence: str
+    unusable: bool = False
+
+
+def recorded_length_m(metadata):
+    """Return the length of the muscle that a bag's rig tells [m], else that of a DMSP-5-300."""
+    from pam_sim import load_rig
+    from pam_sim.errors import InputError
+    try:
+        return load_rig(metadata['rig']).muscle.length_m
+    except (InputError, KeyError):
+        return MUSCLE_LENGTH_M
+
+
+def topic_remarks(topic, info, stamp_ns, values, length_m=None):
     """
     Return sentences on one topic.
 
@@ -49,20 +80,26 @@ def topic_remarks(topic, info, stamp_ns, values):
         Header stamps in file order.
     values : dict of str to ndarray
         SI values; empty for topics that are not a rig's.
+    length_m : callable, optional
+        As of ``value_findings``.
 
     """
     if not values and info.type_name != codecs.TOPIC_TYPES['reference_trajectory']:
         return []
     remarks = _time_remarks(topic, info, stamp_ns)
-    if topic.name.endswith('/controller_state'):
-        # Internals may be undefined, such as the time since the tick before the first.
-        return remarks
+    return remarks + [one.sentence for one in topic_findings(topic.name, values, length_m)]
+
+
+def topic_findings(topic, values, length_m=None):
+    """Return what cannot be right in the values of a topic, a list of Implausible."""
+    # Internals may be undefined, such as the time since the tick before the first.
+    if topic.endswith('/controller_state'):
+        return []
     # A reference that asks for a force says nothing of a contraction.
-    asks_force = topic.name.endswith('/reference') and 'force_n' in values
-    for name, column in values.items():
-        if len(column) and (not asks_force or np.isfinite(column).any()):
-            remarks += _value_remarks(topic.name, name, column)
-    return remarks
+    asks_force = topic.endswith('/reference') and 'force_n' in values
+    return [found for name, column in values.items()
+            if len(column) and (not asks_force or np.isfinite(column).any())
+            for found in value_findings(topic, name, column, length_m)]
 
 
 def missing_topics(namespaces):
@@ -121,41 +158,124 @@ def _clock_remarks(name, delay_ns):
     return []
 
 
-def _value_remarks(topic, name, column):
+def value_findings(topic, name, column, length_m=None):
+    """
+    Return what cannot be right in one column of values, a list of Implausible.
+
+    Parameters
+    ----------
+    topic : str
+        Full name, for the sentences.
+    name : str
+        Of the value, with its unit, such as ``pressure_pa``.
+    column : ndarray
+        As read, in file order or by stamp.
+    length_m : callable, optional
+        Gives the length of the muscle at rest [m]; asked only where it matters.
+
+    """
     finite = column[np.isfinite(column)]
-    remarks = []
+    found = []
     bad = len(column) - len(finite)
     if bad and not (name == 'velocity_m_per_s' and not len(finite)):
-        remarks.append(f'{topic}: {bad} values of {name} are not finite.')
-    if not len(finite):
-        return remarks
-    low, high = float(finite.min()), float(finite.max())
-    if name == 'pressure_pa':
-        remarks += _pressure_remarks(topic, finite, low, high)
-    elif name == 'contraction_m' and (
-            low < -CONTRACTION_MARGIN_M
-            or high > MAX_CONTRACTION * MUSCLE_LENGTH_M + CONTRACTION_MARGIN_M):
-        remarks.append(
-            f'{topic}: contraction from {1e3 * low:.1f} to {1e3 * high:.1f} mm leaves 0 to '
-            f'{1e3 * MAX_CONTRACTION * MUSCLE_LENGTH_M:.0f} mm (25 % of a 300 mm muscle).')
-    elif name in ('fill_duty', 'vent_duty') and (low < 0.0 or high > 1.0):
-        remarks.append(f'{topic}: {name} from {low:.3g} to {high:.3g} leaves 0 to 1.')
-    elif name == 'ppr_voltage' and (low < 0.0 or high > MAX_VOLTAGE):
-        remarks.append(f'{topic}: {name} from {low:.3g} to {high:.3g} V leaves 0 to 10 V.')
-    return remarks
+        what = 'none' if not len(finite) else f'{len(finite)} of {len(column)}'
+        found.append(Implausible(
+            f'{topic}: {bad} values of {name} are not finite (nan or inf), {what} can be used; '
+            'look for a sensor or converter that drops out.', not len(finite)))
+    check = _supply if topic.endswith('/supply_pressure') else _CHECKS.get(name)
+    if len(finite) and check is not None:
+        sentence, unusable = check(
+            finite, float(finite.min()), float(finite.max()), length_m or _usual_length)
+        if sentence:
+            found.append(Implausible(f'{topic}: {sentence}', unusable))
+    return found
 
 
-def _pressure_remarks(topic, finite, low, high):
+def _usual_length():
+    return MUSCLE_LENGTH_M
+
+
+def _unit(low, high, unit, likely, fix):
+    """Return the sentence of a wrong unit; the numbers are told as they were read."""
+    return (f'the values, {low:.4g} to {high:.4g}, cannot be {unit}: they are likely {likely}. '
+            f'{fix}'), True
+
+
+def _pressure(finite, low, high, length_m):
+    if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA:
+        if high <= P_ATM_PA + MAX_GAUGE_PA:
+            return '', False
+        if float(np.median(finite)) > MOST_PA:
+            return _unit(low, high, 'Pa', 'mPa, or Pa multiplied by 1000 once more',
+                         'Divide them by 1000; the topic is absolute, in Pa.')
+        return f'up to {gauge_kpa(high):.0f} kPa gauge, more than the muscle stands.', False
+    usual = float(np.median(finite))
+    # A spike must not hide the unit of the rest.
+    largest = float(np.quantile(finite, 0.99))
+    if 0.0 < largest < LEAST_PA and low > LEAST_KPA:
+        likely, fix = next((text, fix) for limit, text, fix in _PRESSURE_UNITS
+                           if largest < limit)
+        return _unit(low, high, 'Pa absolute', likely,
+                     f'{fix}, and add 101325 Pa if they are gauge; the topic is absolute, in Pa.')
     below = int((finite < P_ATM_PA - ATMOSPHERE_MARGIN_PA).sum())
-    if below and float(np.median(finite)) < P_ATM_PA:
-        return [
-            f'{topic}: mostly below atmospheric pressure (median '
-            f'{1e-3 * float(np.median(finite)):.1f} kPa): is it gauge pressure? The topic is '
-            'absolute, in Pa.']
-    if below:
-        return [
-            f'{topic}: {below} values below atmospheric pressure, down to '
-            f'{gauge_kpa(low):.1f} kPa gauge.']
-    if high > P_ATM_PA + MAX_GAUGE_PA:
-        return [f'{topic}: up to {gauge_kpa(high):.0f} kPa gauge, more than the muscle stands.']
-    return []
+    if usual < P_ATM_PA:
+        return (
+            f'mostly below atmospheric pressure (median {1e-3 * usual:.1f} kPa): is it gauge '
+            'pressure? Add 101325 Pa then; the topic is absolute, in Pa.'), True
+    hint = (' They are likely gauge pressure: add 101325 Pa.'
+            if abs(float(np.quantile(finite, 0.01))) < ATMOSPHERE_MARGIN_PA else '')
+    return (f'{below} values below atmospheric pressure, down to {gauge_kpa(low):.1f} kPa '
+            f'gauge.{hint}'), bool(hint)
+
+
+def _supply(finite, low, high, length_m):
+    if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA and high <= MOST_SUPPLY_PA:
+        return '', False
+    return _pressure(finite, low, high, length_m)
+
+
+def _contraction(finite, low, high, length_m):
+    if low >= -CONTRACTION_MARGIN_M and high <= LEAST_LIMIT_M:
+        return '', False
+    length = length_m()
+    limit = MAX_CONTRACTION * length
+    if low >= -CONTRACTION_MARGIN_M and high <= limit + CONTRACTION_MARGIN_M:
+        return '', False
+    largest = float(np.quantile(np.abs(finite), 0.99))
+    if largest > MOST_M and largest > 2.0 * length:
+        likely, factor = ('micrometres', 1e6) if largest > 1e3 else ('millimetres', 1e3)
+        return _unit(low, high, 'metres', likely,
+                     f'Divide them by {factor:g}; the topic is in m.')
+    hint = ''
+    if largest > limit and high <= 0.5:
+        hint = ' A share of the length? Multiply it by the length then; the topic is in m.'
+    elif low < -CONTRACTION_MARGIN_M and float(np.median(finite)) < -CONTRACTION_MARGIN_M:
+        hint = ' Is the sign turned round, or the zero not set? Shortening is positive.'
+    return (f'contraction from {1e3 * low:.1f} to {1e3 * high:.1f} mm leaves 0 to '
+            f'{1e3 * limit:.0f} mm (25 % of a {1e3 * length:.0f} mm muscle).{hint}'), False
+
+
+def _force(finite, low, high, length_m):
+    if max(-low, high) < MOST_N:
+        return '', False
+    return _unit(low, high, 'N', 'mN', 'Divide them by 1000; the topic is in N.')
+
+
+def _duty(finite, low, high, length_m):
+    if low >= 0.0 and high <= 1.0:
+        return '', False
+    if low >= 0.0 and 1.5 < high <= 100.0:
+        return _unit(low, high, 'a duty of 0 to 1', 'per cent', 'Divide them by 100.')
+    return f'a duty from {low:.3g} to {high:.3g} leaves 0 to 1.', False
+
+
+def _voltage(finite, low, high, length_m):
+    if low >= 0.0 and high <= MAX_VOLTAGE:
+        return '', False
+    if low >= 0.0 and 1e2 < high <= 1e3 * MAX_VOLTAGE:
+        return _unit(low, high, 'volts', 'millivolts', 'Divide them by 1000.')
+    return f'{low:.3g} to {high:.3g} V leaves 0 to 10 V.', False
+
+
+_CHECKS = {'pressure_pa': _pressure, 'contraction_m': _contraction, 'force_n': _force,
+           'fill_duty': _duty, 'vent_duty': _duty, 'ppr_voltage': _voltage}

@@ -22,12 +22,15 @@ the disk cannot follow, the newest messages are dropped and counted.
 
 from collections import deque
 import contextlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 import os
 import threading
 import time
 
 from pam_actuation.bags import disk
+from pam_actuation.bags.ending import ERROR
+from pam_actuation.bags.losses import (
+    DIAGNOSTICS, missing_messages, PublishedCounts, SentTimes)
 from pam_sim.errors import InputError
 
 RECORDING_RECORD = 'pam_recording'
@@ -42,7 +45,8 @@ class TopicCounts:
 
     ``received`` = ``written`` + ``dropped`` once the recorder is closed.
     ``dropped`` came too fast or after a write error; ``lost`` never arrived, by
-    gaps in the publishers' sequence numbers, and ``missed_at_start`` were
+    gaps in the publishers' sequence numbers and, once the recorder is closed, by
+    what the nodes say they have published; ``missed_at_start`` were
     published before the first one that arrived. The last two are None where the
     middleware gives no numbers or they cannot be told apart by publisher.
     """
@@ -164,6 +168,8 @@ class RecorderCore:
         self._disk = threading.Lock()            # guards the writer; never taken inside _wake
         self._counts = {}
         self._checks = {}
+        self._published = PublishedCounts()
+        self._sent = {}
         self._closing = False
         self._summary = None
         self.write_error = ''
@@ -184,6 +190,7 @@ class RecorderCore:
             self._writer.add_topic(full_name, type_name, qos)
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
+            self._sent.setdefault(full_name, SentTimes())
             watch = full_name != '/diagnostics' if check_sequence is None else check_sequence
             if watch:
                 self._checks.setdefault(full_name, SequenceCheck())
@@ -220,9 +227,12 @@ class RecorderCore:
             if self.write_error or self._closing or len(self._queue) >= self._max_queued:
                 counts.dropped += 1
                 return False
-            self._queue.append((
-                full_name, data, receive_timestamp_ns,
-                source_timestamp_ns or receive_timestamp_ns))
+            sent_ns = source_timestamp_ns or receive_timestamp_ns
+            self._queue.append((full_name, data, receive_timestamp_ns, sent_ns))
+            self._sent[full_name].add(sent_ns, receive_timestamp_ns)
+            if full_name == DIAGNOSTICS:
+                for name in self._published.hear(data, sent_ns) & self._sent.keys():
+                    self._sent[name].trim(self._published.of(name)[1])
             if len(self._queue) == WAKE_AT:
                 self._wake.notify()
             return True
@@ -268,8 +278,12 @@ class RecorderCore:
         with self._disk:
             self._writer.add_metadata(name, values)
 
-    def close(self):
-        """Write what is queued, finish the bag and return the RecordingSummary."""
+    def close(self, ending=None):
+        """
+        Write what is queued, finish the bag and return the RecordingSummary.
+
+        The ``Ending`` of the run goes into the bag; one that stopped early replaces no other.
+        """
         if self._summary is not None:
             return self._summary
         with self._wake:
@@ -281,7 +295,14 @@ class RecorderCore:
         try:
             if self.write_error:
                 self._count_what_is_kept()
+            self._count_what_never_came()
+            if ending is not None and ending.texts():
+                if self.write_error:
+                    ending = replace(ending, ended=ERROR, because=self.write_error)
+                self._writer.add_to_experiment(ending.texts())
             self._writer.add_metadata(RECORDING_RECORD, _as_texts(self.counts, self.write_error))
+            if self.write_error or ending is not None and ending.early:
+                self._writer.replace_nothing()
             self._writer.close()
         except OSError as error:
             self._fail(error)
@@ -307,6 +328,17 @@ class RecorderCore:
             for name, counts in self._counts.items():
                 counts.written = kept.get(name, 0)
                 counts.dropped = counts.received - counts.written
+
+    def _count_what_never_came(self):
+        """Hold what arrived against what the nodes say they have published."""
+        with self._wake:
+            for name, counts in self._counts.items():
+                published, sent_ns = self._published.of(name)
+                by_then = counts.written if name == DIAGNOSTICS else min(
+                    counts.written, self._sent[name].up_to(sent_ns))
+                counts.lost = missing_messages(
+                    counts.lost, published, by_then,
+                    counts.dropped + (counts.missed_at_start or 0))
 
     def _run(self):
         flushed = time.monotonic()

@@ -29,6 +29,7 @@ from pam_actuation.bags.mcap_scan import MAGIC, scan
 from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
@@ -104,6 +105,7 @@ def read_bag(path, recover=False, wanted=None):
     try:
         if not path.exists():
             raise InputError('no such file or directory; give the path of a bag', path)
+        refuse_pipe(path)
         if path.is_dir():
             return _read_directory(path, recover, wanted)
         if path.suffix == '.mcap':

@@ -21,10 +21,11 @@ records. With a limit of size or time ``run_1.mcap`` and so on follow, each a co
 file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
-from pathlib import Path
+import contextlib
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
+from pam_actuation.bags.place import BagPlace
 from pam_sim.errors import InputError
 
 # Every file holds the metadata of the experiment; a smaller limit would be full of it.
@@ -47,7 +48,8 @@ class BagWriter:
         records by name. That of the experiment is also kept as custom data in
         metadata.yaml, so that converted bags have it.
     overwrite : bool
-        Replace an existing bag. Files that are no part of a bag are never touched.
+        Replace the bag that is there, once this one is closed as a whole. A folder that holds
+        anything else is refused.
     max_file_bytes : int
         Go on in the next file from about this size on; 0: never.
     max_file_s : float
@@ -66,23 +68,29 @@ class BagWriter:
     def __init__(self, directory, metadata=None, overwrite=False, max_file_bytes=0,
                  max_file_s=0.0):
         check_limits(max_file_bytes, max_file_s)
-        self.directory = Path(directory).resolve()
+        self._place = BagPlace(directory, overwrite)
+        self.directory = self._place.directory
         self._records = _records(metadata or {})
         self._limit_bytes = max_file_bytes or float('inf')
         self._limit_ns = round(max_file_s * 1e9) or float('inf')
         self._topics = {}
         self._finished = []
         self._in_former_files = {}
-        self._closed = False
-        _make_room(self.directory, overwrite)
+        self._closed = self.finished = False
+        self._whole = True
         self._current = None
-        self._current = self._next_file()
+        try:
+            self._current = self._next_file()
+        except OSError:
+            self._place.give_up([])
+            raise
 
     def _next_file(self):
         """Begin the next file: header, metadata, all topics so far."""
         number = len(self._finished) + (self._current is not None)
-        made = DataFile(self.directory / f'{self.directory.name}_{number}.mcap', self._begin)
-        disk.sync_directory(self.directory)
+        made = DataFile(
+            self._place.folder / f'{self.directory.name}_{number}.mcap', self._begin)
+        disk.sync_directory(self._place.folder)
         return made
 
     def _begin(self, file):
@@ -107,8 +115,9 @@ class BagWriter:
     @property
     def files(self):
         """Return the paths of all files of the bag, in order."""
-        files = [self.directory / facts.name for facts in self._finished]
-        return files if self._current is None else [*files, self._current.path]
+        names = [facts.name for facts in self._finished]
+        names += [] if self._current is None else [self._current.path.name]
+        return [self._place.folder / name for name in names]
 
     @property
     def file(self):
@@ -155,6 +164,12 @@ class BagWriter:
         """Append a named metadata record of texts."""
         self._current.mcap.add_metadata(name, _texts(values))
 
+    def add_to_experiment(self, texts):
+        """Add to the ``pam_experiment`` record: it is written anew, readers take the last."""
+        self._records[EXPERIMENT_RECORD] = {
+            **self._records.get(EXPERIMENT_RECORD, {}), **_texts(texts)}
+        self.add_metadata(EXPERIMENT_RECORD, self._records[EXPERIMENT_RECORD])
+
     def flush(self):
         """Close the open chunk, so that all messages written survive the end of the process."""
         self._current.mcap.close_chunk()
@@ -168,18 +183,23 @@ class BagWriter:
         """
         return None if self._current is None else self._current.handle_to_sync()
 
+    def replace_nothing(self):
+        """Leave a former bag where it is: this one, not whole, gets another ``directory``."""
+        self._whole = False
+
     def close(self):
-        """Finish the index and metadata.yaml; a second call does nothing."""
+        """Finish the index and metadata.yaml, put the bag in its place; once."""
         if self._closed:
             return
         try:
             if self._current is not None:
                 self._finish_file()
-            layout.write_metadata(self.directory, self._bag_metadata())
+            layout.write_metadata(self._place.folder, self._bag_metadata())
+            self.directory = self._place.settle(self._whole)
         except OSError:
             self.abandon()
             raise
-        self._closed = True
+        self._closed = self.finished = True
 
     def _finish_file(self):
         self._write_rosbag2_record(self._current)
@@ -202,9 +222,23 @@ class BagWriter:
 
     def abandon(self):
         """Close the file without an index, after a write error; what is in it stays readable."""
-        if not self._closed and self._current is not None:
+        if not self._closed:
+            self._release()
+            with contextlib.suppress(OSError):
+                self.directory = self._place.settle(whole=False)
+
+    def _release(self):
+        if self._current is not None:
             self._current.abandon()
         self._closed = True
+
+    def discard(self):
+        """Give a bag up that is not ``finished``: remove what was written, and nothing else."""
+        if self.finished:
+            return
+        files = self.files
+        self._release()
+        self._place.give_up([*files, self._place.folder / layout.METADATA_FILE])
 
     def __enter__(self):
         """Return the writer itself."""
@@ -256,20 +290,3 @@ def _records(metadata):
     if loose:
         records[EXPERIMENT_RECORD] = {**records.get(EXPERIMENT_RECORD, {}), **_texts(loose)}
     return records
-
-
-def _make_room(directory, overwrite):
-    """Create the bag's directory; remove the bag in it if that is wanted."""
-    if directory.is_file():
-        raise InputError('a file has this name; give the name of a new directory', directory)
-    present = sorted(directory.iterdir()) if directory.is_dir() else []
-    ours = [p for p in present if p.name == layout.METADATA_FILE or p.suffix == '.mcap']
-    if present and not overwrite:
-        raise InputError(
-            'the directory exists and is not empty; give another name or ask to overwrite',
-            directory)
-    if present and not ours:
-        raise InputError('the directory holds no bag and is not overwritten', directory)
-    for path in ours:
-        path.unlink()
-    directory.mkdir(parents=True, exist_ok=True)

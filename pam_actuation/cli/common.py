@@ -18,6 +18,7 @@ import json
 import os
 import sys
 
+from pam_actuation.cli.options import count, HIGHEST_SEED, source
 from tqdm import tqdm
 
 EXIT_DONE = 0
@@ -39,7 +40,40 @@ def emit(args, payload, text):
         The result for people.
 
     """
+    implausible = getattr(args, 'implausible', [])
+    if implausible:
+        payload = {**payload, 'implausible': implausible}
+        new = [sentence for sentence in implausible if sentence.rstrip('.') not in text]
+        text = '\n'.join([text, *(f'warning: {sentence}' for sentence in new)])
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
+
+
+def note_implausible(args, runs, must_be_right=False):
+    """
+    Note what cannot be right in loaded bags: ``emit`` says it, and the verb ends with 1.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Of the verb.
+    runs : list of RecordedRun
+        What ``load_run`` returned.
+    must_be_right : bool
+        Refuse values that mean something else than they say, a wrong unit for instance.
+
+    Raises
+    ------
+    InputError
+        As above, with the first such sentence.
+
+    """
+    from pam_sim.errors import InputError
+    for run in runs:
+        if must_be_right and run.unusable:
+            raise InputError(run.unusable[0].rstrip('.'), run.path)
+        several = f'{run.path}: ' if len(runs) > 1 else ''
+        found = [f'{several}{sentence}' for sentence in run.implausible]
+        args.implausible = [*getattr(args, 'implausible', []), *found]
 
 
 def progress(args, total, unit='', description=''):
@@ -57,7 +91,7 @@ def progress(args, total, unit='', description=''):
 def add_rig_options(parser):
     """Add the options that choose the rig, as used by several verbs."""
     parser.add_argument(
-        '--rig', default='dmsp_5_300_realistic', metavar='NAME|FILE',
+        '--rig', type=source, default='dmsp_5_300_realistic', metavar='NAME|FILE',
         help='rig preset or model YAML (default: %(default)s)')
     parser.add_argument(
         '--valve', metavar='ppr|hsv', default=None,
@@ -69,21 +103,29 @@ def add_controller_options(
         'in force'):
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
-        '--controller', default=None, metavar='NAME|FILE',
+        '--controller', type=source, default=None, metavar='NAME|FILE',
         help=f'controller preset or YAML (default: {default})')
     parser.add_argument(
-        '--rules', default=None, metavar='FILE', help='rule file to start from')
+        '--rules', type=source, default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
+    add_other_rig_option(parser)
+
+
+def add_other_rig_option(parser):
+    """Add the option that lets a controller run on a rig it was not made for."""
+    parser.add_argument(
+        '--accept-other-rig', action='store_true',
+        help='take a controller that was made for another rig; the bag says so')
 
 
 def add_experiment_options(parser):
     """Add what ``run`` and ``simulate`` both need: experiment, rig, controller, seed."""
-    parser.add_argument('experiment', help='experiment name or YAML file')
+    parser.add_argument('experiment', type=source, help='experiment name or YAML file')
     add_rig_options(parser)
     add_controller_options(parser)
-    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
+    add_seed_option(parser, 'seed of the sensor noise')
+    add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
 
 
 def load_setup(args):
@@ -107,17 +149,67 @@ def load_setup(args):
     experiment = load_experiment(args.experiment)
     rig = load_rig(args.rig, valve=args.valve)
     if not experiment.tracked:
+        if args.controller or args.rules:       # of no use here, but not to be wrong either
+            load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules,
+                            accept_other_rig=True)
         return experiment, rig, None
     experiment.check_reachable(rig)
     controller = load_controller(
-        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules)
+        args.controller or preset_for(experiment, rig), rig, rules_file=args.rules,
+        accept_other_rig=args.accept_other_rig)
     check_tracked(experiment, controller)
     return experiment, rig, controller
+
+
+def tell_remarks(args, experiment, valve, rig=None, controller=None):
+    """Return what a person should read before an experiment runs; say it on stderr."""
+    remarks = list(experiment.remarks(valve, rig, controller))
+    if not args.json:
+        for text in remarks:
+            print(f'remark: {text}', file=sys.stderr, flush=True)
+    return remarks
 
 
 def default_controller(args, valve):
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'
+
+
+def add_seed_option(parser, text):
+    """Add the option of the seed, said to be that of ``text``."""
+    parser.add_argument(
+        '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
+
+
+def add_overwrite_option(parser, what='files that are there already'):
+    """Add the option without which no verb replaces ``what``."""
+    parser.add_argument('--overwrite', action='store_true', help=f'replace {what}')
+
+
+def check_outputs(args, *paths):
+    """
+    Look whether the files that the options name can be written, before the work starts.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``overwrite``.
+    paths : str or None
+        None: not asked for.
+
+    Raises
+    ------
+    InputError
+        As ``pam_sim.files.check_file``; two results in one file.
+
+    """
+    from pam_sim.errors import InputError
+    from pam_sim.files import check_file
+    wanted = [os.path.abspath(check_file(path, args.overwrite))
+              for path in paths if path is not None]
+    for path in wanted:
+        if wanted.count(path) > 1:
+            raise InputError('two results cannot go into one file', path)
 
 
 def add_recover_option(parser):

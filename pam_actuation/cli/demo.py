@@ -18,6 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.options import out_path
 
 HELP = ('Run the real nodes as separate processes on DDS for both valves: record, replay, tune, '
         'gap between model and recording, one HTML page. Takes about three minutes.')
@@ -26,7 +27,7 @@ EXAMPLE = 'pam demo --out runs/demo'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='folder for bags and page (default: runs/demo-TIME)')
     parser.add_argument('--quick', action='store_true',
                         help='two short cycles per run and a short gap search: only to see that '
@@ -36,8 +37,9 @@ def add_arguments(parser):
 def run(args):
     """Run the demo and print where the bags and the page are."""
     from pam_actuation.cli.common import progress
-    from pam_actuation.demo import Demo
+    from pam_actuation.demo import check_place, Demo
     out = args.out or os.path.join('runs', f'demo-{time.strftime("%Y%m%d-%H%M%S")}')
+    check_place(out)
     with progress(args, 100, '%', 'demo') as bar:
         said = []
 

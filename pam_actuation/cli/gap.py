@@ -15,8 +15,11 @@
 """``pam gap``: what a model misses in recordings, added to it and proved."""
 
 import json
+import os
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
+from pam_actuation.cli.common import (
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
+from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
@@ -26,12 +29,14 @@ MODEL = 'dmsp_5_300_hanging_mass'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('run', nargs='*', help='recorded bags')
-    parser.add_argument('--model', default=MODEL, metavar='NAME|FILE',
+    parser.add_argument('run', type=source, nargs='*', help='recorded bags')
+    parser.add_argument('--model', type=source, default=MODEL, metavar='NAME|FILE',
                         help='model YAML or rig preset to hold against the recording '
                         '(default: %(default)s)')
-    parser.add_argument('--out', default=None, metavar='DIR', help='folder for the results')
-    parser.add_argument('--explain', default=None, metavar='EFFECT',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
+                        help='folder for the results; those of the same bags and model are '
+                        'made again')
+    parser.add_argument('--explain', type=source, default=None, metavar='EFFECT',
                         help='say what an effect is, from which size on it shows and what looks '
                         'like it; in the bag, or without one in a simulated identification')
     parser.add_argument('--plan', action='store_true',
@@ -42,24 +47,27 @@ def add_arguments(parser):
                         help='plan for a model preset with this valve')
     parser.add_argument('--no-force', action='store_true',
                         help='plan for a rig without a load cell')
-    parser.add_argument('--certify', default=None, metavar='RUN',
+    parser.add_argument('--certify', type=source, default=None, metavar='RUN',
                         help='bag for the proof (default: every fifth block of the first bag)')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
-    parser.add_argument('--effects', default=None, metavar='A,B',
+    parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names to try (default: all)')
-    parser.add_argument('--seconds', type=float, default=SECONDS, metavar='N',
+    parser.add_argument('--seconds', type=number(1.0, None, 's'), default=SECONDS, metavar='N',
                         help='time budget of the search (default: %(default)g)')
-    parser.add_argument('--materiality', type=float, default=1.0, metavar='S',
+    parser.add_argument('--materiality', type=number(0.01, 1000.0), default=1.0, metavar='S',
                         help='an effect is named when it moves a signal by more than S standard '
                         'deviations of its sensor (default: %(default)g)')
+    add_overwrite_option(parser)
 
 
 def run(args):
     """Find the gap; exit code 1 where there is one."""
     from pam_actuation.bags.load import load_run
-    from pam_actuation.report.gap import write_gap
+    from pam_actuation.report.gap import FILES, write_gap
+    from pam_actuation.report.origin import is_of, origin
     from pam_sim.effects.registry import get_effect
     from pam_sim.errors import InputError
+    from pam_sim.files import check_folder
     if args.explain is not None:
         return _explain(args)
     if args.plan:
@@ -69,14 +77,29 @@ def run(args):
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
+    page = os.path.join(args.out, 'report.html')
+    of = origin(args.run, page, 'gap', args.model, args.certify)
+    check_folder(args.out, FILES, args.overwrite or is_of(page, of))
     runs = [load_run(path, namespace=args.namespace) for path in args.run]
     certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
+    note_implausible(args, [*runs, *([certify] if certify else [])])
     with progress(args, 1.0, '', 'gap') as bar:
         result = write_gap(
-            runs, args.model, args.out, certify, effects=names, seconds=args.seconds,
+            runs, args.model, args.out, certify, of, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
-    emit(args, result.to_dict(), result.text() + f'\nresults: {args.out}')
+    emit(args, result.to_dict(), '\n'.join(
+        [result.text(), f'results: {args.out}', *_next_lines(result, args.out)]))
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+
+
+def _next_lines(result, out):
+    """Return in words what to measure next and how; nothing where that is not known."""
+    if not result.next_experiment:
+        return []
+    from pathlib import Path
+    from pam_actuation.report.gap import next_command
+    return [f'what to measure next: {result.next_experiment["why"]}',
+            f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
 
 
 def _plan(args):
@@ -85,24 +108,26 @@ def _plan(args):
 
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.protocols import plan
-    from pam_actuation.report.page import write_text
     from pam_sim import load_rig
     from pam_sim.effects.registry import get_effect
+    from pam_sim.files import check_folder, whole_files, write_text
     from pam_sim.located_yaml import dump_yaml
     rig = load_rig(args.model, valve=args.valve)
     names = args.effects.split(',') if args.effects else None
     for name in names or ():
         get_effect(name, '--effects')
+    if args.out is not None:
+        check_folder(args.out, ('plan.json', 'experiment.yaml'), args.overwrite)
     experiments = [load_experiment(one) for one in args.run]
     with progress(args, 1.0, '', 'plan') as bar:
         found = plan(rig, experiments, not args.no_force, args.materiality, names,
                      progress=lambda done: bar.update(done - bar.n))
     text = found.text()
     if args.out is not None:
-        folder = Path(args.out)
-        write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
-        write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
-        text += f'\nrun it with: pam run {folder / "experiment.yaml"}'
+        with whole_files(args.out) as folder:
+            write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
+            write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
+        text += f'\nrun it with: pam run {Path(args.out) / "experiment.yaml"}'
     emit(args, found.to_dict(), text)
     return EXIT_DONE
 
@@ -119,6 +144,7 @@ def _explain(args):
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], namespace=args.namespace)
+        note_implausible(args, [run], must_be_right=True)
         rig = model_for(run, args.model)
     else:
         rig = load_rig(args.model)

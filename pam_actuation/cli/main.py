@@ -28,7 +28,8 @@ VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap
 def build_parser():
     """Return the argument parser with one sub-parser per verb."""
     from pam_actuation import __version__
-    parser = argparse.ArgumentParser(
+    from pam_actuation.cli.options import Parser
+    parser = Parser(
         prog='pam', description='Simulate, run, record, replay and tune a pneumatic muscle rig.',
         epilog='Start with "pam demo", or "pam simulate sine_quarter_hz --out runs/first".')
     parser.add_argument('--version', action='version', version=f'pam_actuation {__version__}')
@@ -79,23 +80,34 @@ def main(argv=None):
 def _run_verb(argv, begin=lambda: None):
     """Parse, call ``begin``, run the verb; return the exit code."""
     # Here and not above: an early Ctrl-C finds main() at work, see interrupts.
-    from pam_actuation.cli.common import EXIT_BAD_INPUT
+    from pam_actuation.cli.common import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING
     from pam_sim.errors import InputError
+    from pam_sim.files import reason, shown
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    args = build_parser().parse_args(argv)
+    try:
+        args = build_parser().parse_args(argv)
+    except SystemExit as ended:     # --help, or an option that is not allowed
+        return ended.code
     begin()
     try:
-        return args.call(args)
+        code = args.call(args)
+        sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
+        # A verb that did its work on data that cannot be right has found something.
+        return EXIT_FINDING if code == EXIT_DONE and getattr(args, 'implausible', ()) else code
     except InputError as mistake:
-        print(f'pam {args.verb}: {mistake}', file=sys.stderr)
+        print(f'pam {args.verb}: {" ".join(str(mistake).split())}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as stop:
-        print(f'pam {args.verb}: {str(stop) or "stopped"}', file=sys.stderr)
+        print(f'pam {args.verb}: stopped' + (f'; {stop}' if str(stop) else ''), file=sys.stderr)
         return interrupts.EXIT_INTERRUPTED
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()
         return 0
+    except OSError as error:  # the file system refuses where nobody looked before
+        place = f'{shown(str(error.filename))}: ' if error.filename else ''
+        print(f'pam {args.verb}: {place}{reason(error)}', file=sys.stderr)
+        return EXIT_BAD_INPUT
 
 
 if __name__ == '__main__':

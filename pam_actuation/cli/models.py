@@ -14,7 +14,9 @@
 
 """``pam models``: the laws, valves, loads, effects, sensors and rigs the simulator knows."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE
+from pam_actuation.cli.common import (
+    add_overwrite_option, check_outputs, emit, EXIT_DONE)
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'List muscle laws, valves, loads and effects with equations, parameters and sources.'
 EXAMPLE = 'pam models hysteresis'
@@ -22,22 +24,32 @@ EXAMPLE = 'pam models hysteresis'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('name', nargs='?', default=None, help='show this entry in full')
-    parser.add_argument('--html', metavar='FILE', default=None,
+    parser.add_argument('name', type=source, nargs='?', default=None,
+                        help='show this entry in full')
+    parser.add_argument('--html', type=out_path, metavar='FILE', default=None,
                         help='write all entries as one HTML page')
-    parser.add_argument('--markdown', metavar='FILE', default=None,
-                        help='write all entries as a Markdown page')
+    parser.add_argument('--markdown', type=out_path, metavar='FILE', default=None,
+                        help='write all entries as a Markdown page; one made this way before '
+                             'is made again')
+    add_overwrite_option(parser)
 
 
 def run(args):
     """List the catalogue, or one entry in full; write the pages asked for."""
     from pam_actuation.models.text import in_full, overview
     from pam_sim.catalogue import catalogue, find
+    from pam_sim.errors import InputError
+    from pam_sim.files import check_file
+    if args.markdown is not None:
+        check_file(args.markdown, args.overwrite, ours='by `pam models --markdown')
+    check_outputs(args, args.html)
+    if args.html is not None and args.html == args.markdown:
+        raise InputError('two pages cannot go into one file', args.html)
     entries = catalogue()
     if args.name is not None:
         entries = find(entries, args.name)
-    written = _pages(args, entries)
     shown = overview(entries) if args.name is None else in_full(entries)
+    written = _pages(args, entries)
     payload = {'schema': 1, 'models': entries, 'written': written}
     emit(args, payload, '\n'.join(f'page: {path}' for path in written) if written else shown)
     return EXIT_DONE
@@ -48,10 +60,10 @@ def _pages(args, entries):
     written = []
     if args.html is not None:
         from pam_actuation.models import page
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         written.append(str(write_text(args.html, page.page(entries))))
     if args.markdown is not None:
         from pam_actuation.models import markdown
-        from pam_actuation.report.page import write_text
+        from pam_sim.files import write_text
         written.append(str(write_text(args.markdown, markdown.page(entries))))
     return written

@@ -16,7 +16,8 @@
 
 from pathlib import Path
 
-from pam_actuation.cli.common import emit, EXIT_DONE
+from pam_actuation.cli.common import add_overwrite_option, emit, EXIT_DONE
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'List the nodes with parameters, topics and services; write their pages.'
 EXAMPLE = 'pam nodes valve_driver'
@@ -24,26 +25,35 @@ EXAMPLE = 'pam nodes valve_driver'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('name', nargs='?', default=None, help='show the page of this node')
-    parser.add_argument('--markdown', metavar='DIR', default=None,
-                        help='write a Markdown page per node into this folder')
+    parser.add_argument('name', type=source, nargs='?', default=None,
+                        help='show the page of this node')
+    parser.add_argument('--markdown', type=out_path, metavar='DIR', default=None,
+                        help='write a Markdown page per node into this folder; pages made this '
+                             'way before are made again')
+    add_overwrite_option(parser)
 
 
 def run(args):
     """Print the names, or one page; write the pages asked for."""
     from pam_sim.errors import InputError
+    from pam_sim.files import check_folder, whole_files, write_text
+    if args.markdown is not None:
+        check_folder(args.markdown)
     try:
-        from pam_actuation.nodes.pages import pages
+        from pam_actuation.nodes.pages import pages, VARIANTS
     except ImportError as error:
         raise InputError(f'the nodes need ROS 2 ({error.name} is missing)') from None
+    if args.name is not None and args.name not in VARIANTS:
+        raise InputError(f'no node {args.name!r}, known are {", ".join(VARIANTS)}', 'name')
     texts = {Path(file).stem: text for file, text in pages().items()}
-    if args.name is not None and args.name not in texts:
-        raise InputError(f'no node {args.name!r}, known are {", ".join(texts)}', 'name')
     if args.markdown is not None:
-        from pam_actuation.report.page import write_text
-        Path(args.markdown).mkdir(parents=True, exist_ok=True)
-        written = [str(write_text(Path(args.markdown) / f'{name}.md', text))
-                   for name, text in texts.items()]
+        files = {f'{name}.md': text for name, text in texts.items()}
+        folder = check_folder(
+            args.markdown, files, args.overwrite, ours='by `pam nodes --markdown')
+        with whole_files(folder) as temporary:
+            for name, text in files.items():
+                write_text(temporary / name, text)
+        written = [str(folder / name) for name in files]
         shown = '\n'.join(f'page: {path}' for path in written)
     else:
         written = []

@@ -14,7 +14,10 @@
 
 """``pam replay``: step controller, driver and plant offline on what was recorded."""
 
-from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import (
+    add_other_rig_option, add_overwrite_option, add_recover_option, check_outputs, emit,
+    EXIT_DONE, EXIT_FINDING, note_implausible)
+from pam_actuation.cli.options import out_path, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
         'chained, and compare with the recording.')
@@ -23,7 +26,7 @@ EXAMPLE = 'pam replay runs/first --chain'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', help='bag directory, or a lone .mcap file')
+    parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bag')
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
@@ -33,11 +36,15 @@ def add_arguments(parser):
         '--chain', action='store_true',
         help='repeat the experiment: controller, driver and plant in a closed loop')
     parser.add_argument(
-        '--set', dest='changes', action='append', default=None, metavar='FILE|NAME=VALUE',
+        '--set', dest='changes', type=source, action='append', default=None,
+        metavar='FILE|NAME=VALUE',
         help='another controller YAML or one changed setting (may be repeated): what would '
         'this tuning have commanded; with --chain: how would it have gone')
     parser.add_argument(
-        '--out', default=None, metavar='FILE', help='write the replayed signals as an .npz file')
+        '--out', type=out_path, default=None, metavar='FILE',
+        help='write the replayed signals as an .npz file')
+    add_other_rig_option(parser)
+    add_overwrite_option(parser, 'a file that is there already')
     add_recover_option(parser)
 
 
@@ -46,9 +53,11 @@ def run(args):
     from pam_actuation.bags.load import load_run
     from pam_actuation.replay.compare import replay_run
     from pam_actuation.replay.settings import changed_controller
+    check_outputs(args, args.out)
     recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
-    result = replay_run(recorded, changed_controller(recorded, args.changes), args.only,
-                        args.chain)
+    note_implausible(args, [recorded])
+    result = replay_run(recorded, changed_controller(
+        recorded, args.changes, args.accept_other_rig), args.only, args.chain)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

@@ -14,9 +14,9 @@
 
 """``pam report``: one HTML page about one or several bags."""
 
-import os
-
-from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE
+from pam_actuation.cli.common import (
+    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
 EXAMPLE = 'pam report runs/first --out first.html'
@@ -24,20 +24,28 @@ EXAMPLE = 'pam report runs/first --out first.html'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', nargs='+', help='bag directories or .mcap files')
+    parser.add_argument('bag', type=source, nargs='+', help='bag directories or .mcap files')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
-    parser.add_argument('--out', default=None, metavar='FILE',
-                        help='page to write (default: report.html beside the first bag)')
+    parser.add_argument('--out', type=out_path, default=None, metavar='FILE',
+                        help='page to write (default: report.html beside the first bag, made '
+                        'again if it is the page of the same bags, else report_BAG.html)')
+    add_overwrite_option(parser, 'a page that is there already')
     add_recover_option(parser)
 
 
 def run(args):
     """Load the bags and write the page."""
+    from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
+    from pam_actuation.report.origin import default_page, origin
     from pam_actuation.report.pages import bag_report
+    out = args.out or default_page(args.bag, args.overwrite)
+    if args.out:
+        check_outputs(args, args.out)
     runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
-    first = os.path.abspath(args.bag[0]).rstrip(os.sep)
-    out = args.out or os.path.join(os.path.dirname(first), 'report.html')
-    summary = bag_report(runs, out)
-    emit(args, {'report': out, **summary}, f'report: {out}')
+    note_implausible(args, runs)
+    summary = bag_report(runs, out, of=origin(args.bag, out))
+    early = early_sentences(runs)
+    emit(args, {'report': out, 'remarks': early, **summary},
+         '\n'.join([*(f'remark: {text}' for text in early), f'report: {out}']))
     return EXIT_DONE

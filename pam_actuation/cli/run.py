@@ -18,7 +18,8 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
+from pam_actuation.cli.options import count, out_path
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
@@ -27,19 +28,23 @@ EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 def add_arguments(parser):
     """Declare the options of the verb."""
     add_experiment_options(parser)
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
-    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: a free one, this machine only)')
     parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
 
 
 def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
+    check_bag_target(out, args.overwrite)
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
         result = run_experiment(
             experiment, rig, controller, rig.valve, out, learning=not args.freeze,
@@ -48,9 +53,8 @@ def run(args):
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {published} published'
-    lines = [f'ran "{experiment.name}" on {rig.name} ({rig.valve}): {recorded} messages '
+    lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
              f'recorded{counted}']
-    remarks = list(experiment.remarks(rig.valve))
     lines += [f'remark: {text}' for text in remarks]
     if result.failure:
         lines.append(f'not completed: {result.failure}')

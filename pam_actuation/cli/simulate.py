@@ -18,7 +18,8 @@ import os
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, load_setup, progress)
+    add_experiment_options, emit, EXIT_DONE, load_setup, progress, tell_remarks)
+from pam_actuation.cli.options import out_path
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
@@ -27,15 +28,19 @@ EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
 def add_arguments(parser):
     """Declare the options of the verb."""
     add_experiment_options(parser)
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE)')
 
 
 def run(args):
     """Simulate and say what was recorded."""
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
+    from pam_sim.model_file import rig_title
     experiment, rig, controller = load_setup(args)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
+    check_bag_target(out, args.overwrite)
     started = time.perf_counter()
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
         result = simulate_experiment(
@@ -43,10 +48,10 @@ def run(args):
             overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n))
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
-    result['remarks'] = list(experiment.remarks(rig.valve))
-    remarks = ''.join(f'remark: {text}\n' for text in result['remarks'])
+    result['remarks'] = remarks
+    told = ''.join(f'remark: {text}\n' for text in remarks)
     emit(args, result, (
-        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig.name} '
-        f'({rig.valve}) in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{remarks}'
+        f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
+        f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{told}'
         f'next: pam report {result["bag"]}'))
     return EXIT_DONE

@@ -17,7 +17,9 @@
 import os
 
 from pam_actuation.cli.common import (
-    add_controller_options, default_controller, emit, EXIT_DONE, EXIT_FINDING, progress)
+    add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
+    default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
+from pam_actuation.cli.options import count, out_path, source
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
         'writes controller YAML, initial rules and report.')
@@ -28,38 +30,41 @@ CHECK = 'tuning_check'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', nargs='*', help='bags that say rig, controller and experiment')
-    parser.add_argument('--model', '--rig', dest='rig', default=None, metavar='NAME|FILE',
+    parser.add_argument('bag', type=source, nargs='*',
+                        help='bags that say rig, controller and experiment')
+    parser.add_argument('--model', '--rig', dest='rig', type=source, default=None,
+                        metavar='NAME|FILE',
                         help='model to tune on (default: the rig of the first bag)')
     parser.add_argument('--valve', metavar='ppr|hsv', default=None, help='valve type')
     parser.add_argument(
-        '--experiment', action='append', default=None, metavar='NAME|FILE',
+        '--experiment', type=source, action='append', default=None, metavar='NAME|FILE',
         help='experiment to tune for, may be repeated (default: those of the bags; without '
         f'bags {", ".join(EXPERIMENTS)})')
     parser.add_argument(
-        '--check', action='append', default=None, metavar='NAME|FILE',
+        '--check', type=source, action='append', default=None, metavar='NAME|FILE',
         help=f'experiment of the held-out check, may be repeated (default: {CHECK} and those of '
         'the search, with other noise)')
     add_controller_options(
         parser, 'that of the first bag, else sofc_ppr or sofc_hsv, after the valve; it tracks '
         'contraction')
-    parser.add_argument('--rollouts', type=int, default=3000, metavar='N',
+    parser.add_argument('--rollouts', type=count(10), default=3000, metavar='N',
                         help='budget of simulated runs of the search (default: %(default)s)')
-    parser.add_argument('--randomise', type=int, default=0, metavar='N',
+    parser.add_argument('--randomise', type=count(0, 1000), default=0, metavar='N',
                         help='tune on so many random rigs beside the model (default: 0)')
-    parser.add_argument('--patience', type=int, default=30, metavar='N',
+    parser.add_argument('--patience', type=count(0), default=30, metavar='N',
                         help='stop after so many generations without progress, 0 = never '
                         '(default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=-1, metavar='N',
+    parser.add_argument('--jobs', type=count(1, 1024, {-1: 'one a core'}), default=-1,
+                        metavar='N',
                         help='threads; -1 = one a core (default)')
-    parser.add_argument('--cluster', default=None, metavar='ADDRESS',
+    parser.add_argument('--cluster', type=source, default=None, metavar='ADDRESS',
                         help='run on a Dask scheduler (tcp://HOST:PORT) or a Ray cluster '
                         '(ray://HOST:PORT) instead')
-    parser.add_argument('--seed', type=int, default=0,
-                        help='seed of search, sensor noise and random rigs')
-    parser.add_argument('--out', default='tuned.yaml', metavar='FILE.yaml',
+    add_seed_option(parser, 'seed of search, sensor noise and random rigs')
+    parser.add_argument('--out', type=out_path, default='tuned.yaml', metavar='FILE.yaml',
                         help='controller to write; its rules and the report go beside it '
                         '(default: %(default)s)')
+    add_overwrite_option(parser)
 
 
 def run(args):
@@ -73,12 +78,14 @@ def run(args):
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
     from pam_sim import load_rig
     from pam_sim.errors import InputError
-    stem = _checked(args)
+    from pam_sim.files import whole_files
+    written = _targets(args)
     runs = [load_run(bag) for bag in args.bag]
+    note_implausible(args, runs, must_be_right=True)
     rig = load_rig(_rig_source(args, runs), valve=args.valve)
     controller = load_controller(
         args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
-        rig, rules_file=args.rules)
+        rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
     if tracked_by(controller) != CONTRACTION:
         raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
                          'contraction can be tuned', 'controller')
@@ -93,11 +100,12 @@ def run(args):
             held_out_rigs=others, patience=args.patience, cluster=args.cluster,
             learn_rules=not args.freeze)
     recordings = check_recordings(runs, rig, result.controller)
-    written = {'controller': args.out, 'report': f'{stem}.html'}
-    if result.controller.rules is not None:
-        written['rules'] = f'{stem}_rules.json'
-    result.save(args.out, written.get('rules'))
-    tuning_report(written['report'], result, recordings, rig, experiments, runs)
+    if result.controller.rules is None:
+        del written['rules']
+    with whole_files(os.path.dirname(os.path.abspath(args.out))) as folder:
+        files = {what: folder / os.path.basename(path) for what, path in written.items()}
+        result.save(files['controller'], files.get('rules'))
+        tuning_report(files['report'], result, recordings, rig, experiments, runs)
     emit(args, {**{key: os.fspath(path) for key, path in written.items()}, **result.to_dict(),
                 'recordings': [one.to_dict() for one in recordings]},
          '\n'.join([result.text(), *(f'  {text}' for one in recordings for text in one.lines()),
@@ -106,18 +114,14 @@ def run(args):
     return EXIT_DONE if result.improved and not wrong else EXIT_FINDING
 
 
-def _checked(args):
-    """Return the path of ``--out`` without its ending; raise InputError for bad options."""
-    from pam_sim.errors import InputError
-    for name, least in (('rollouts', 10), ('randomise', 0), ('patience', 0)):
-        if getattr(args, name) < least:
-            raise InputError(f'is {getattr(args, name)}; allowed is {least} or more', f'--{name}')
-    if args.jobs == 0:
-        raise InputError('is 0; allowed is 1 or more, or -1 for one a core', '--jobs')
-    folder = os.path.dirname(os.path.abspath(args.out))
-    if not os.path.isdir(folder):
-        raise InputError('the folder does not exist', folder)
-    return os.path.splitext(args.out)[0]
+def _targets(args):
+    """Return what will be written to which file; raise InputError where that cannot be."""
+    from pam_sim.files import check_file
+    check_file(args.out, args.overwrite, parents=False)
+    stem = os.path.splitext(args.out)[0]
+    targets = {'controller': args.out, 'report': f'{stem}.html', 'rules': f'{stem}_rules.json'}
+    check_outputs(args, *targets.values())
+    return targets
 
 
 def _first(runs, key):

@@ -14,8 +14,11 @@
 
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import (
+    add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
+from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
+from pam_sim.files import check_file
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
 EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'
@@ -26,25 +29,28 @@ def add_arguments(parser):
     parser.add_argument('what', choices=('rig', 'knee', 'exo'),
                         help='one muscle, a joint with two, two joints')
     parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
-    parser.add_argument('--model', default='', metavar='NAME',
+    parser.add_argument('--model', type=source, default=None, metavar='NAME',
                         help='rig or joint: preset, or path of a model file')
-    parser.add_argument('--controller', default='', metavar='NAME',
+    parser.add_argument('--controller', type=source, default=None, metavar='NAME',
                         help='controller preset or file, or none: one of your own commands the '
                              'pressure (default: that of valve and experiment)')
-    parser.add_argument('--experiment', default='', metavar='NAME',
+    add_other_rig_option(parser)
+    parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
-    parser.add_argument('--hardware', default='sim', metavar='NAME',
+    parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
                         help='rig only: sim, another name in config/hardware, or a file')
-    parser.add_argument('--record', default='', metavar='DIR', help='rig only: folder of a bag')
+    parser.add_argument('--record', type=out_path, default=None, metavar='DIR',
+                        help='rig only: folder of a bag')
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
-    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
-    parser.add_argument('--realtime-priority', type=int, choices=range(97), default=0,
+    parser.add_argument('--realtime-priority', type=count(0, 96), default=0,
                         metavar='N', help='of all nodes, 1 to 96 (default: none)')
-    parser.add_argument('--seconds', type=float, default=None, metavar='S',
+    parser.add_argument('--seconds', type=number(0.0, None, 's'), default=None, metavar='S',
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
-    parser.add_argument('--policy', metavar='FILE', default=None,
+    parser.add_argument('--policy', type=out_path, metavar='FILE', default=None,
                         help='start nothing; write the access policy of these nodes (SROS2)')
+    add_overwrite_option(parser, 'a policy that is there already')
 
 
 def run(args):
@@ -53,10 +59,16 @@ def run(args):
 
     Once all are active Ctrl-C is the ordinary end, exit code 0; before, it is an interruption.
     """
+    from pam_actuation.bags.place import check_bag_target
     from pam_actuation.interrupts import undisturbed
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
+    if args.policy is not None:
+        check_file(args.policy, args.overwrite, ours='Made from the code, as docs/security.md')
+    elif args.record:
+        check_bag_target(args.record)
     nodes = _nodes(args)
+    _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
     failure, problems, is_up = '', [], False
@@ -77,16 +89,28 @@ def run(args):
             problems = supervisor.finish()
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:
-        raise KeyboardInterrupt('stopped while the nodes started')
+        raise KeyboardInterrupt('the nodes were still starting')
     findings = list(dict.fromkeys(filter(None, [failure, *problems])))
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
     return EXIT_FINDING if failure or problems else EXIT_DONE
 
 
+def _tell_remarks(args):
+    """Say what a person should read before the experiment is played."""
+    if not args.experiment:
+        return
+    from pam_actuation.experiments import load_experiment
+    from pam_sim import load_rig
+    rig = None
+    if args.what == 'rig':
+        rig = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
+    tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
+
+
 def _write_policy(args, nodes):
     from pam_actuation.nodes.policy import policy
-    from pam_actuation.report.page import write_text
+    from pam_sim.files import write_text
     path = str(write_text(args.policy, policy(nodes)))
     emit(args, {'policy': path, 'nodes': len(nodes)}, f'policy of {len(nodes)} nodes: {path}')
     return EXIT_DONE
@@ -96,14 +120,14 @@ def _nodes(args):
     """Return the nodes that are asked for."""
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
-    options = {'valve': args.valve, 'controller': args.controller,
-               'experiment': args.experiment}
+    options = {'valve': args.valve, 'controller': args.controller or '',
+               'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig}
     if args.namespace is not None:
         options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     if args.what == 'rig':
-        return layouts.rig(hardware=args.hardware, record=args.record, **options)
+        return layouts.rig(hardware=args.hardware, record=args.record or '', **options)
     for name, given in (('--hardware', args.hardware != 'sim'), ('--record', args.record)):
         if given:
             raise InputError(f'is for a rig only, not for {args.what}', name)

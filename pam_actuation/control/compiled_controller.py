@@ -39,6 +39,8 @@ class CompiledController:
     """
 
     rules = None
+    made_for = None         # facts of the rig, see ``made_for``
+    other_rig = ''          # how the rig it runs on differs, if that was accepted
 
     def __init__(self, settings, state_size, rig_name=''):
         self.settings = settings

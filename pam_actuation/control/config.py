@@ -27,14 +27,16 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
     rules: learned.json           # optional: rules to start from, path relative to this file
 
 Written by ``to_yaml`` for recordings, which must not depend on anything else:
-``rig`` (identity), ``static_inverse`` (table) and ``initial_rules`` (content of a
-rule file); for an LQI controller instead its ``model`` and ``gains``, see ``lqi_files``.
+``rig`` (identity), ``made_for`` (what of the rig matters, see ``made_for``),
+``static_inverse`` (table) and ``initial_rules`` (content of a rule file); for an LQI
+controller instead its ``model`` and ``gains``, see ``lqi_files``.
 """
 
 import os
 
 import numpy as np
 from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
+from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, mode_to_mapping, read_mode
 from pam_actuation.control.modes.tracked import FORCE, tracked_by
 from pam_actuation.control.pid import PidController
@@ -46,7 +48,7 @@ from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
 _KINDS = ('sofc', 'pid', 'lqi')
-_KEYS = ('controller', 'rig', 'settings', *MODE_KEYS)
+_KEYS = ('controller', 'rig', 'made_for', 'settings', *MODE_KEYS)
 _OWN_KEYS = {
     'sofc': ('static_inverse', 'rules', 'initial_rules'), 'pid': ('static_inverse',),
     'lqi': ('model', 'gains')}
@@ -59,7 +61,7 @@ def rig_identity(rig):
     return f'{rig.name}/{getattr(rig, "flexor", rig).valve}'
 
 
-def load_controller(name_or_path_or_text, rig=None, rules_file=None):
+def load_controller(name_or_path_or_text, rig=None, rules_file=None, accept_other_rig=False):
     """
     Build a controller.
 
@@ -72,6 +74,9 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
         be None for text that brings its own ``static_inverse``.
     rules_file : str or os.PathLike, optional
         File of rules to start from instead of those of the controller's text.
+    accept_other_rig : bool
+        Take a controller that was made for another rig too; its ``other_rig`` says how the
+        rigs differ.
 
     Returns
     -------
@@ -81,7 +86,7 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
     ------
     InputError
         Unknown preset, missing file, unknown key, value out of range (each with file and
-        line), rules that do not fit.
+        line), rules that do not fit, a controller made for another rig.
 
     """
     text = os.fspath(name_or_path_or_text)
@@ -93,7 +98,7 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
         path = find_config('controllers', text)
         folder = os.path.dirname(path)
         tree = load_yaml(path)
-    controller = controller_from_tree(tree, rig, folder)
+    controller = controller_from_tree(tree, rig, folder, accept_other_rig)
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))
@@ -101,9 +106,19 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None):
     return controller
 
 
-def controller_from_tree(tree, rig=None, folder='.'):
+def controller_from_tree(tree, rig=None, folder='.', accept_other_rig=False):
     """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
     tree.check_keys(_ALL_KEYS)
+    if rig is None:
+        facts, other_rig = read_facts(tree) if 'made_for' in tree else None, ''
+    else:
+        facts, other_rig = check_made_for(tree, rig, accept_other_rig)
+    controller = _built(tree, rig, folder)
+    controller.made_for, controller.other_rig = facts, other_rig
+    return controller
+
+
+def _built(tree, rig, folder):
     kind = tree.require('controller', str, choices=_KINDS)
     for key in tree:
         if key not in _KEYS + _OWN_KEYS[kind]:
@@ -174,8 +189,9 @@ def controller_to_yaml(controller, rules_file=None):
     if 'index_form' in settings:
         settings['index_form'] = _INDEX_FORMS[int(round(settings['index_form']))]
     data = {
-        'controller': controller.kind, 'rig': controller.rig_name, 'settings': settings,
-        **mode_to_mapping(controller)}
+        'controller': controller.kind, 'rig': controller.rig_name,
+        **({'made_for': dict(controller.made_for)} if controller.made_for else {}),
+        'settings': settings, **mode_to_mapping(controller)}
     if controller.kind == 'lqi':
         data.update(lqi_to_mapping(controller))
     elif tracked_by(controller) != FORCE:       # there the surface says it

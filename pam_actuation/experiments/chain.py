@@ -141,6 +141,26 @@ class Chain:
         values = [self.at(self.duration_s * k / count)[0] for k in range(count + 1)]
         return min(values), max(values)
 
+    def jumps(self, least):
+        """
+        Return where the value jumps by more than ``least`` although no step is asked for.
+
+        A list of (time [s], name of the primitive that begins there, value before, value after).
+        """
+        found, before = [], self.domain.rest
+        for (name, _), segment, start in zip(self._raw, self.segments, self._starts):
+            after = segment.at(0.0)[0]
+            if abs(after - before) > least and not segment.JUMPS:
+                found.append((start, name, before, after))
+            before = segment.end
+        return found
+
+    def share_above(self, limit):
+        """Return the share of the time, 0 to 1, in which the value is above a limit."""
+        count = min(max(round(self.duration_s / CHECK_EVERY_S), 1), _MOST_CHECKS)
+        return sum(self.at(self.duration_s * k / count)[0] > limit
+                   for k in range(count + 1)) / (count + 1)
+
     def plain(self):
         """Return the list of segments as it stands in a file."""
         return [{name: arguments} for name, arguments in self._raw]

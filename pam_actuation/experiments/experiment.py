@@ -15,9 +15,10 @@
 """An experiment file: a domain and a chain of primitives, checked before it runs."""
 
 from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S, TRACKED
-from pam_actuation.experiments.limits import check_rig
+from pam_actuation.experiments.limits import check_rig, jump_remarks, reach_remarks
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
+from pam_sim.files import check_name
 from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located
 
 KEYS = (
@@ -117,13 +118,26 @@ class Experiment:
         """Raise InputError where the experiment asks for what the rig cannot do."""
         check_rig(self, rig)
 
-    def remarks(self, valve):
-        """Return sentences a person should read about this experiment on this valve."""
+    def remarks(self, valve, rig=None, controller=None):
+        """
+        Return sentences a person should read before this experiment runs.
+
+        Parameters
+        ----------
+        valve : str
+            Valve of the rig.
+        rig : pam_sim.rig.Rig, optional
+            Then also what of the reference it cannot reach.
+        controller : object, optional
+            May keep the pressure lower than the driver does.
+
+        """
+        said = ()
         if valve == 'ppr' and any(s.SHUTS_VALVE for s in self.chain.segments):
-            return (
+            said = (
                 'decay: a pressure regulator has no shut state; it holds the last command and '
                 'refills what leaks, so this recording shows nothing of a leak',)
-        return ()
+        return (*said, *jump_remarks(self), *reach_remarks(self, rig, controller))
 
     def to_dict(self):
         """Return the experiment as plain data, as it stands in a file."""
@@ -149,7 +163,8 @@ def load_experiment(source):
     Raises
     ------
     InputError
-        No such experiment, or a mistake in the file, with file and line.
+        No such experiment, or a mistake in the file, with file and line; a name that cannot be
+        that of a file.
 
     """
     if '\n' not in str(source):
@@ -157,7 +172,8 @@ def load_experiment(source):
     data = load_yaml(source)
     data.check_keys(KEYS)
     return Experiment(
-        data.require('name', str), data.get('description', str, ''),
+        check_name(data.require('name', str), '`name`', data.where('name')),
+        data.get('description', str, ''),
         data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
         _segments(data.require('segments', list)), data.where('segments'),
         _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())),

@@ -21,6 +21,10 @@ from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
+# Design values: of a contraction [m] that friction may take, and of jumps worth a word.
+FRICTION_PA = 30e3
+LEAST_JUMP = {'contraction': 5e-4, 'force': 2.0, 'joint_angle': 0.02}
+_SHOWN = {'contraction': (1e3, 'mm'), 'force': (1.0, 'N'), 'joint_angle': (1.0, 'rad')}
 _VALVE_OF = {'ppr_voltage': 'ppr', 'hsv_duty': 'hsv'}
 
 
@@ -67,6 +71,47 @@ def check_tracked(experiment, controller):
         raise InputError(
             f'is in {experiment.domain}; the controller has `mode: {tracked.mode}`',
             f'experiment "{experiment.name}"')
+
+
+def highest_gauge_pa(rig, controller=None):
+    """Return the highest pressure [Pa gauge] that driver, supply and controller allow."""
+    config = driver_config(rig)
+    limits = [config.safety.max_pressure_gauge_pa]
+    if rig.valve == 'hsv':
+        limits.append(config.hsv.supply_pa - P_ATM_PA)
+    if controller is not None and 'max_pressure_gauge_pa' in controller.settings:
+        limits.append(controller.settings['max_pressure_gauge_pa'])
+    return min(limits)
+
+
+def reach_remarks(experiment, rig, controller=None):
+    """Return a sentence if a reference asks for more than the rig holds at its limit."""
+    if rig is None or experiment.domain != 'contraction' or hasattr(rig, 'flexor') \
+            or not LOADS[rig.load].MOVES_FREELY:
+        return ()
+    gauge_pa = highest_gauge_pa(rig, controller)
+    worst_m = experiment.chain.extremes()[1]
+    if rig.static_pressure_pa(worst_m) + FRICTION_PA <= P_ATM_PA + gauge_pa:
+        return ()
+    reach_m = float(rig.static_contraction_m(P_ATM_PA + gauge_pa))
+    share = experiment.chain.share_above(reach_m)
+    time = f'beyond that for {100 * share:.0f} % of the time' if share else 'too near to that'
+    return (f'the reference asks for up to {1e3 * worst_m:.1f} mm; at {1e-3 * gauge_pa:.0f} kPa '
+            f'gauge this rig holds {1e3 * reach_m:.1f} mm at most, less with friction; it is '
+            f'{time}, where the error says nothing of the controller',)
+
+
+def jump_remarks(experiment):
+    """Return a sentence on every jump of a reference that no step asks for."""
+    if experiment.domain not in LEAST_JUMP:
+        return ()
+    factor, unit = _SHOWN[experiment.domain]
+    return tuple(
+        f'the reference jumps from {factor * before:.4g} to {factor * after:.4g} {unit} at '
+        f'{start:.4g} s, where `{name}` begins; ramp to its start first, or use `step` if a jump '
+        'is meant'
+        for start, name, before, after in experiment.chain.jumps(LEAST_JUMP[experiment.domain])
+        if start < experiment.duration_s)
 
 
 def _check_stroke(experiment, rig, place):

@@ -26,6 +26,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 
+from pam_actuation.bags.place import check_bag_target
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.parallel import in_processes
@@ -53,7 +54,7 @@ def bag_name(load_n):
     return f'load_{load_n:05.1f}_n'.replace('.', '_')
 
 
-def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT):
+def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT, overwrite=False):
     """
     Simulate one bag of the series.
 
@@ -69,6 +70,8 @@ def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT):
         Seed of the series; each load adds its weight in newtons.
     experiment : str
         Name or file of the experiment, in the pressure domain.
+    overwrite : bool
+        Whether a bag that is there may be replaced.
 
     Returns
     -------
@@ -80,12 +83,12 @@ def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT):
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     mass = max(load_n / GRAVITY_M_PER_S2, HOOK_KG)
     simulate_experiment(load_experiment(experiment), rig.with_(parameters={'mass_kg': mass}),
-                        None, out, seed=1000 * seed + int(round(load_n)))
+                        None, out, seed=1000 * seed + int(round(load_n)), overwrite=overwrite)
     return os.fspath(out)
 
 
 def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPERIMENT,
-                   progress=None):
+                   progress=None, overwrite=False):
     """
     Simulate one bag per load, in parallel processes; return their paths in the order of loads.
 
@@ -94,7 +97,7 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
     rig : pam_sim.rig.Rig
         With a hanging mass.
     folder : path
-        Where the bags go; none of them may exist.
+        Where the bags go.
     seed, experiment
         See ``simulate_load``.
     loads_n : iterable of float
@@ -103,11 +106,14 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
         Processes.
     progress : callable, optional
         Called with the number of bags done.
+    overwrite : bool
+        Whether bags that are there may be replaced.
 
     Raises
     ------
     InputError
-        A rig without a hanging mass, a wrong experiment, or a bag that exists.
+        A rig without a hanging mass, a wrong experiment, a bag that exists or cannot be
+        written.
 
     """
     if 'mass_kg' not in rig.parameters:
@@ -120,11 +126,13 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
                          'loads')
     targets = [Path(folder) / bag_name(load) for load in loads]
     there = [path for path in targets if path.exists()]
-    if there:
+    if there and not overwrite:
         raise InputError('exists already; give another folder', str(there[0]))
+    for path in targets:
+        check_bag_target(path, overwrite)
     rig.pack()     # compiled once here, or every process would compile for itself
     runs = in_processes(jobs, (
-        joblib.delayed(simulate_load)(rig, float(load), path, seed, experiment)
+        joblib.delayed(simulate_load)(rig, float(load), path, seed, experiment, overwrite)
         for load, path in zip(loads, targets)))
     bags = []
     for bag in runs:

@@ -24,7 +24,9 @@ from collections import Counter, deque
 import heapq
 import os
 
+from pam_actuation import interrupts
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
@@ -34,6 +36,7 @@ from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.plant_loop import PlantLoop
+from pam_sim.files import cannot_write
 
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
@@ -57,10 +60,12 @@ class _Recorder:
         self._writer.write(name, encode(topic, message), now_ns, now_ns)
         self.counts[name] += 1
 
-    def published(self):
-        """Return the counts as a node states them in its last status."""
-        return tuple((f'published.{name}', str(count)) for name, count in self.counts.items()
-                     if not name.endswith('/diagnostics'))
+    def finish(self, now_ns, said):
+        """Write the last status: the counts as a node states them."""
+        published = tuple((f'published.{name}', str(count)) for name, count in self.counts.items()
+                          if not name.endswith('/diagnostics'))
+        self.write('diagnostics', Status(
+            now_ns, 0, f'{self._namespace}/simulation', said, published), now_ns)
 
 
 class _Loops:
@@ -92,6 +97,7 @@ class _Loops:
         for topic, take in takers:
             self._takers[topic].append(take)
         self._on_the_way = deque()
+        self.reached_ns = 0
         self._status_ns = -STATUS_EVERY_NS
 
     def send(self, topic, message, now):
@@ -141,14 +147,21 @@ class _Loops:
             self._status_ns = now
             self.recorder.write('diagnostics', status, now)
 
-    def run(self, ticks, end, progress):
-        """Call every loop when it is due, in order of time, until the experiment is over."""
+    def run(self, ticks, end, progress, stopped):
+        """
+        Call every loop when it is due, in order of time, until the experiment is over.
+
+        Between two ticks ``stopped`` is asked; KeyboardInterrupt once it says so.
+        """
         reported = 0
         for now, k in heapq.merge(*(
                 _due(k, ticks.get(name), rate_hz, 0 if name == 'reference' else self.lead_ns, end)
                 for k, (name, rate_hz, _) in enumerate(self.loops))):
+            if stopped():
+                raise KeyboardInterrupt
             self.deliver(now)
             self.loops[k][2](now)
+            self.reached_ns = now - START_NS
             if progress and (now - START_NS) // 1_000_000_000 > reported:
                 reported = (now - START_NS) // 1_000_000_000
                 progress(reported)
@@ -187,7 +200,7 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     learning : bool
         False keeps the rules frozen.
     overwrite : bool
-        Replace an existing bag.
+        Replace the bag that is there, once this one is whole.
     progress : callable, optional
         Called with simulated seconds done.
     namespace : str
@@ -208,24 +221,53 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
     ------
     InputError
         The experiment asks for what the rig cannot do or the controller does not track; the
-        bag directory exists.
+        bag directory exists or cannot be written. Nothing is left behind then.
+    KeyboardInterrupt
+        Ctrl-C or SIGTERM; the bag holds what was simulated and says that it stopped early.
 
     """
     experiment.check_reachable(rig)
     check_tracked(experiment, controller)
     metadata = experiment_metadata(
-        experiment=experiment.to_yaml(), rig=rig.to_yaml(),
-        controller=controller.to_yaml() if controller is not None else '', valve=rig.valve,
-        experiment_name=experiment.name, seed=seed)
-    writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
-    recorder = _Recorder(writer, namespace)
+        experiment=experiment, rig=rig.to_yaml(),
+        controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
+        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)))
+    writer = None
     try:
-        loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns)
-        end = START_NS + round(experiment.duration_s * 1e9)
-        loops.run(ticks or {}, end, progress)
-        recorder.write('diagnostics', Status(
-            end, 0, f'{namespace}/simulation', 'finished', recorder.published()), end)
+        with interrupts.held() as stopped:
+            writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
+            recorder = _Recorder(writer, namespace)
+            loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns)
+            ending = _recorded(loops, experiment, ticks or {}, progress, stopped)
+            if not ending.reached_s:
+                raise KeyboardInterrupt
+            writer.add_to_experiment(ending.texts())
+            if ending.early:
+                writer.replace_nothing()
+            writer.close()
+    except OSError as error:
+        raise cannot_write(out, error) from None
     finally:
-        writer.close()
+        if writer is not None:
+            writer.discard()        # what is not finished; a whole bag stays
+    if stopped() and not ending.early:
+        raise KeyboardInterrupt(f'the bag {writer.directory} is whole')
+    if ending.early:
+        raise KeyboardInterrupt(
+            f'the bag {writer.directory} holds {ending.reached_s:.1f} of {ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
+
+
+def _recorded(loops, experiment, ticks, progress, stopped):
+    """Run the loops to the end or to an interrupt; return the Ending."""
+    end = START_NS + round(experiment.duration_s * 1e9)
+    ended, said = COMPLETE, 'finished'
+    try:
+        loops.run(ticks, end, progress, stopped)
+        reached_s = experiment.duration_s
+    except KeyboardInterrupt:
+        ended, said, reached_s = INTERRUPTED, 'interrupted', max(loops.reached_ns, 0) * 1e-9
+        end = START_NS + max(loops.reached_ns, 0)
+    loops.recorder.finish(end, said)
+    return Ending(experiment.duration_s, reached_s, ended)

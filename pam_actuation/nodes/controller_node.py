@@ -27,6 +27,8 @@ from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
 MOST_WRONG_STEPS = 20
+ACCEPT_OTHER_RIG = NodeParameter(
+    'accept_other_rig', False, 'Take a controller file that was made for another rig.')
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
 INPUTS = ('reference_trajectory', 'reference', 'followed_pressure', *MEASURED)
@@ -56,6 +58,7 @@ class ControllerNode(ManagedNode):
         NodeParameter(
             'rig', 'dmsp_5_300_realistic', 'Rig the controller is made for: preset or path.'),
         NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        ACCEPT_OTHER_RIG,
     )
 
     learning = False
@@ -70,8 +73,12 @@ class ControllerNode(ManagedNode):
         valve = self.value('valve_type')
         rig = load_rig(self.value('rig'), valve=valve)
         name = self.value('controller') or self.DEFAULT_CONTROLLERS[valve]
-        load_controller(name, rig).step(0.0, 0.0, 0.0, 0.0, 0.0)    # compiled before time counts
-        self.controller = load_controller(name, rig)
+        accept = self.value('accept_other_rig')
+        spare = load_controller(name, rig, accept_other_rig=accept)
+        spare.step(0.0, 0.0, 0.0, 0.0, 0.0)         # compiled before time counts
+        self.controller = load_controller(name, rig, accept_other_rig=accept)
+        if self.controller.other_rig:
+            self.get_logger().warning(f'the controller was {self.controller.other_rig}')
         self.loop = ControllerLoop(self.controller)
         self._refusals = RefusalLog(self.get_logger())
         self.add_publisher('pressure_command')

@@ -14,14 +14,21 @@
 
 """The recorder on ROS: every message of the rig, as it came, into a bag."""
 
+import contextlib
 import importlib
 import json
+import os
 import sys
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.bags import layout
-from pam_actuation.bags.codecs import TOPIC_TYPES
+from pam_actuation.bags.codecs import decode, TOPIC_TYPES
+from pam_actuation.bags.ending import ENDED_FILE
+from pam_actuation.bags.ending import Ending
+from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.ending import EndWatch
+from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter, check_limits
@@ -34,7 +41,9 @@ from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.plant_simulator import MAX_SEED
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 
+UNKNOWN_VALVE, UNKNOWN_SEED = 'unknown', -1
 TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
 CHECK_EVERY = 10            # ticks between two looks at the counts
 QUIET_S = 0.15              # nothing for this long: all that was sent has arrived
@@ -57,7 +66,8 @@ class ExperimentRecorder(ManagedNode):
     FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (
         NodeParameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
-        NodeParameter('overwrite', False, 'Replace an existing bag.'),
+        NodeParameter(
+            'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
         NodeParameter(
             'topics', list(TOPIC_TYPES), 'Topics to record, relative to the namespace '
             '(diagnostics is /diagnostics).'),
@@ -75,11 +85,19 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter(
             'metadata_file', '', 'JSON file of texts for the record pam_experiment. Empty: '
             'made from the parameters below.'),
+        NodeParameter(
+            'notes_folder', '', 'Folder in which whoever started this node may say why the run '
+            'ended (ended.json) and in which the node says what it recorded (recorded.json). '
+            'Empty: none.'),
         NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
         NodeParameter('rig', '', 'Rig preset, or path of its file.'),
         NodeParameter('controller', '', 'Controller preset, or path of its file.'),
-        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
-        NodeParameter('seed', 0, 'Seed of the simulated sensors.', 0, MAX_SEED),
+        NodeParameter(
+            'valve_type', UNKNOWN_VALVE, 'Valve of the rig; unknown: that of the rig, else the '
+            'bag does not say it.', choices=('ppr', 'hsv', UNKNOWN_VALVE)),
+        NodeParameter(
+            'seed', UNKNOWN_SEED, 'Seed of the simulated sensors; -1: none, the bag does not '
+            'say one.', UNKNOWN_SEED, MAX_SEED),
     )
 
     core = None
@@ -127,19 +145,23 @@ class ExperimentRecorder(ManagedNode):
                     return json.load(stream)
             except (OSError, ValueError) as error:
                 raise InputError(f'cannot be read: {error}', path) from None
-        valve = self.value('valve_type')
+        valve, seed = self.value('valve_type'), self.value('seed')
+        valve = '' if valve == UNKNOWN_VALVE else valve
         experiment = rig = controller = None
         if self.value('experiment'):
             from pam_actuation.experiments import load_experiment
             experiment = load_experiment(self.value('experiment'))
         if self.value('rig'):
             from pam_sim import load_rig
-            rig = load_rig(self.value('rig'), valve=valve)
+            rig = load_rig(self.value('rig'), valve=valve or None)
         if self.value('controller'):
             from pam_actuation.control.config import load_controller
-            controller = load_controller(self.value('controller'), rig)
+            # A recorder refuses none: it says which one ran.
+            controller = load_controller(self.value('controller'), rig, accept_other_rig=True)
         return experiment_metadata(
-            experiment, rig, controller, valve, self.value('seed'), origin='live')
+            experiment, rig, controller, valve, None if seed == UNKNOWN_SEED else seed,
+            origin='live', remarks='\n'.join(
+                experiment.remarks(rig.valve, rig, controller)) if experiment and rig else '')
 
     def start(self):
         """Open the bag; wait until the publishers asked for are connected."""
@@ -149,6 +171,7 @@ class ExperimentRecorder(ManagedNode):
             max_file_bytes=self.value('max_bagfile_size_bytes'),
             max_file_s=self.value('max_bagfile_duration_s'))
         self.core = RecorderCore(writer)
+        self.watch = EndWatch(self.get_namespace().rstrip('/'))
         self.known = set()
         if self._recorded or not self.value('autostart'):
             for source in self.sources.values():
@@ -188,8 +211,7 @@ class ExperimentRecorder(ManagedNode):
         An experiment without a record is not worth its risk; whoever started the rig sees
         this node end and stops the others, which vents.
         """
-        summary = self.core.close()
-        self.core = None
+        summary = self._close()
         self.fail(f'{summary.write_error} ({summary.written} messages kept, '
                   f'{summary.dropped} not written)')
 
@@ -215,24 +237,53 @@ class ExperimentRecorder(ManagedNode):
                 self.core.add_topic(name, self.types[topic])
                 self.known.add(name)
             self.core.receive_all(name, messages)
+            if topic == 'diagnostics':
+                self._listen(messages)
             taken += len(messages)
         return taken
+
+    def _listen(self, messages):
+        """Follow how the run goes by what the other nodes say."""
+        for data, _ in messages:
+            with contextlib.suppress(InputError):
+                self.watch.hear(decode('diagnostics', data))
+
+    def _ending(self):
+        """Return how the run ended, by what was heard and by who started this node."""
+        told = None
+        if self.value('notes_folder'):
+            path = os.path.join(self.value('notes_folder'), ENDED_FILE)
+            with contextlib.suppress(OSError, ValueError, TypeError), open(path) as stream:
+                told = Ending(**json.load(stream))
+        return self.watch.ending(ending_of(self.metadata).planned_s, told)
+
+    def _close(self):
+        """Finish the bag; return the summary."""
+        summary = self.core.close(self._ending())
+        self.core = None
+        if self.value('notes_folder'):
+            try:
+                write_text(os.path.join(self.value('notes_folder'), RECORDED_FILE),
+                           json.dumps(summary.to_dict()))
+            except InputError as error:
+                self.get_logger().warning(str(error))
+        return summary
 
     def stop(self):
         """Take the last messages, finish the bag, say whether it is complete."""
         if self.core is None:
             return
         self._take_last()
-        summary = self.core.close()
-        self.core = None
+        summary = self._close()
         if summary.complete:
             self.get_logger().info(
-                f'{summary.written} messages recorded, none lost: {summary.path}')
+                f'{summary.written} messages recorded, none lost{_before(summary)}: '
+                f'{summary.path}')
             return
         self.result_code = 1
         self.get_logger().error(summary.write_error or (
             f'{summary.lost} messages lost and {summary.dropped} dropped, '
-            f'{summary.written} recorded: {summary.path}'))
+            f'{summary.written} recorded{_before(summary)}: {summary.path}'))
 
     def _take_last(self):
         begin = last = time.monotonic()
@@ -261,6 +312,12 @@ class ExperimentRecorder(ManagedNode):
             if counts.lost:
                 rows.append((f'lost.{name}', counts.lost))
         return (*values, *rows)
+
+
+def _before(summary):
+    """Return in words how many messages came too early for the recorder, '' for none."""
+    early = sum(counts.missed_at_start or 0 for counts in summary.counts.values())
+    return f', {early} sent before the recorder was connected' if early else ''
 
 
 def parse_extra_topic(text):

@@ -18,6 +18,7 @@ import sys
 
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.controller_node import ACCEPT_OTHER_RIG
 from pam_actuation.nodes.controller_node import FOLLOWING
 from pam_actuation.nodes.controller_node import report_reason
 from pam_actuation.nodes.learning_switch import LearningSwitch
@@ -57,6 +58,7 @@ class JointNode(LearningSwitch, ManagedNode):
         NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint the controller is made for: '
                       'preset or path.'),
         NodeParameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
+        ACCEPT_OTHER_RIG,
         NodeParameter(
             'learning', True, 'Whether the rules change while running.', live=True),
     )
@@ -73,9 +75,13 @@ class JointNode(LearningSwitch, ManagedNode):
         valve = self.value('valve_type')
         joint = load_joint(self.value('joint'), valve=valve)
         name = self.value('controller') or joint_preset_for(joint, valve)
-        load_controller(name, joint).step(0.0, 0.0, 0.0, 0.0, 0.0)  # compiled before time counts
-        self.loop = JointControllerLoop(
-            load_controller(name, joint), joint, self.value('muscle'))
+        accept = self.value('accept_other_rig')
+        spare = load_controller(name, joint, accept_other_rig=accept)
+        spare.step(0.0, 0.0, 0.0, 0.0, 0.0)         # compiled before time counts
+        controller = load_controller(name, joint, accept_other_rig=accept)
+        if controller.other_rig:
+            self.get_logger().warning(f'the controller was {controller.other_rig}')
+        self.loop = JointControllerLoop(controller, joint, self.value('muscle'))
         self._description = self.create_publisher(String, 'robot_description', qos.LATCHED)
         self._description.publish(String(data=joint_urdf(joint, self.value('muscle'))))
         self._commands = [f'{side}/pressure_command' for side in SIDES]

@@ -16,13 +16,13 @@
 
 import sys
 
+from pam_actuation.bags.ending import FINISHED
+from pam_actuation.bags.ending import PLAYING
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
-
-FINISHED = 'finished'      # beginning of the diagnostic message once the experiment is over
 
 
 class ReferenceGenerator(ManagedNode):
@@ -93,7 +93,7 @@ class ReferenceGenerator(ManagedNode):
         for topic, plain in self.loop.tick(now_ns).items():
             self.send(topic, plain)
         if not self.loop.finished(now_ns):
-            self.diagnostics.update(OK, f'playing {self.experiment.name}')
+            self.diagnostics.update(OK, f'{PLAYING} {self.experiment.name}')
             return
         self.diagnostics.update(OK, f'{FINISHED} {self.experiment.name}')
         if self.value('exit_when_finished'):

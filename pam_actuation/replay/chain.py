@@ -230,6 +230,6 @@ def _controller(run, rig, controller):
         return None
     run.require('controller_state')
     run.require('reference')
-    if controller is None:
-        controller = own
+    if controller is None:      # what ran is repeated, whatever it was made for
+        return load_controller(own, rig, accept_other_rig=True)
     return controller if hasattr(controller, 'step') else load_controller(controller, rig)

@@ -16,16 +16,17 @@
 
 from dataclasses import dataclass
 import os
-import tempfile
 
 import numpy as np
 
+from pam_actuation.bags.ending import early_sentences
 from pam_actuation.replay.chain import replay_chain
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.replay.difference import difference
 from pam_actuation.replay.driver import replay_driver
 from pam_actuation.replay.plant import replay_plant
 from pam_sim.errors import InputError
+from pam_sim.files import whole_file
 
 PARTS = ('controller', 'driver', 'plant')
 
@@ -51,6 +52,8 @@ class Replay:
         True if another controller than the recorded one was asked for.
     start_ns : int
         First stamp of the recording; differences are placed in seconds after it.
+    remarks : tuple of str
+        Sentences on the recording itself, such as that it stopped early.
 
     """
 
@@ -61,6 +64,7 @@ class Replay:
     notes: dict = None
     counterfactual: bool = False
     start_ns: int = 0
+    remarks: tuple = ()
 
     @property
     def unexpected_difference(self):
@@ -77,7 +81,7 @@ class Replay:
 
     def to_dict(self):
         """Return plain data for ``--json``."""
-        out = {'counterfactual': self.counterfactual}
+        out = {'counterfactual': self.counterfactual, 'remarks': list(self.remarks)}
         if self.controller is not None:
             out['controller'] = {
                 'ticks': int(len(self.controller.recorded_pa)),
@@ -101,6 +105,7 @@ class Replay:
             if getattr(self, name) is not None:
                 lines.extend(getattr(self, name).lines())
         lines.extend(f'{name}: not replayed, {note}' for name, note in (self.notes or {}).items())
+        lines.extend(f'remark: {text}' for text in self.remarks)
         return '\n'.join(lines)
 
     def _controller_lines(self):
@@ -126,18 +131,8 @@ class Replay:
         for part in (self.driver, self.plant, self.chain):
             if part is not None:
                 arrays.update(part.arrays())
-        folder = os.path.dirname(os.path.abspath(path))
-        if not os.path.isdir(folder):
-            raise InputError('the folder does not exist', folder)
-        handle, temporary = tempfile.mkstemp(dir=folder, suffix='.npz')
-        os.close(handle)
-        try:
+        with whole_file(path, suffix='.npz', parents=False) as temporary:
             np.savez(temporary, **arrays)
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-        finally:
-            if os.path.exists(temporary):
-                os.unlink(temporary)
 
 
 def replay_run(run, controller=None, only=None, chain=False):
@@ -165,7 +160,8 @@ def replay_run(run, controller=None, only=None, chain=False):
         What was asked for cannot be replayed, or nothing can; the controller is unusable.
 
     """
-    result = Replay(counterfactual=controller is not None, start_ns=run.start_ns, notes={})
+    result = Replay(counterfactual=controller is not None, start_ns=run.start_ns, notes={},
+                    remarks=tuple(early_sentences([run])))
     if chain:
         result.chain = replay_chain(run, controller)
         return result

@@ -22,7 +22,7 @@ from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
 
-def changed_controller(run, wanted):
+def changed_controller(run, wanted, accept_other_rig=False):
     """
     Return the controller that ``--set`` asks for, None if it asks for nothing.
 
@@ -33,12 +33,14 @@ def changed_controller(run, wanted):
     wanted : sequence of str
         Each a controller (preset or YAML file; at most one) or ``NAME=VALUE`` with the name of
         a setting.
+    accept_other_rig : bool
+        Take a controller that was made for another rig than the recorded one.
 
     Raises
     ------
     InputError
-        Two controllers, an unknown setting, a value that is no number or out of range, or a
-        recording without a controller to change.
+        Two controllers, an unknown setting, a value that is no number or out of range, a
+        recording without a controller to change, or a controller made for another rig.
 
     """
     if not wanted:
@@ -50,7 +52,8 @@ def changed_controller(run, wanted):
     base = run.metadata.get('controller')
     if files:
         rig = run.metadata.get('rig')
-        controller = load_controller(files[0], load_rig(rig) if rig else None)
+        controller = load_controller(
+            files[0], load_rig(rig) if rig else None, accept_other_rig=accept_other_rig)
         if not changes:
             return controller
         base = controller.to_yaml()

@@ -28,9 +28,9 @@ from pathlib import Path
 import numpy as np
 
 from pam_actuation.report import figures, svg
-from pam_actuation.report.page import paragraph, plot, render, Section, table, write_text
+from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
-from pam_sim.errors import InputError
+from pam_sim.files import whole_files, write_text
 
 ISOBARS = 6                 # pressures in the figure of force against contraction
 HOLD_COLUMNS = ('load_n', 'load_u_n', 'branch', 'pressure_pa', 'pressure_u_pa',
@@ -87,6 +87,10 @@ CAPTIONS = {
     'figure_4_7': 'Contraction over pressure and loading (Figure 4.7).'}
 
 
+FILES = ('characterise.json', 'report.html', 'holds.csv', 'lookup.csv',
+         *(f'{name}.svg' for name in FIGURES))
+
+
 def save_characterisation(result, out_dir):
     """
     Write the folder of a result; return {name: path} of what was written.
@@ -94,12 +98,10 @@ def save_characterisation(result, out_dir):
     Raises
     ------
     InputError
-        ``out_dir`` is a file.
+        ``out_dir`` is a file or cannot be written.
 
     """
     out = Path(out_dir)
-    if out.exists() and not out.is_dir():
-        raise InputError('is a file; give a folder for the results', str(out))
     pictures = {name: draw(result.surfaces) for name, draw in FIGURES.items()}
     pictures = {name: text for name, text in pictures.items() if text is not None}
     texts = {'characterise.json': json.dumps(document(result), allow_nan=False) + '\n',
@@ -107,12 +109,12 @@ def save_characterisation(result, out_dir):
     texts.update({f'{name}.svg': text for name, text in pictures.items()})
     if result.loads:
         texts['holds.csv'] = holds_csv(result)
-    out.mkdir(parents=True, exist_ok=True)
-    written = {name: str(write_text(out / name, text)) for name, text in texts.items()}
-    if result.surfaces.air_mass_kg is not None:
-        result.table().write_csv(out / 'lookup.csv')
-        written['lookup.csv'] = str(out / 'lookup.csv')
-    return written
+    with whole_files(out) as folder:
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        if result.surfaces.air_mass_kg is not None:
+            result.table().write_csv(folder / 'lookup.csv')
+        return {path.name: str(out / path.name) for path in folder.iterdir()}
 
 
 def summary(result):

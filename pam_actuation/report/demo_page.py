@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 from pam_actuation.report.metrics import run_metrics
 from pam_actuation.report.page import (
-    paragraph, render, Section, signed, table, write_text)
+    paragraph, render, Section, signed, table)
 from pam_actuation.report.pages import FOOTER, muscle_volume, summary
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
@@ -29,6 +29,7 @@ from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.sections.tuning import tuning_section
+from pam_sim.files import write_text
 
 LEAD = ('A pneumatic muscle lifts a mass along a sine while a self-organizing fuzzy controller '
         'rewrites its own rules. Every part of the rig ran as its own process and talked over '

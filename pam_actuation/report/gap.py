@@ -22,15 +22,17 @@ not at all.
 import json
 import os
 from pathlib import Path
+import shlex
 import tempfile
 
 import numpy as np
 
 from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import next_experiment
 from pam_actuation.messages import Contraction, Force, Pressure
-from pam_actuation.report.page import render, write_text
+from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
 from pam_actuation.report.sections.provenance import provenance
@@ -38,6 +40,7 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
+from pam_sim.files import check_folder, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import check_health, recorded_valve
@@ -45,11 +48,12 @@ from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
 MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
+FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
 
-def write_gap(runs, model, out_dir, certify=None, **options):
+def write_gap(runs, model, out_dir, certify=None, of='', **options):
     """
     Find the gap between recordings and a model and write the result folder.
 
@@ -63,6 +67,8 @@ def write_gap(runs, model, out_dir, certify=None, **options):
         Folder for the results; made if needed.
     certify : pam_sim.run.Run, optional
         Recording for the proof; by default blocks of the first one.
+    of : str
+        Words in the head of the page that tell of what it is.
     options
         As of :func:`pam_sim.gap.find_gap`.
 
@@ -73,17 +79,19 @@ def write_gap(runs, model, out_dir, certify=None, **options):
     Raises
     ------
     InputError
-        No recording, or a mistake in the model.
+        No recording, a mistake in the model, or a folder that cannot be written.
 
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
+    check_folder(out_dir)
     rig = model_for(runs[0], model)
     result = find_gap(runs, rig, certify, **options)
     if len(result.rivals) > 1:
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise)
-    save_gap(result, certify or runs[0], out_dir)
+    result.remarks += early_sentences([*runs, *([certify] if certify else [])])
+    save_gap(result, certify or runs[0], out_dir, of)
     return result
 
 
@@ -95,15 +103,17 @@ def model_for(run, model):
     return load_rig(model, valve=(recorded_valve(run) or None) if named else None)
 
 
-def save_gap(result, run, out_dir):
+def save_gap(result, run, out_dir, of=''):
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
     """
-    out_dir = Path(out_dir)
-    if out_dir.exists() and not out_dir.is_dir():
-        raise InputError('is a file; give a folder for the results', str(out_dir))
+    with whole_files(out_dir) as folder:
+        _save_into(folder, result, run, of)
+
+
+def _save_into(out_dir, result, run, of):
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)
@@ -114,7 +124,13 @@ def save_gap(result, run, out_dir):
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
-        [gap_section(result), provenance([('recording', run)])], footer=FOOTER))
+        [gap_section(result, command=next_command(result, 'next_experiment.yaml')),
+         provenance([('recording', run)])], footer=FOOTER, of=of))
+
+
+def next_command(result, path):
+    """Return the command that runs the next experiment on the rig that was recorded."""
+    return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
 
 
 def write_compare(result, namespace, path):

@@ -17,9 +17,6 @@
 from dataclasses import dataclass
 import html
 import json
-import os
-from pathlib import Path
-import tempfile
 
 from pam_actuation.report.assets import CSS, SCRIPT
 from pam_sim.errors import InputError
@@ -94,7 +91,7 @@ def key_numbers(numbers):
     return f'<div class="numbers">{cells}</div>'
 
 
-def render(title, lead, sections, numbers=(), footer=''):
+def render(title, lead, sections, numbers=(), footer='', of=''):
     """
     Return the whole page as text.
 
@@ -108,6 +105,8 @@ def render(title, lead, sections, numbers=(), footer=''):
         See ``key_numbers``; shown above all sections.
     footer : str
         Last line.
+    of : str
+        What the page is of, for programs; not shown.
 
     """
     links = ''.join(f'<a href="#{text(s.key)}">{text(s.title)}</a>' for s in sections
@@ -120,6 +119,7 @@ def render(title, lead, sections, numbers=(), footer=''):
                      f'{section.body}</{tag}>')
     return ('<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<meta name="generator" content="pam_actuation {text(of)}">'
             f'<title>{text(title)}</title><style>{CSS}</style></head><body>'
             f'<header class="top"><h1>{text(title)}</h1>{paragraph(lead, "lead")}'
             f'<nav>{links}</nav>{key_numbers(numbers) if numbers else ""}</header>'
@@ -142,21 +142,3 @@ def plotly_script():
         raise InputError(
             'a page needs the Python package plotly: pip install "plotly>=5.15"') from error
     return get_plotlyjs().replace('</script', '<\\/script')
-
-
-def write_text(path, content):
-    """Write a text file atomically: a reader sees the old file or the whole new one."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    try:
-        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return path

@@ -15,8 +15,9 @@
 """The page about one experiment or several runs of it."""
 
 import numpy as np
+from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report.metrics import run_metrics
-from pam_actuation.report.page import render, signed, write_text
+from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -28,6 +29,7 @@ from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
@@ -54,7 +56,7 @@ def muscle_volume(run):
 
 
 def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,
-                      overlay=None, replays=None, gap=None, page_title=None):
+                      overlay=None, replays=None, gap=None, page_title=None, of=''):
     """
     Write the HTML page of one or several runs.
 
@@ -76,6 +78,8 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
         Gap of the first run against a model.
     page_title : str, optional
         Heading; by default made of the experiment's name.
+    of : str
+        Words in the head of the page that tell which bags it shows.
 
     Returns
     -------
@@ -94,7 +98,8 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
                 for run in runs]
     named = list(zip(titles, measured))
-    sections = [metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
+    sections = [_early(runs), _implausible(list(zip(titles, runs))),
+                metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -112,8 +117,25 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     write_text(out_path, render(
         page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
         'what was asked, what it did, and how well.', [s for s in sections if s],
-        run_numbers(named), FOOTER))
+        run_numbers(named), FOOTER, of))
     return {title: summary(m) for title, m in named}
+
+
+def _early(runs):
+    """Return the section that warns of runs that stopped early, None without any."""
+    found = early_sentences(runs)
+    return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None
+
+
+def _implausible(runs):
+    """Return the section on values that cannot be right, None where there are none."""
+    found = [(title, sentence) for title, run in runs
+             for sentence in getattr(run, 'implausible', ())]
+    if not found:
+        return None
+    return Section('implausible', 'What cannot be right in the data', paragraph(
+        'Numbers and plots below rest on these values all the same.') + table(
+            ['recording', 'what was read'], found))
 
 
 def default_titles(runs):
@@ -162,10 +184,10 @@ def summary(m):
             'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
 
 
-def bag_report(runs, out_path, titles=None):
+def bag_report(runs, out_path, titles=None, of=''):
     """
     Write the page of some bags; as ``experiment_report``, and return the main numbers.
 
     A gap result or rules are not computed here; the page shows what was recorded.
     """
-    return experiment_report(runs, out_path, titles=titles)
+    return experiment_report(runs, out_path, titles=titles, of=of)

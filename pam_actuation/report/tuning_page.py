@@ -15,12 +15,14 @@
 """The page of a tuning: what was searched, what came out, how the recordings judge it."""
 
 from pam_actuation.report import figures
-from pam_actuation.report.page import paragraph, plot, render, Section, table, write_text
+from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.tuning import tuning_section
 from pam_actuation.tuning.problem import rebuild
+from pam_sim.files import write_text
+from pam_sim.model_file import rig_title
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '
@@ -56,7 +58,7 @@ def tuning_report(out_path, result, recordings, rig, experiments, runs):
         untaught = rebuild(result.start, result.controller.settings).rules
         sections.append(rules(untaught, after, title='The initial rules'))
     sections.append(Section('setup', 'Set-up', table([], [
-        ['model', rig.name], ['valve', rig.valve.upper()],
+        ['model', rig_title(rig)], ['valve', rig.valve.upper()],
         ['controller', result.controller.kind],
         ['experiments', ', '.join(one.name for one in experiments)],
         ['closed loops of the search', len(result.problem.loops)]], 'facts')))

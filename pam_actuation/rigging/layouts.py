@@ -44,7 +44,7 @@ class NodeSpec:
 
 
 def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='sim',
-        controller='', experiment='', record=''):
+        controller='', experiment='', record='', accept_other_rig=False):
     """
     Return the nodes of one muscle.
 
@@ -66,6 +66,8 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
         valve signals speaks to the driver itself: there is no controller then.
     record : str
         Folder of the bag; '': no recorder.
+    accept_other_rig : bool
+        Take a controller file that was made for another rig.
 
     Raises
     ------
@@ -78,8 +80,9 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
     described = {**kind, 'rig': rig}
     name, raw = played(experiment, rig, valve, controller)
     driver = {**described, 'accept_valve_command': True} if raw else described
-    nodes = [NodeSpec('sofc_controller', namespace, {**described, 'controller': name})
-             ] if name else []
+    accept = {'accept_other_rig': True} if accept_other_rig else {}
+    nodes = [NodeSpec('sofc_controller', namespace, {
+        **described, **accept, 'controller': name})] if name else []
     if hardware == 'sim':
         nodes += [NodeSpec('plant_simulator', namespace, described),
                   NodeSpec('valve_watchdog', namespace, kind),
@@ -94,7 +97,8 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
             **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'})
             for node in nodes]
         nodes.append(NodeSpec('experiment_recorder', namespace, {
-            **described, 'output': record, 'experiment': experiment, 'controller': name}))
+            **described, **({'seed': 0} if hardware == 'sim' else {}),
+            'output': record, 'experiment': experiment, 'controller': name}))
     return nodes
 
 
@@ -135,7 +139,7 @@ def played(experiment, rig, valve, controller='', presets=None):
 
 
 def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', controller='',
-         experiment='', seed=0):
+         experiment='', seed=0, accept_other_rig=False):
     """
     Return the nodes of one simulated joint; its name is the last part of the namespace.
 
@@ -146,8 +150,9 @@ def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', con
     of_joint = {**common, 'joint': joint}
     nodes = [NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed})]
     if controller != NO_CONTROLLER:
-        nodes.append(
-            NodeSpec('joint_controller', namespace, {**of_joint, 'controller': controller}))
+        nodes.append(NodeSpec('joint_controller', namespace, {
+            **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
+            'controller': controller}))
     for side in SIDES:
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}),

@@ -22,6 +22,7 @@ import shutil
 import tempfile
 
 from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.place import check_bag_target
 from pam_actuation.namespaces import namespace_of, node_name_of
 from pam_sim.errors import InputError
 
@@ -102,8 +103,11 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     elif not hasattr(controller, 'to_yaml'):
         controller = load_controller(controller or preset_for(experiment, rig), rig)
     check_tracked(experiment, controller)
-    if bag is not None and os.path.exists(bag) and not overwrite:
-        raise InputError('exists already; choose another folder or allow to replace it', str(bag))
+    if bag is not None:
+        if os.path.exists(bag) and not overwrite:
+            raise InputError(
+                'exists already; choose another folder or allow to replace it', str(bag))
+        check_bag_target(bag, overwrite)
     _compile(rig, controller)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(experiment, rig, controller, '', {}, folder)
@@ -125,7 +129,7 @@ def _compile(rig, controller):
     DriverLoop(rig.valve)
     if controller is not None:
         from pam_actuation.control.config import load_controller
-        spare = load_controller(controller.to_yaml(), rig)
+        spare = load_controller(controller.to_yaml(), rig, accept_other_rig=True)
         spare.step(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -138,7 +142,8 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     if bag is not None:
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
-            learning=str(bool(learning)).lower())
+            learning=str(bool(learning)).lower(),
+            remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)))
         wanted = ReferenceLoop(plan.experiment, valve=rig.valve).topics
         topics = ['pressure', 'contraction', 'force', 'valve_signal', *wanted]
         if rig.valve == 'hsv':
@@ -147,6 +152,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
             topics += ['controller_state', 'pressure_command', 'followed_pressure']
         nodes[RECORDER] = {
             'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
+            'notes_folder': str(plan.folder),
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
     nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
     nodes[DRIVER] = {
@@ -155,6 +161,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     if controller is not None:
         nodes[plan.controller_node] = {
             'rig': rig_file, 'valve_type': rig.valve,
+            'accept_other_rig': bool(controller.other_rig),
             'controller': _write(plan.folder / 'controller.yaml', controller.to_yaml())}
         if controller.kind == 'sofc':
             nodes[plan.controller_node]['learning'] = learning

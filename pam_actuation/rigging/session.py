@@ -22,11 +22,14 @@ the signal that vents, the plant a little later, the recorder last. The same ord
 Ctrl-C and when a node dies.
 """
 
+import contextlib
 from dataclasses import dataclass, field
+import json
 import os
 from pathlib import Path
 import time
 
+from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.domain import DomainLock
@@ -36,12 +39,12 @@ from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
     TRANSITION_TIMEOUT_S)
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 import yaml
 
 START_TIMEOUT_S = 60.0        # a busy machine compiles for long
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
-FINISHED = 'finished'
 STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
 
@@ -207,9 +210,14 @@ class RigSession:
         level, message, _ = self.client.statuses.get(driver.full_name, (0, '', {}))
         return f'{sentence}; valve_driver: {message}' if level else sentence
 
-    def finish(self):
+    def finish(self, ended='', because=''):
         """
         Stop the nodes in order; what cannot be stopped is left to the end of the processes.
+
+        Parameters
+        ----------
+        ended, because : str
+            Why the run ended early, as in ``bags.ending.Ending``.
 
         Returns
         -------
@@ -226,10 +234,17 @@ class RigSession:
         if DRIVER in self._active:
             self.client.spin(VENT_S)
         problems += self._deactivate([PLANT])
+        self._tell_recorder(ended, because)
         problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
         self.client.spin(0.1)
         end_all(self.processes.values())
         return problems
+
+    def _tell_recorder(self, ended, because):
+        """Write down why the run ended, for the bag; without a word the recorder judges."""
+        if ended:
+            write_text(self.plan.folder / ENDED_FILE,
+                       json.dumps({'ended': ended, 'because': because}))
 
     def _deactivate(self, names, timeout_s=STOP_TIMEOUT_S):
         problems = []
@@ -254,6 +269,12 @@ class RigSession:
             else:
                 self._cpu.pop(name, None)
 
+    def _bag(self, bag):
+        """Return where the recorder put the bag: not in the place of another if ended early."""
+        with contextlib.suppress(OSError, ValueError, KeyError):
+            return json.loads((self.plan.folder / RECORDED_FILE).read_text())['path']
+        return bag
+
     def fill(self, result):
         """Enter counts, exit codes and findings into a Result."""
         if not self._may_record or not os.path.isdir(result.bag):
@@ -261,6 +282,7 @@ class RigSession:
         if self.client is None:
             return
         result.published = self.client.published()
+        result.bag = self._bag(result.bag)
         result.recorded = recorded_counts(result.bag) if result.bag else {}
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
         result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()}
@@ -330,7 +352,6 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         if out_dir is None:
             raise InputError('is needed for a recording', 'out_dir')
         bag = os.path.abspath(out_dir)
-        os.makedirs(os.path.dirname(bag), exist_ok=True)
     plan = make_plan(
         experiment, rig, controller, valve, bag, learning=learning, seed=seed,
         namespace=namespace, overwrite=overwrite, realtime=realtime)
@@ -345,18 +366,18 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
 
 def run_guarded(session, result, progress):
     """Start, run and stop; a failure or Ctrl-C goes into the result."""
-    begin = None
+    begin, ended = None, ()
     try:
         session.start()
         begin = time.monotonic()
         session.run(progress)
     except SessionFailed as error:
-        result.failure = str(error)
+        result.failure, ended = str(error), (ERROR, str(error))
     except KeyboardInterrupt:
-        result.failure = STOPPED
+        result.failure, ended = STOPPED, (INTERRUPTED,)
     if begin is not None:
         result.duration_s = time.monotonic() - begin
     with undisturbed():
-        problems = session.finish()
+        problems = session.finish(*ended)
         session.fill(result)
         result.findings += problems

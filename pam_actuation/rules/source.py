@@ -14,7 +14,7 @@
 
 """Rules from what a user names: a rule file, a controller, a preset, or a recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
@@ -33,7 +33,8 @@ class FoundRules:
 
     ``rules`` are shown; ``before`` those they started from, None for the initial ones kept
     in ``rules``; ``since`` names these in words. ``kind`` is 'rule file', 'controller' or
-    'recording'; ``remarks`` are sentences on anything odd.
+    'recording'; ``remarks`` are sentences on anything odd, ``implausible`` those of them on
+    values of the recording that cannot be right.
     """
 
     title: str
@@ -42,6 +43,7 @@ class FoundRules:
     before: object = None
     since: str = 'the initial rules'
     remarks: tuple = ()
+    implausible: tuple = ()
 
 
 def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
@@ -73,7 +75,8 @@ def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
         return FoundRules(path.name, 'rule file', load_rules(path))
     if path.is_dir() or path.suffix in _BAG_ENDINGS or path.name == 'metadata.yaml':
         return _of_recording(path, namespace, recover, progress)
-    controller = load_controller(name, None if rig is None else rig())
+    controller = load_controller(
+        name, None if rig is None else rig(), accept_other_rig=True)     # it is read, not run
     if controller.rules is None:
         raise InputError(f'a {controller.kind} controller has no rules', name)
     return FoundRules(path.stem, 'controller', controller.rules)
@@ -88,10 +91,17 @@ def saved_beside(path):
 
 
 def _of_recording(path, namespace, recover, progress):
-    """Return the rules at the end of a recording, and those at its start."""
+    """Return the rules of a recording, with what cannot be right in its values."""
     from pam_actuation.bags.load import load_run
-    from pam_actuation.replay.controller import replay_controller
     run = load_run(path, namespace=namespace, recover=recover)
+    found = _of_run(run, path, progress)
+    return replace(found, remarks=(*run.implausible, *found.remarks),
+                   implausible=run.implausible)
+
+
+def _of_run(run, path, progress):
+    """Return the rules at the end of a recording, and those at its start."""
+    from pam_actuation.replay.controller import replay_controller
     text = run.metadata.get('controller')
     if not text:
         raise InputError('the recording does not say which controller ran', os.fspath(path))

@@ -74,7 +74,12 @@ def rebuild(controller, settings, rules=None):
     It starts from ``rules``, by default from those of ``controller`` where the settings leave
     them their meaning.
     """
-    merged = {**controller.settings, **settings}
+    fresh = _rebuilt(controller, {**controller.settings, **settings}, rules)
+    fresh.made_for, fresh.other_rig = controller.made_for, controller.other_rig
+    return fresh
+
+
+def _rebuilt(controller, merged, rules):
     if controller.kind == 'pid':
         return PidController(controller.static_inverse, merged, controller.rig_name)
     if controller.kind == 'lqi':

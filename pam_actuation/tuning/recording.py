@@ -24,6 +24,7 @@ commands, so the comparison shows how differently it acts, not how well.
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
+from pam_actuation.bags.ending import ending_of
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.replay.controller import replay_controller
@@ -131,7 +132,7 @@ def check_recordings(runs, rig, controller):
     """Return a RecordingCheck of every run for a model and a tuned controller."""
     checks = []
     for run in runs:
-        found, notes = {}, []
+        found, notes = {}, [ending_of(run.metadata).sentence] * ending_of(run.metadata).early
         for name, check, thing in (('model', check_model, rig),
                                    ('counterfactual', counterfactual, controller)):
             try:

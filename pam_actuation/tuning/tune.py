@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 import time
 
 from pam_actuation.control.config import controller_to_yaml
-from pam_actuation.control.files import write_atomically
+from pam_actuation.control.made_for import facts_of
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.initial_rules import initial_rules
@@ -34,6 +34,7 @@ from pam_actuation.tuning.search import default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import check_axes, default_axes, from_unit, to_unit
 from pam_actuation.tuning.workers import Workers
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 from pam_sim.units import P_ATM_PA
 
 HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
@@ -117,10 +118,11 @@ class TuneResult:
 
         """
         if rules_path is None or self.controller.rules is None:
-            write_atomically(path, self.to_yaml())
+            write_text(path, self.to_yaml(), parents=False)
             return
         self.controller.rules.save(rules_path)
-        write_atomically(path, controller_to_yaml(self.controller, rules_file=rules_path))
+        write_text(path, controller_to_yaml(self.controller, rules_file=rules_path),
+                   parents=False)
 
     def to_dict(self):
         """Return the outcome as plain data."""
@@ -271,6 +273,7 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     improved = held_after < held_before
     if not improved:
         tuned, rules = rebuild(controller, {}), ''
+    tuned.made_for, tuned.other_rig = facts_of(rigs[0]), ''
     changed = {name: (value, tuned.settings[name]) for name, value in before.items()
                if tuned.settings[name] != value}
     rollouts = done[0] + len(train) + 2 * len(test) + extra

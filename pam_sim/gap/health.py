@@ -76,6 +76,11 @@ def check_health(run, valve):
         health.problems.append(
             f'the recording is of a rig with valve {health.valve}, the model has {valve}')
         return health
+    # What the loader of a bag found in the values, such as a wrong unit.
+    health.problems += [text.rstrip('.') for text in getattr(run, 'unusable', ())]
+    if health.problems:
+        return health
+    health.remarks += [text for text in getattr(run, 'implausible', ())]
     health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
     for needed in ('pressure', 'contraction'):
         if needed not in health.signals:

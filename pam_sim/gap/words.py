@@ -17,6 +17,10 @@
 from pam_sim.effects.registry import effects
 from pam_sim.gap.result import READABLE
 
+SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
+ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
+LEAST_SHARE = 0.005
+
 
 def explain(result, outcome):
     """Return the reason of a verdict, two or three sentences."""
@@ -24,23 +28,34 @@ def explain(result, outcome):
         return 'The model follows the recording within sensor noise and stamps, its numbers ' \
             'calibrated within their tolerance.'
     if result.verdict == 'parameter':
-        return f'{_numbers(result.parameters)} {_shrink(result)}.'
+        return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
         missed = _sizes(result.signals, 'rmse_refit')
-        return (f'The calibrated model misses {missed} and no known effect explains it'
-                f'{_nearest(outcome)}.{_mistaken(outcome)}')
-    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}).'
-             for e in result.effects]
-    if result.parameters:
-        parts.append(_numbers(result.parameters) + '.')
+        return f'The calibrated model misses {missed}{_nearest(outcome)}.{_mistaken(outcome)}'
+    # Of several that are named, some may be certain.
+    open_sets = [w.names for w in outcome.named if len(w.names) > 1]
+    doubtful = {name for names in open_sets for name in names}
     if result.verdict == 'ambiguous':
-        parts = ['These data cannot tell ' + join(result.ambiguity_set) + ' apart. Likeliest: '
-                 + (' '.join(parts))]
+        apart = ', nor '.join(join(names) for names in open_sets)
+        certain = _found(result, lambda name: name not in doubtful)
+        parts = [f'These data cannot tell {apart} apart.', 'Likeliest:',
+                 *_found(result, lambda name: name in doubtful),
+                 *(['Certain:', *certain] if certain else [])]
+    else:
+        parts = _found(result, lambda name: True)
     text = ' '.join(parts) + f' With this {_shrink(result)}.'
     if result.unexplained_fraction >= 0.2:
         text += (f' {100 * result.unexplained_fraction:.0f} % of the squared gap remain '
                  'unexplained.')
     return text
+
+
+def _found(result, chosen):
+    """Return a sentence for each effect, and one for the numbers, whose names are chosen."""
+    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}).'
+             for e in result.effects if chosen(e['name'])]
+    numbers = [c for c in result.parameters if chosen(c.name)]
+    return [*parts, *([_numbers(numbers) + '.'] if numbers else [])]
 
 
 def join(parts):
@@ -64,13 +79,18 @@ def _numbers(parameters):
 
 
 def _shrink(result):
+    """Return in words how the gap of every signal that had or has one changes."""
     parts = []
     for name, s in result.signals.items():
         factor, unit = READABLE[name]
-        if s.shrink_percent is not None and s.rmse_refit > 1.2 * s.noise_floor:
-            parts.append(f'the gap in {name} falls from {s.rmse_refit * factor:.3g} to '
-                         f'{s.rmse_after * factor:.3g} {unit}')
-    return join(parts) if parts else 'the gap falls to the noise floor'
+        if max(s.rmse_refit, s.rmse_after) > SEEN * s.noise_floor:
+            before, after = (f'{value * factor:.3g}' for value in (s.rmse_refit, s.rmse_after))
+            if before == after:
+                parts.append(f'the gap in {name} stays at {after} {unit}')
+            else:
+                verb = 'rises' if s.rmse_after > s.rmse_refit else 'falls'
+                parts.append(f'the gap in {name} {verb} from {before} to {after} {unit}')
+    return join(parts) if parts else 'every signal stays within its noise floor'
 
 
 def _sizes(signals, name):
@@ -86,5 +106,13 @@ def _mistaken(outcome):
 
 
 def _nearest(outcome):
-    parts = [f'{100 * share:.0f} % in the {s}' for s, share in outcome.share.items()]
-    return f' (explained: {join(parts)})' if parts else ''
+    """Return in words what was fitted, and why it is no explanation."""
+    shares = {s: share for s, share in outcome.share.items() if share >= LEAST_SHARE}
+    parts = [f'{100 * share:.0f} % in the {s}' for s, share in shares.items()]
+    if not parts:
+        return ' and no known effect explains it'
+    if max(shares.values()) < ENOUGH:
+        return f' and no known effect explains it: the best fit explains {join(parts)}'
+    return (f'. A fit explains {join(parts)} of the data that were searched, but it does not '
+            'hold: it needs numbers far from their nominal values, or fails on the data of '
+            'the proof. So nothing is named')

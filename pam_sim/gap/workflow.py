@@ -19,6 +19,7 @@ import math
 import time
 
 from pam_sim.effects.registry import get_effect
+from pam_sim.gap.apart import check_apart
 from pam_sim.gap.cuts import cuts_of
 from pam_sim.gap.doubt import spread_of_numbers
 from pam_sim.gap.fingerprint import fingerprint
@@ -74,9 +75,16 @@ def find_gap(runs, rig, certify=None, effects=None, seconds=120.0, materiality=1
         Equal inputs give equal results, ``runtime_s`` aside, as long as the time budget
         is not used up.
 
+    Raises
+    ------
+    InputError
+        The recording for the proof is one of those that are searched.
+
     """
     started = time.perf_counter()
     runs = list(runs) if isinstance(runs, (list, tuple)) else [runs]
+    if certify is not None:
+        check_apart(runs, certify)
     health = [check_health(run, rig.valve) for run in [*runs, *([certify] if certify else [])]]
     problems = list(dict.fromkeys(p for h in health for p in h.problems))
     remarks = list(dict.fromkeys(r for h in health for r in h.remarks))

@@ -19,7 +19,7 @@ from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.rig import JointRig
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 from pam_sim.model_file import load_rig
-from pam_sim.named_files import NamedFiles
+from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
 
 _PRESETS = NamedFiles('joint/presets')
@@ -55,7 +55,8 @@ def load_joint(source, valve=None, fidelity=None):
     if isinstance(source, JointRig):
         joint = source
     else:
-        joint = _from_mapping(*_PRESETS.locate(source, 'joint'))
+        data, name = _PRESETS.locate(source, 'joint')
+        joint = _from_mapping(data, name or file_stem(source))
     return joint.with_(valve=valve, fidelity=fidelity)
 
 

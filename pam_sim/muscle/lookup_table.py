@@ -16,11 +16,11 @@
 
 import csv
 from dataclasses import dataclass
-import os
 from pathlib import Path
 
 import numpy as np
 from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe, whole_file
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
@@ -91,9 +91,8 @@ class LookupTable:
 
     def write_csv(self, path):
         """Write the table, one line per point, atomically; the source goes into a comment."""
-        path = Path(path)
-        temporary = path.with_name(path.name + '.part')
-        with open(temporary, 'w', newline='', encoding='utf-8') as stream:
+        with whole_file(path) as temporary, \
+                open(temporary, 'w', newline='', encoding='utf-8') as stream:
             for line in self.source.splitlines():
                 stream.write(f'# {line}\n')
             writer = csv.writer(stream)
@@ -102,7 +101,6 @@ class LookupTable:
                 for j, load in enumerate(self.load_n):
                     writer.writerow([repr(float(value)) for value in (
                         pressure, load, self.strain[i, j], self.air_mass_kg[i, j])])
-        os.replace(temporary, path)
 
 
 def read_commented_csv(path):
@@ -115,6 +113,7 @@ def read_commented_csv(path):
         The file cannot be read as text.
 
     """
+    refuse_pipe(path)
     try:
         lines = Path(path).read_text(encoding='utf-8').splitlines()
     except (OSError, UnicodeDecodeError) as error:

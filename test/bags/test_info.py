@@ -16,6 +16,7 @@
 
 import json
 
+import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags import codecs
 from pam_actuation.bags.info import bag_info, render_text
@@ -111,6 +112,41 @@ def test_recorder_counts_reach_the_info(tmp_path):
     # Without that loss every topic is accounted for.
     info.topic('/muscle/force').lost = 0
     assert info.complete is True and 'Complete' in render_text(info)
+
+
+@pytest.mark.parametrize('unknown_send_times', [False, True])
+def test_recorder_and_info_count_the_same_losses(tmp_path, unknown_send_times):
+    # Lost without a gap in the sequence numbers: the last ones of a topic, and all of a node
+    # whose middleware gives none; one node dies before it reports what it sent last.
+    random = np.random.default_rng(3)
+    for k in range(12):
+        core = RecorderCore(BagWriter(tmp_path / f'run_{k}', METADATA))
+        topics = ('pressure', 'contraction', 'force')
+        for short in (*topics, 'diagnostics'):
+            core.add_topic(full_name(short), codecs.TOPIC_TYPES[short])
+        dies_at, numbered = int(random.integers(20, 60)), bool(k % 2)
+        for i in range(60):
+            now_ns = START_NS + i * STEP_NS
+            messages_now = example_messages(i)
+            for short in topics:
+                if random.random() < 0.1 or (short == 'force' and i > dies_at + 5):
+                    continue
+                core.receive(
+                    full_name(short), codecs.encode(short, messages_now[short]),
+                    0 if unknown_send_times else now_ns - 1000, now_ns,
+                    i + 1 if numbered and short != 'contraction' else 0)
+            for node, sent in (('plant', topics[:2]), ('cell', topics[2:])):
+                if i % 10 == 9 and (node == 'plant' or i <= dies_at):
+                    counts = tuple((f'published.{full_name(s)}', str(i + 1)) for s in sent)
+                    status = messages.Status(now_ns, 0, f'/muscle/{node}', 'ok', counts)
+                    core.receive(full_name('diagnostics'), codecs.encode(
+                        'diagnostics', [status]), now_ns, now_ns + 5)
+        summary, info = core.close(), bag_info(tmp_path / f'run_{k}')
+        assert summary.lost == info.lost > 0
+        for short in topics:
+            name = full_name(short)
+            assert summary.counts[name].lost == info.topic(name).lost
+        assert not summary.complete and info.complete is False
 
 
 def test_messages_before_the_recorder_are_told_from_losses(tmp_path):

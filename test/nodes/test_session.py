@@ -20,7 +20,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from pam_actuation.bags.ending import Ending, ending_of                     # noqa: E402, I100
+from pam_actuation.bags.info import bag_info, render_text                   # noqa: E402
+from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.replay.controller import replay_controller               # noqa: E402
 from pam_actuation.rigging import session                                   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
@@ -67,6 +69,7 @@ def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
     assert seen[-1][0] <= seen[-1][1] == 1.5
     run = load_run(result.bag)
     assert run.metadata['experiment_name'] == 'short' and run.metadata['seed'] == '3'
+    assert ending_of(run.metadata) == Ending(1.5, 1.5, 'complete')
     assert {'pressure', 'contraction', 'force', 'pressure_command', 'valve_signal', 'reference',
             'controller_state'} <= set(run.topics)
     replayed = replay_controller(run)
@@ -115,6 +118,9 @@ def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(t
     assert result.exit_codes.pop('sofc_controller') == -signal.SIGKILL
     assert set(result.exit_codes.values()) == {0}
     run = load_run(bag)
+    ending = ending_of(run.metadata)
+    assert ending.ended == 'error' and 'sofc_controller was ended by SIGKILL' in ending.because
+    assert ending.planned_s == 61.0 and 0.5 < ending.reached_s < 4.0
     signals, states = run.topics['valve_signal'], run.topics['controller_state']
     vented = (signals.values['fill_duty'] == 0.0) & (signals.values['vent_duty'] == 1.0)
     after = signals.stamp_ns[vented & (signals.stamp_ns > states.stamp_ns[-1])]
@@ -133,6 +139,27 @@ def test_the_user_may_stop_it(tmp_path):
     assert set(result.exit_codes.values()) == {0}
     assert result.published == result.recorded
     assert load_run(result.bag).topics['valve_signal'].values['ppr_voltage'][-1] == 0.0
+    info = bag_info(result.bag)
+    assert info.ending.ended == 'interrupted' and info.ending.planned_s == 61.0
+    assert 0.3 < info.ending.reached_s < 2.5 and info.complete is False
+    assert f'Stopped early after {info.ending.reached_s:.1f} s of 61.0 s' in render_text(info)
+
+
+def test_a_stopped_run_replaces_no_bag_and_a_whole_one_does(tmp_path):
+    bag, whole = tmp_path / 'bag', []
+
+    def stop(done_s, total_s):
+        if done_s > 0.5:
+            raise KeyboardInterrupt
+
+    for progress in (None, stop, None):
+        result = session.run_experiment(
+            PRESSURE, 'dmsp_5_300_hanging_mass', out_dir=bag, overwrite=True, progress=progress)
+        whole.append((bag / 'bag_0.mcap').read_bytes())
+        assert result.bag == str(tmp_path / 'bag_stopped' if progress else bag)
+        assert ending_of(load_run(result.bag).metadata).early == bool(progress)
+    assert whole[0] == whole[1] != whole[2]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'bag_stopped']
 
 
 def test_without_recorder_and_stopped_during_the_start(tmp_path, monkeypatch):

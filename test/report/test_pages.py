@@ -24,6 +24,7 @@ from pam_actuation.report import demo_page, figures, page, pages
 from pam_actuation.report.sections.replay import Overlay
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import write_text
 from pam_sim.gap.result import Calibrated, GapResult, Share, SignalGap, Trace
 from pam_sim.run import Series
 import pytest
@@ -226,6 +227,6 @@ def test_a_failed_write_leaves_the_old_page(tmp_path):
     path = tmp_path / 'page.html'
     path.write_text('old')
     with pytest.raises(UnicodeEncodeError):
-        page.write_text(path, 'new \ud800')
+        write_text(path, 'new \ud800')
     assert path.read_text() == 'old'
     assert [p.name for p in tmp_path.iterdir()] == ['page.html']

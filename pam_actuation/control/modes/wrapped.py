@@ -40,6 +40,8 @@ class WrappedLaw:
     """
 
     tracked = None
+    made_for = None         # facts of the rig, see ``control/made_for``
+    other_rig = ''          # how the rig it runs on differs, if that was accepted
 
     def __init__(self, law):
         self.law = law

@@ -27,12 +27,12 @@ import math
 import os
 
 import numpy as np
-from pam_actuation.control.files import write_atomically
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe, write_text
 
 SCHEMA = 2
 VALVES = ('ppr', 'hsv')
@@ -253,7 +253,7 @@ def save_rules(rules, path):
     if spoiled:
         raise InputError(
             f'rules are not saved: {spoiled[0]} holds values that are not finite', str(path))
-    write_atomically(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n')
+    write_text(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n', parents=False)
 
 
 def load_rules(path, expected=None):
@@ -267,6 +267,7 @@ def load_rules(path, expected=None):
 
     """
     path = os.fspath(path)
+    refuse_pipe(path)
     try:
         with open(path, 'rb') as stream:
             data = stream.read(MAX_BYTES + 1)

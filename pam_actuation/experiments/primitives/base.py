@@ -31,6 +31,7 @@ class Primitive:
     QUANTITIES = ()
     DOMAINS = None            # names of the domains in which it makes sense, None: all
     SHUTS_VALVE = False       # True: a pair of high-speed valves is shut meanwhile
+    JUMPS = False             # True: jumps are what it is for, at its start too
 
     def at(self, t_s):
         """Return (value, rate per second) at the time t_s since the start."""

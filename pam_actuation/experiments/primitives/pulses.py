@@ -23,6 +23,7 @@ from pam_actuation.experiments.primitives.base import Primitive
 class Pulses(Primitive):
     """Rectangular pulses of ``height`` above the value before, one every ``every_s``."""
 
+    JUMPS = True
     QUANTITIES = ('height',)
     start: float
     height: float

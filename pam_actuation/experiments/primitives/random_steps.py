@@ -25,6 +25,7 @@ from pam_actuation.experiments.primitives.base import Primitive
 class RandomSteps(Primitive):
     """Steps to uniformly random values, held for uniformly random times."""
 
+    JUMPS = True
     QUANTITIES = ('low', 'high')
     start: float
     low: float

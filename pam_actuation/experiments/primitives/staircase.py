@@ -23,6 +23,7 @@ from pam_actuation.experiments.primitives.base import Primitive
 class Staircase(Primitive):
     """Equal steps from one value to another, each held for ``hold_s``."""
 
+    JUMPS = True
     QUANTITIES = ('low', 'high')
     start: float
     low: float

@@ -23,6 +23,7 @@ from pam_actuation.experiments.primitives.base import Primitive
 class Step(Primitive):
     """Jump to a value and stay there."""
 
+    JUMPS = True
     QUANTITIES = ('to',)
     start: float
     to: float

@@ -28,7 +28,7 @@ VERDICT_TEXT = {
 
 
 def gap_section(result, key='gap', title='Recording against model', remark='',
-                max_points=2000):
+                max_points=2000, command='pam run next_experiment.yaml'):
     """
     Return the section of a gap result.
 
@@ -40,6 +40,8 @@ def gap_section(result, key='gap', title='Recording against model', remark='',
         Anchor, heading, and a sentence above.
     max_points : int
         Most points per trace.
+    command : str
+        How the next experiment is run.
 
     """
     body = paragraph(remark) if remark else ''
@@ -52,7 +54,7 @@ def gap_section(result, key='gap', title='Recording against model', remark='',
             'RMS difference of whole free runs of the model on the recorded valve signal, on '
             'data that neither the fit nor the choice used. The noise floor is what sensor noise '
             'and stamps explain. Gap closed: of what calibrating the numbers left.', 'note')
-    body += _effects(result) + _evidence(result) + _next(result)
+    body += _effects(result) + _evidence(result) + _next(result, command)
     body += _where(result) + witness_part(result) + _calibration(result)
     for note in result.remarks:
         body += paragraph(note, 'note')
@@ -80,7 +82,8 @@ def _effects(result):
             rows.append([e['name'], e['family'], e['subsystem'], f'{e["confidence"]:.2f}', name,
                          f'{q["value"]:.4g} {q["unit"]}',
                          f'{q["ci95"][0]:.4g} … {q["ci95"][1]:.4g}'])
-    body = '<h3>What is missing in the model</h3>'
+    body = ('<h3>What is likeliest to be missing</h3>' if result.verdict == 'ambiguous'
+            else '<h3>What is missing in the model</h3>')
     body += table(['effect', 'family', 'subsystem', 'confidence', 'quantity', 'value',
                    '95 % interval'], rows)
     moved = ', '.join(f'{name} by {value:.3g}' for name, value in result.moved.items())
@@ -102,12 +105,12 @@ def _evidence(result):
         'errors block by block; below 3 the data do not tell two names apart.', 'note')
 
 
-def _next(result):
+def _next(result, command):
     if not result.next_experiment:
         return ''
     return '<h3>What to measure next</h3>' + paragraph(
-        f'{result.next_experiment["why"]} Run it with: '
-        'pam run next_experiment.yaml (beside this page).')
+        f'{result.next_experiment["why"]} Run it with: {command} (the file is beside this '
+        'page).')
 
 
 def _where(result):

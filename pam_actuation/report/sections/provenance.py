@@ -14,10 +14,10 @@
 
 """Where the numbers of a page come from: bags, rig, controller, versions, seed."""
 
+from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.facts import NOT_RECORDED, recorded, recorded_rig_title
 from pam_actuation.report import signals
 from pam_actuation.report.page import Section, table, text
-
-UNKNOWN = 'not recorded'
 
 
 def provenance(runs, key='provenance', title='Where this comes from'):
@@ -33,14 +33,18 @@ def provenance(runs, key='provenance', title='Where this comes from'):
 
     """
     fields = [('Recording', lambda run: run.path or 'in memory'),
-              ('Experiment', lambda run: _meta(run, 'experiment_name')),
-              ('Rig', lambda run: _rig_name(run)),
-              ('Valve', lambda run: _meta(run, 'valve').upper()),
+              ('Experiment', lambda run: recorded(run.metadata, 'experiment_name')),
+              ('Rig', lambda run: recorded_rig_title(run.metadata)),
+              ('Valve', lambda run: _valve(run)),
               ('Namespace', lambda run: run.namespace),
               ('Duration', lambda run: f'{signals.duration_s(run):.1f} s'),
+              ('Planned and reached', lambda run: ending_of(run.metadata).sentence),
               ('Messages', lambda run: _counts(run)),
-              ('Random seed', lambda run: _meta(run, 'seed')),
-              ('pam_actuation version', lambda run: _meta(run, 'software_version'))]
+              ('Random seed', lambda run: recorded(run.metadata, 'seed')),
+              ('pam_actuation version', lambda run: recorded(run.metadata, 'software_version'))]
+    if any((run.metadata or {}).get('controller_other_rig') for _, run in runs):
+        fields.append(('Controller', lambda run: (run.metadata or {}).get(
+            'controller_other_rig', 'made for this rig')))
     rows = [[name] + [read(run) for _, run in runs] for name, read in fields]
     body = table([''] + [name for name, _ in runs], rows, 'facts')
     for name, run in runs:
@@ -52,17 +56,13 @@ def provenance(runs, key='provenance', title='Where this comes from'):
     return Section(key, title, body)
 
 
-def _meta(run, name):
-    value = (run.metadata or {}).get(name)
-    return UNKNOWN if value in (None, '') else str(value)
-
-
-def _rig_name(run):
-    """Return the first line of the rig's YAML that names it."""
-    for row in str((run.metadata or {}).get('rig', '')).splitlines():
-        if row.startswith('rig:'):
-            return row.split(':', 1)[1].strip()
-    return UNKNOWN
+def _valve(run):
+    """Return the valve as recorded, or as its signal tells."""
+    valve = recorded(run.metadata, 'valve')
+    if valve != NOT_RECORDED:
+        return valve.upper()
+    seen = getattr(run, 'valve', '')
+    return f'{seen.upper()}, by its signal' if seen else NOT_RECORDED
 
 
 def _counts(run):

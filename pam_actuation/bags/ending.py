@@ -1,0 +1,183 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How far a run came and why it ended: what a bag says of it, and the sentence for people.
+
+Four texts of the ``pam_experiment`` record: ``planned_length_s`` from the start on;
+``reached_length_s``, ``ended`` and, where there is more to say, ``ended_because`` once the
+run is over. Recordings without them are told apart from those that came to their end.
+"""
+
+from dataclasses import dataclass
+
+PLANNED, REACHED, ENDED, BECAUSE = (
+    'planned_length_s', 'reached_length_s', 'ended', 'ended_because')
+COMPLETE, INTERRUPTED, ERROR, VENTED = 'complete', 'interrupted', 'error', 'vented'
+EARLY = {INTERRUPTED: 'interrupted', ERROR: 'an error ended it', VENTED: 'the driver had vented'}
+# How the reference generator begins its word on /diagnostics.
+PLAYING, FINISHED = 'playing', 'finished'
+ENDED_FILE, RECORDED_FILE = 'ended.json', 'recorded.json'     # between session and recorder
+REFERENCE, DRIVER = 'reference_generator', 'valve_driver'
+_LEVEL_ERROR = 2
+
+
+@dataclass(frozen=True)
+class Ending:
+    """
+    How a run ended.
+
+    Parameters
+    ----------
+    planned_s, reached_s : float or None
+        Length of the experiment and how much of it was run [s]; None: not recorded.
+    ended : str
+        'complete', 'interrupted', 'error', 'vented', or '' where that is not recorded.
+    because : str
+        What else is known of the reason.
+
+    """
+
+    planned_s: float | None = None
+    reached_s: float | None = None
+    ended: str = ''
+    because: str = ''
+
+    @property
+    def early(self):
+        """Return whether the run is known not to have come to its planned end."""
+        return self.ended in EARLY
+
+    @property
+    def sentence(self):
+        """Return one sentence for people."""
+        if self.planned_s is None and not self.ended:
+            return 'Length planned: not recorded.'
+        planned = 'an unknown length' if self.planned_s is None else f'{self.planned_s:.1f} s'
+        if self.early:
+            reached = '' if self.reached_s is None else f' after {self.reached_s:.1f} s'
+            because = f' ({self.because.rstrip(".")})' if self.because else ''
+            return f'Stopped early{reached} of {planned} planned: {EARLY[self.ended]}{because}.'
+        if self.ended == COMPLETE:
+            return f'Ran to its end: {planned} planned and reached.'
+        return f'Planned: {planned}; how it ended is not recorded.'
+
+    def texts(self):
+        """Return the entries of the ``pam_experiment`` record that are known."""
+        found = {PLANNED: _number(self.planned_s), REACHED: _number(self.reached_s),
+                 ENDED: self.ended, BECAUSE: ' '.join(self.because.split())}
+        return {key: text for key, text in found.items() if text}
+
+
+def ending_of(metadata):
+    """Return the Ending that a ``pam_experiment`` record tells; entries of others are not used."""
+    metadata = metadata or {}
+    ended = metadata.get(ENDED, '')
+    return Ending(
+        _seconds(metadata.get(PLANNED)), _seconds(metadata.get(REACHED)),
+        ended if ended in EARLY or ended == COMPLETE else '', metadata.get(BECAUSE, ''))
+
+
+def early_sentences(runs):
+    """Return a sentence on every run that is known to have stopped early, with its path."""
+    found = [(run, ending_of(run.metadata)) for run in runs]
+    return [f'{run.path}: {ending.sentence}' for run, ending in found if ending.early]
+
+
+class EndWatch:
+    """
+    Follows a live run by what reference generator and valve driver say on /diagnostics.
+
+    Parameters
+    ----------
+    namespace : str
+        Namespace of the rig.
+
+    """
+
+    def __init__(self, namespace):
+        self._reference, self._driver = f'{namespace}/{REFERENCE}', f'{namespace}/{DRIVER}'
+        self._heard_ns = None           # the newest word of the reference while it plays
+        self._elapsed_s = None
+        self._vented = ''
+        self._vented_s = None
+        self._failed = ''
+        self._over = self._finished = False
+
+    def hear(self, statuses):
+        """Take the statuses of one diagnostic message."""
+        for status in statuses:
+            if self._over:
+                return
+            if status.name == self._reference:
+                self._hear_reference(status)
+            elif status.name == self._driver:
+                self._hear_driver(status)
+
+    def _hear_reference(self, status):
+        elapsed_s = _seconds(dict(status.values).get('elapsed_s'))
+        if status.message.startswith((PLAYING, FINISHED)):
+            self._heard_ns, self._elapsed_s = status.stamp_ns, elapsed_s
+            self._over = self._finished = status.message.startswith(FINISHED)
+        elif self._heard_ns is not None:
+            self._over = True
+            self._elapsed_s = elapsed_s or self._elapsed_s
+            self._failed = status.message if status.level >= _LEVEL_ERROR else ''
+
+    def _hear_driver(self, status):
+        if status.level < _LEVEL_ERROR:
+            self._vented, self._vented_s = '', None
+        elif self._heard_ns is not None and not self._vented:
+            self._vented = status.message
+            self._vented_s = max(
+                (self._elapsed_s or 0.0) + (status.stamp_ns - self._heard_ns) * 1e-9, 0.0)
+
+    def ending(self, planned_s, told=None):
+        """
+        Return the Ending of the run.
+
+        Parameters
+        ----------
+        planned_s : float or None
+            Length of the experiment [s].
+        told : Ending, optional
+            What whoever ended the run knows; it goes before what was heard.
+
+        """
+        reached_s = self._elapsed_s
+        if reached_s is not None and planned_s is not None:
+            reached_s = planned_s if self._finished else min(reached_s, planned_s)
+        if told is not None and told.early:
+            return Ending(planned_s, reached_s or 0.0, told.ended, told.because)
+        if self._heard_ns is None and told is None:
+            return Ending(planned_s)                # nobody played an experiment
+        if self._vented:
+            return Ending(planned_s, min(self._vented_s, reached_s or self._vented_s), VENTED,
+                          self._vented)
+        if self._failed:
+            return Ending(planned_s, reached_s, ERROR, self._failed)
+        return Ending(planned_s, reached_s, COMPLETE if self._finished else INTERRUPTED)
+
+
+def _number(value):
+    return '' if value is None else f'{value:.3f}'
+
+
+def _seconds(text):
+    """Return a text as a length of time, None where it is none."""
+    try:
+        value = float(text)
+    except (TypeError, ValueError):
+        return None
+    return value if 0.0 <= value < float('inf') else None

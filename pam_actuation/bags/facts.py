@@ -1,0 +1,56 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a bag says of rig, valve and seed, for people; what it does not say is not invented."""
+
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+from pam_sim.model_file import rig_title
+
+NOT_RECORDED = 'not recorded'
+
+
+def recorded_rig_title(metadata):
+    """
+    Return the name of the recorded rig with what it is made from, else 'not recorded'.
+
+    Parameters
+    ----------
+    metadata : dict of str to str
+        The ``pam_experiment`` record, may be empty.
+
+    """
+    content = (metadata or {}).get('rig')
+    if not content:
+        return NOT_RECORDED
+    try:
+        return rig_title(load_rig(content))
+    except InputError:
+        pass
+    try:
+        return load_joint(content).name
+    except InputError:
+        return _stated_name(content)
+
+
+def _stated_name(content):
+    """Return the name in the text of a rig that this version cannot read."""
+    rows = dict(row.partition(':')[::2] for row in reversed(content.splitlines()))
+    return (rows.get('name') or rows.get('rig') or NOT_RECORDED).strip()
+
+
+def recorded(metadata, key):
+    """Return a text of the record, 'not recorded' where it is missing."""
+    return str((metadata or {}).get(key) or NOT_RECORDED)

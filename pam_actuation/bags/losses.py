@@ -1,0 +1,125 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How many messages are missing, counted in one way by the recorder and by ``pam info``.
+
+Every node says in /diagnostics how many messages it has published, as
+``published.<full topic>``. What a node had published by its last report must be in the
+bag from before that report; so a node that died early is checked too.
+"""
+
+from array import array
+
+from pam_actuation.bags import codecs
+from pam_sim.errors import InputError
+
+DIAGNOSTICS = '/diagnostics'
+PUBLISHED = 'published.'
+COUNT_DIGITS = 18
+_MOST_KEPT = 10_000           # send times of a topic no node reports on
+
+
+def count_of(text):
+    """Return the number a text is, None where it is no number of messages."""
+    return int(text) if text.isdecimal() and len(text) <= COUNT_DIGITS else None
+
+
+def missing_messages(unheard, published, held_by_then, accounted_for):
+    """
+    Return how many messages never arrived, None where it cannot be known.
+
+    Parameters
+    ----------
+    unheard : int or None
+        By gaps in the publishers' sequence numbers.
+    published : int or None
+        What the nodes say they have published.
+    held_by_then : int
+        Messages that were sent up to that report and are there.
+    accounted_for : int
+        Those known to be dropped or sent before the recorder was connected.
+
+    """
+    if published is None:
+        return unheard
+    return max(unheard or 0, published - held_by_then - accounted_for)
+
+
+class PublishedCounts:
+    """
+    What the nodes last reported, by full topic.
+
+    Reports of several nodes on one topic add up; the latest report's time counts.
+    """
+
+    def __init__(self):
+        self._last = {}         # topic -> status name -> (number, send time)
+
+    def hear(self, payload, sent_ns):
+        """
+        Take one serialized message of /diagnostics and its send time [ns].
+
+        Returns the topics it reports on.
+        """
+        topics = set()
+        try:
+            statuses = codecs.decode('diagnostics', payload)
+        except InputError:
+            return topics
+        for status in statuses:
+            for key, text in status.values:
+                number = count_of(text)
+                if key.startswith(PUBLISHED) and number is not None:
+                    topics.add(topic := key[len(PUBLISHED):])
+                    self._last.setdefault(topic, {})[status.name] = (number, sent_ns)
+        return topics
+
+    def of(self, topic):
+        """Return (published, send time of the last report), (None, 0) where nobody reports."""
+        last = self._last.get(topic)
+        if not last:
+            return None, 0
+        return sum(number for number, _ in last.values()), max(sent for _, sent in last.values())
+
+
+class SentTimes:
+    """Counts, while recording, the messages sent up to a report that comes after them."""
+
+    def __init__(self):
+        self._before = 0
+        self._later = array('q')
+        self._differ = self._reported = False
+
+    def add(self, sent_ns, received_ns):
+        """Take the send and receive time [ns] of one message."""
+        self._differ = self._differ or sent_ns != received_ns
+        self._later.append(sent_ns)
+        if len(self._later) > _MOST_KEPT and not self._reported:
+            self._keep(self._later[_MOST_KEPT // 2:])
+
+    def trim(self, reported_ns):
+        """Keep no times that a report at this time [ns] has settled."""
+        self._reported = True
+        self._keep(array('q', (sent for sent in self._later if sent > reported_ns)))
+
+    def _keep(self, later):
+        self._before += len(self._later) - len(later)
+        self._later = later
+
+    def up_to(self, reported_ns):
+        """Return how many were sent up to a report; all where send times are not known."""
+        if not self._differ:
+            return self._before + len(self._later)
+        return self._before + sum(sent <= reported_ns for sent in self._later)

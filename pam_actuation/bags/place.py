@@ -1,0 +1,220 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Where a bag is written, and which bag it may take the place of.
+
+A bag under a new name grows in its own folder, so that a killed recorder leaves it there.
+A bag that replaces another grows in a folder beside it; the two change places only when
+the new one is whole. What is not part of the former bag is never deleted: a folder that
+holds anything else is refused.
+"""
+
+import contextlib
+import os
+from pathlib import Path
+import stat
+
+from pam_actuation.bags import disk, layout
+from pam_sim.errors import InputError
+from pam_sim.files import make_folder, reason, shown, try_to_write
+
+# Added to the name of a bag while it is written beside the one it replaces, when it ended
+# early and may not, and to the name of the former bag while they change places.
+UNFINISHED, STOPPED, FORMER = '_unfinished', '_stopped', '_former'
+LONGEST_NAME_BYTES = 230      # files and folders of a bag add something to its name
+
+
+def check_bag_target(directory, overwrite=False):
+    """
+    Look whether a bag can be written to a folder, before the run that fills it.
+
+    Parameters
+    ----------
+    directory : path
+        The folder of the bag.
+    overwrite : bool
+        Whether the bag that is there may be replaced.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder, absolute.
+
+    Raises
+    ------
+    InputError
+        A file or link of this name, the present folder, one above it, the home folder or the
+        root of a disk; a folder that is not empty and must not be replaced, or holds anything
+        but one bag; no right or room to write there.
+
+    """
+    directory = _absolute(directory)
+    _bag_in(directory, overwrite)
+    try_to_write(directory / 'any' if directory.is_dir() and not overwrite else directory)
+    return directory
+
+
+class BagPlace:
+    """
+    The folder a bag is written into until it is settled or given up.
+
+    Parameters
+    ----------
+    directory, overwrite
+        As ``check_bag_target``, which is asked first.
+
+    Attributes
+    ----------
+    directory : pathlib.Path
+        Where the bag shall be in the end; after ``settle`` where it is.
+    folder : pathlib.Path
+        Where it is written.
+
+    """
+
+    def __init__(self, directory, overwrite=False):
+        directory = check_bag_target(directory, overwrite)
+        self.directory = self.folder = directory
+        self._former = _bag_in(directory, overwrite)
+        if self._former:
+            self.folder = _free(directory, f'{directory.name}{UNFINISHED}')
+        self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        make_folder(self.folder)
+
+    def settle(self, whole=True):
+        """
+        Put a closed bag in its place; return its folder.
+
+        One that is not whole replaces nothing: it gets a name of its own beside the former.
+        """
+        if not self._former:
+            return self.directory
+        if not whole:
+            self.directory = _free(self.directory, f'{self.directory.name}{STOPPED}')
+            os.rename(self.folder, self.directory)
+            self._moved()
+            return self.directory
+        aside = _free(self.directory, f'{self.directory.name}{FORMER}')
+        os.rename(self.directory, aside)
+        try:
+            os.rename(self.folder, self.directory)
+        except BaseException:
+            os.rename(aside, self.directory)
+            raise
+        self._moved()
+        for name in self._former:
+            (aside / name).unlink()
+        aside.rmdir()
+        self._former = []
+        return self.directory
+
+    def _moved(self):
+        self.folder, self._made = self.directory, [self.directory]
+        disk.sync_directory(self.directory.parent)
+
+    def give_up(self, files):
+        """Remove the given files of a bag that came to nothing, and the folders made for it."""
+        for path in files:
+            with contextlib.suppress(OSError):
+                path.unlink()
+        for folder in self._made:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+
+
+def _absolute(directory):
+    """Return the folder with the links on the way resolved; its own name may be no link."""
+    text = os.fspath(directory)
+    if not text.strip() or '\0' in text:
+        raise InputError(f'{text!r} is no name of a folder; give one for the bag', 'output')
+    if text.startswith('~'):
+        raise InputError('~ is not replaced by the home folder here; write that out', shown(text))
+    try:
+        if stat.S_ISLNK(os.lstat(text.rstrip(os.sep) or os.sep).st_mode):
+            raise InputError('is a symbolic link; give the name of a new folder', shown(text))
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        raise InputError(f'cannot be written: {reason(error)}', shown(text)) from None
+    path = Path(text).resolve()
+    if len(os.fsencode(path.name)) > LONGEST_NAME_BYTES:
+        raise InputError('the name is too long for a bag; give a shorter one', shown(text))
+    here = Path.cwd()
+    if path == here or path in here.parents:
+        raise InputError(
+            'is the present folder or one above it; give the name of a new folder', shown(text))
+    if path == Path(os.path.expanduser('~')) or path == Path(path.anchor) or path.is_mount():
+        raise InputError('is no folder for one bag; give the name of a new folder', shown(text))
+    return path
+
+
+def _bag_in(directory, overwrite):
+    """Return the names of the files of the bag that may be replaced, [] for a free folder."""
+    if not directory.is_dir():
+        if directory.exists():
+            raise InputError(
+                'a file has this name; give the name of a new directory', shown(directory))
+        return []
+    try:
+        present = sorted(os.listdir(directory))
+    except OSError as error:
+        raise InputError(f'cannot be read: {reason(error)}', shown(directory)) from None
+    if not present:
+        return []
+    if not overwrite:
+        raise InputError(
+            'the directory exists and is not empty; give another name or ask to overwrite '
+            '(--overwrite)', shown(directory))
+    ours = _files_of_bag(directory)
+    other = [name for name in present if name not in ours]
+    if other:
+        raise InputError(
+            f'the directory holds {other[0]!r}, which is no part of a bag, and is not '
+            'overwritten; give another name', shown(directory))
+    return [name for name in ours if name in present]
+
+
+def _files_of_bag(directory):
+    """Return the names of metadata.yaml and of the files it lists; InputError without a bag."""
+    listed = None
+    file = directory / layout.METADATA_FILE
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        if _is_regular(file):
+            facts = layout.from_yaml(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
+            if facts['storage_identifier'] == layout.STORAGE_IDENTIFIER:
+                listed = facts['relative_file_paths']
+    if not isinstance(listed, list) or not listed:
+        raise InputError(
+            f'the directory holds no bag with a {layout.METADATA_FILE} and is not overwritten; '
+            'give another name', shown(directory))
+    return [layout.METADATA_FILE] + [
+        name for name in listed if isinstance(name, str) and name.endswith('.mcap')
+        and os.path.basename(name) == name and _is_regular(directory / name)]
+
+
+def _is_regular(path):
+    try:
+        return stat.S_ISREG(os.lstat(path).st_mode)
+    except OSError:
+        return False
+
+
+def _free(directory, name):
+    """Return a path beside ``directory`` that nothing has yet: ``name``, else with a number."""
+    path, number = directory.with_name(name), 1
+    while os.path.lexists(path):
+        number += 1
+        path = directory.with_name(f'{name}{number}')
+    return path

@@ -1,0 +1,171 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the verbs write: looked at before the work, whole or not at all, nothing of yours lost."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from pam_actuation.cli.main import main
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PUSH = 'name: push\ndomain: pressure\nsegments:\n  - step: {to_pa: 250000.0, duration_s: 0.4}\n'
+EVIL = PUSH.replace('push', '../../evil', 1)
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """Return a folder with two short bags, the experiment file, and other things."""
+    folder = tmp_path_factory.mktemp('runs')
+    (folder / 'push.yaml').write_text(PUSH)
+    for name in ('first', 'second'):
+        assert main(['simulate', str(folder / 'push.yaml'), '--out', str(folder / name)]) == 0
+    return folder
+
+
+def listed(folder):
+    return {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()}
+
+
+def call(capsys, *arguments, code=0):
+    """Make a call; return what it said, checking code and form of a refusal."""
+    got = main([str(word) for word in arguments])
+    out, err = capsys.readouterr()
+    assert got == code, (arguments, err)
+    assert code != 2 or err.count('\n') == 1, err
+    return err if code == 2 else out
+
+
+def test_overwrite_keeps_recordings_of_others(bags, tmp_path, capsys):
+    many = tmp_path / 'many'
+    many.mkdir()
+    for day in ('monday', 'tuesday'):
+        (many / f'{day}.mcap').write_bytes((bags / 'first' / 'first_0.mcap').read_bytes())
+    before = listed(tmp_path)
+    for out in (many, '.'):
+        said = call(capsys, 'simulate', bags / 'push.yaml', '--out', out, '--overwrite', code=2)
+        assert str(out) in said and listed(tmp_path) == before
+
+
+def test_a_second_report_does_not_replace_the_first(bags, capsys):
+    page = bags / 'report.html'
+    assert str(page) in call(capsys, 'report', bags / 'first')
+    first = page.read_bytes()
+    assert str(bags / 'report_second.html') in call(capsys, 'report', bags / 'second')
+    assert page.read_bytes() == first
+    # The page of the same bags is made again, also by another name of the folder.
+    assert str(page) in call(capsys, 'report', os.path.join(bags, 'second', '..', 'first', ''))
+    assert 'content="pam_actuation report of first"' in page.read_text()
+    page.write_text('mine')
+    assert 'report_first.html' in call(capsys, 'report', bags / 'first')
+    (bags / 'report_first.html').write_text('mine too')
+    assert 'exists already' in call(capsys, 'report', bags / 'first', code=2)
+    assert 'exists already' in call(capsys, 'report', bags / 'first', '--out', page, code=2)
+    assert page.read_text() == 'mine' and (bags / 'report_first.html').read_text() == 'mine too'
+    assert str(page) in call(capsys, 'report', bags / 'first', '--overwrite')
+    assert page.stat().st_size > 1e6
+
+
+@pytest.mark.parametrize('verb', [
+    'report', 'replay', 'tune', 'gap', 'plan', 'characterise', 'rules', 'save', 'valves',
+    'html', 'markdown', 'policy', 'demo', 'run'])
+def test_no_verb_replaces_what_is_there_and_says_so_at_once(verb, bags, tmp_path, capsys):
+    """The searches of tune and gap would take minutes: refused before they begin."""
+    file, folder = tmp_path / 'mine.html', tmp_path / 'mine'
+    folder.mkdir()
+    for path in (file, tmp_path / 'mine.yaml', tmp_path / 'mine.json', folder / 'model.yaml',
+                 folder / 'experiment.yaml', folder / 'report.html'):
+        path.write_text('mine')
+    before = listed(tmp_path)
+    bag = bags / 'first'
+    arguments = {
+        'report': ['report', bag, '--out', file], 'replay': ['replay', bag, '--out', file],
+        'tune': ['tune', bag, '--out', tmp_path / 'mine.yaml', '--rollouts', 999_999],
+        'gap': ['gap', bag, '--out', folder, '--seconds', 9999],
+        'plan': ['gap', '--plan', '--out', folder],
+        'characterise': ['characterise', '--simulate', 'dmsp_5_300_realistic', '--out', folder],
+        'rules': ['rules', 'sofc_ppr', '--html', file],
+        'save': ['rules', 'sofc_ppr', '--save', tmp_path / 'mine.json'],
+        'valves': ['valves', 'compare', '--html', file], 'html': ['models', '--html', file],
+        'markdown': ['models', '--markdown', file], 'policy': ['up', 'rig', '--policy', file],
+        'demo': ['demo', '--out', folder],
+        'run': ['run', bags / 'push.yaml', '--out', folder]}[verb]
+    said = call(capsys, *arguments, code=2)
+    assert 'exists' in said and 'mine' in said
+    assert listed(tmp_path) == before
+
+
+def test_pages_of_the_documentation_are_made_again(tmp_path, capsys):
+    page = tmp_path / 'models.md'
+    for _ in range(2):
+        call(capsys, 'models', '--markdown', page)
+    page.write_text('mine')
+    assert 'exists already' in call(capsys, 'models', '--markdown', page, code=2)
+    call(capsys, 'models', '--markdown', page, '--overwrite')
+    assert page.read_text().startswith('# Models')
+
+
+@pytest.mark.parametrize('arguments', [
+    ['simulate', 'push.yaml', '--out', 'full'], ['report', 'first', '--out', 'page.html'],
+    ['models', '--html', 'models.html']])
+def test_a_file_system_that_refuses_half_way(arguments, bags):
+    """Files may grow to 20 kB only, as if the disk were full; real processes."""
+    before = listed(bags)
+    code = (
+        'import resource, signal, sys\n'
+        'signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n'
+        'resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n'
+        'from pam_actuation.cli.main import main\n'
+        'sys.exit(main(sys.argv[1:]))\n')
+    done = subprocess.run(
+        [sys.executable, '-c', code, *arguments], cwd=bags, capture_output=True, text=True,
+        timeout=100, check=False, env=dict(os.environ, PYTHONPATH=str(ROOT)))
+    assert done.returncode == 2 and done.stderr.count('\n') == 1, done.stderr
+    assert 'cannot be written: File too large' in done.stderr
+    assert listed(bags) == before and not (bags / 'full').exists()
+
+
+def test_an_output_that_is_full(bags):
+    done = subprocess.run(
+        f'{sys.executable} -m pam_actuation.cli.main models > /dev/full', shell=True, cwd=ROOT,
+        stderr=subprocess.PIPE, text=True, timeout=100, check=False)
+    assert done.stderr == 'pam models: No space left on device\n' and done.returncode == 2
+
+
+@pytest.mark.parametrize('arguments', [['simulate'], ['run'], ['simulate', '--overwrite']])
+def test_the_name_of_an_experiment_leads_nowhere_else(arguments, tmp_path, monkeypatch, capsys):
+    here = tmp_path / 'a' / 'b'
+    here.mkdir(parents=True)
+    (here / 'evil.yaml').write_text(EVIL)
+    monkeypatch.chdir(here)
+    said = call(capsys, *arguments, 'evil.yaml', code=2)
+    assert 'evil.yaml:1' in said and '../../evil' in said
+    assert [path.name for path in tmp_path.rglob('*')] == ['a', 'b', 'evil.yaml']
+
+
+def test_a_gap_is_made_again_for_the_same_bags_and_model_only(bags, tmp_path, capsys):
+    """The short bag is refused as data, which is a result, too."""
+    folder, model = tmp_path / 'gap', ['--model', 'dmsp_5_300_hanging_mass']
+    for _ in range(2):
+        call(capsys, 'gap', bags / 'first', *model, '--out', folder, code=1)
+    before = listed(folder)
+    for other in ([bags / 'second', *model], [bags / 'first', '--model', folder / 'model.yaml'],
+                  [bags / 'first', *model, '--certify', bags / 'second']):
+        assert 'exists already' in call(capsys, 'gap', *other, '--out', folder, code=2)
+    assert listed(folder) == before
+    call(capsys, 'gap', bags / 'second', *model, '--out', folder, '--overwrite', code=1)
+    assert listed(folder) != before

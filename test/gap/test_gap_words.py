@@ -1,0 +1,164 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sentences of a gap result never say what its numbers contradict."""
+
+from types import SimpleNamespace
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_actuation.cli import gap as gap_verb
+from pam_actuation.report.gap import next_command
+from pam_actuation.report.sections.gap import gap_section
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.gap import find_gap
+from pam_sim.gap.choice import Named
+from pam_sim.gap.result import Calibrated, GapResult, SignalGap
+from pam_sim.gap.words import explain
+from pam_sim.run import Run, Series
+import pytest
+
+FORCE = SignalGap('N', 0.05, 0.5, 0.186, 0.197)
+PRESSURE = SignalGap('Pa', 300.0, 9e3, 8e3, 400.0)
+MASS = Calibrated('mass_kg', 'kg', 5.0, 5.75, (5.7, 5.8), 7.5)
+
+
+def effect(name, quantity, unit):
+    return {'name': name, 'family': 'f', 'subsystem': 'valve', 'confidence': 0.5,
+            'equivalent': {quantity: {'value': 0.03, 'unit': unit, 'ci95': [0.02, 0.04]}},
+            'parameters': {}}
+
+
+EFFECTS = {'valve_dead_time': effect('valve_dead_time', 'delay_s', 's'),
+           'hysteresis': effect('hysteresis', 'loop_half_width_at_400kpa_n', 'N')}
+
+
+def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **more):
+    """Return what is said of a result with these numbers."""
+    result = GapResult(verdict, '', signals=signals, effects=[EFFECTS[e] for e in effects],
+                       parameters=list(parameters), **more)
+    result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
+    return explain(result, SimpleNamespace(named=list(named), share=share or {}, mistaken={}))
+
+
+def test_what_grows_rises_and_what_stays_stays():
+    named = [Named('hysteresis', 'muscle', [], ('hysteresis',))]
+    text = said('effects', {'force': FORCE, 'pressure': PRESSURE}, named, effects=['hysteresis'])
+    assert 'the gap in force rises from 0.186 to 0.197 N' in text
+    assert 'the gap in pressure falls from 8 to 0.4 kPa' in text
+    same = SignalGap('N', 0.05, 0.5, 0.1861, 0.1859)
+    assert 'the gap in force stays at 0.186 N' in said('effects', {'force': same}, named)
+    # What was within noise and is no more is told as well.
+    grown = SignalGap('N', 0.05, 0.05, 0.05, 0.5)
+    assert 'rises from 0.05 to 0.5 N' in said('effects', {'force': grown}, named)
+
+
+def test_no_pair_of_numbers_is_told_the_wrong_way():
+    random = np.random.default_rng(4)
+    for _ in range(300):
+        floor, refit, after = 10.0 ** random.uniform(-2, 1, 3)
+        text = said('parameter', {'force': SignalGap('N', floor, 1.0, refit, after)},
+                    parameters=[MASS])
+        words = text.rstrip('.').split()
+        if 'from' in words:
+            low, high = (float(words[k]) for k in (-4, -2))
+            assert ('rises' in words) == (high > low) and ('falls' in words) == (high < low)
+        else:
+            assert 'stays' in words
+            assert 'noise' in words or f'{refit:.3g}' == f'{after:.3g}' == words[-2]
+        assert ('noise' in words) == (max(refit, after) <= 1.2 * floor)
+
+
+def test_only_what_cannot_be_told_apart_is_listed_so():
+    named = [Named('valve_dead_time', 'valve', [], ('valve_dead_time', 'tube_lag')),
+             Named('hysteresis', 'muscle', [], ('hysteresis',))]
+    text = said('ambiguous', {'pressure': PRESSURE}, named,
+                effects=['valve_dead_time', 'hysteresis'], parameters=[MASS])
+    assert text.startswith('These data cannot tell valve_dead_time and tube_lag apart. Likeliest:')
+    likeliest, certain = text.split(' Certain: ')
+    assert 'valve_dead_time: delay_s' in likeliest and 'hysteresis' not in likeliest
+    assert 'hysteresis: loop' in certain and 'mass_kg = 5.75' in certain
+    named[1] = Named('hysteresis', 'muscle', [], ('hysteresis', 'mass_kg'))
+    text = said('ambiguous', {'pressure': PRESSURE}, named,
+                effects=['valve_dead_time', 'hysteresis'])
+    assert 'cannot tell valve_dead_time and tube_lag, nor hysteresis and mass_kg apart.' in text
+    assert 'Certain' not in text
+
+
+def test_unknown_is_never_explained():
+    signals = {'pressure': PRESSURE}
+    for share in ({'valve': 1.0}, {'valve': 0.97, 'muscle': 0.2}):
+        text = said('unknown', signals, share=share)
+        assert 'no known effect explains' not in text and '(explained' not in text
+        assert 'does not hold' in text and 'nothing is named' in text
+    text = said('unknown', signals, share={'valve': 0.42, 'muscle': -0.1})
+    assert text == ('The calibrated model misses 8 kPa of pressure and no known effect explains '
+                    'it: the best fit explains 42 % in the valve.')
+    assert said('unknown', signals, share={'valve': -0.2}).endswith(
+        'no known effect explains it.')
+
+
+def test_a_wrong_number_is_a_sentence_of_its_own():
+    text = said('parameter', {'pressure': PRESSURE}, parameters=[MASS])
+    assert text == ('mass_kg = 5.75 kg instead of 5 kg (+15.0 %). With this the gap in pressure '
+                    'falls from 8 to 0.4 kPa.')
+
+
+def test_the_page_of_doubtful_effects_says_likeliest():
+    assert 'What is likeliest to be missing' in gap_section(
+        GapResult('ambiguous', '', effects=[EFFECTS['hysteresis']])).body
+    assert 'What is missing in the model' in gap_section(
+        GapResult('effects', '', effects=[EFFECTS['hysteresis']])).body
+
+
+def test_the_next_experiment_is_told_with_its_command():
+    result = GapResult('ambiguous', '', model_yaml=load_rig(
+        'dmsp_5_300_hanging_mass', valve='hsv').to_yaml())
+    assert gap_verb._next_lines(result, 'runs/gap') == []
+    result.next_experiment = {'name': 'next', 'why': 'It tells A from B.', 'experiment': {}}
+    told = gap_verb._next_lines(result, 'runs/my gap')
+    assert told == ['what to measure next: It tells A from B.',
+                    "next: pam run 'runs/my gap/next_experiment.yaml' --valve hsv"]
+    command = next_command(result, 'next_experiment.yaml')
+    assert command in gap_section(result, command=command).body
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded(nominal(), voltages(4.0))
+
+
+def part(run, start, stop, every=1, topics=None):
+    """Return a part of a recording, as a cut or filtered copy holds it."""
+    return Run({topic: Series(series.stamp_ns[start:stop:every], {
+        name: column[start:stop:every] for name, column in series.values.items()})
+        for topic, series in run.topics.items() if topics is None or topic in topics},
+        {}, '/other', 'copy')
+
+
+def test_the_proof_may_not_be_on_searched_data(run):
+    for copy in (run, part(run, 0, None), part(run, 100, 300), part(run, 0, None, 4),
+                 part(run, 0, None, topics=('pressure', 'valve_signal'))):
+        with pytest.raises(InputError) as found:
+            find_gap([recorded(nominal(), voltages(4.0), seed=9), run], nominal(), copy)
+        assert 'is the same recording as simulated (100 % of its messages' in str(found.value)
+        assert str(found.value).startswith('--certify')
+
+
+def test_another_run_of_the_same_clock_is_a_proof(run):
+    # Simulations begin at one time: equal stamps alone say nothing.
+    other = recorded(nominal(), voltages(4.0), seed=1, jitter_s=0.0)
+    find_gap(recorded(nominal(), voltages(4.0), seed=2, jitter_s=0.0), nominal(), other,
+             effects=['leakage'], seconds=1.0)
