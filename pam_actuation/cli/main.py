@@ -99,7 +99,7 @@ def _run_verb(argv, begin=lambda: None):
         print(f'pam {args.verb}: {" ".join(str(mistake).split())}', file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as stop:
-        print(f'pam {args.verb}: stopped' + (f'; {stop}' if str(stop) else ''), file=sys.stderr)
+        print(f'pam {args.verb}: {str(stop) or "stopped"}', file=sys.stderr)
         return interrupts.EXIT_INTERRUPTED
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()

@@ -89,7 +89,7 @@ def run(args):
             problems = supervisor.finish()
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:
-        raise KeyboardInterrupt('the nodes were still starting')
+        raise KeyboardInterrupt('stopped while the nodes started')
     findings = list(dict.fromkeys(filter(None, [failure, *problems])))
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
