@@ -140,7 +140,8 @@ class Located(Mapping):
                     f'unknown {what} `{key}`{hint}; allowed: {", ".join(allowed) or "none"}', key)
         return self
 
-    def require(self, key, type=None, lower=None, upper=None, choices=None, unit=''):
+    def require(self, key, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
         """
         Return a value that must be there.
 
@@ -169,7 +170,8 @@ class Located(Mapping):
         return check_value(
             self._values[key], f'`{key}`', self.where(key), type, lower, upper, choices, unit)
 
-    def get(self, key, type=None, default=None, lower=None, upper=None, choices=None, unit=''):
+    def get(self, key, type=None,  # noqa: A002
+            default=None, lower=None, upper=None, choices=None, unit=''):
         """Return a checked value as :meth:`require` does, or ``default`` if the key is absent."""
         if key not in self._values:
             return default
@@ -194,7 +196,8 @@ class LocatedList(list):
         known = index is not None and 0 <= index < len(self._lines)
         return f'{self.name}:{self._lines[index] if known else self.line}'
 
-    def require(self, index, type=None, lower=None, upper=None, choices=None, unit=''):
+    def require(self, index, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
         """Return item ``index`` checked as :meth:`Located.require` does."""
         if not 0 <= index < len(self):
             raise InputError(f'item {index + 1} is missing', self.where())
@@ -217,7 +220,8 @@ def _has_type(value, wanted):
     return isinstance(value, wanted)
 
 
-def check_value(value, what, where, type=None, lower=None, upper=None, choices=None, unit=''):
+def check_value(value, what, where, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
     """
     Return ``value`` (a number as ``float`` where ``type`` is float) or raise.
 

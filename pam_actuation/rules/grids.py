@@ -77,7 +77,7 @@ class Grid:
 
     @property
     def change(self):
-        """What was changed [kPa]."""
+        """Return what was changed [kPa]."""
         return self.values - self.before
 
     @property

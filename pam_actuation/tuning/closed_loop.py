@@ -66,7 +66,7 @@ class LoopResult(TrackingErrors):
 
     @property
     def error_m(self):
-        """Reference minus contraction [m]."""
+        """Return reference minus contraction [m]."""
         return self.reference_m - self.contraction_m
 
     error = error_m

@@ -39,5 +39,5 @@ class ModeResult(TrackingErrors):
 
     @property
     def error(self):
-        """Reference minus what was reached, in ``unit``."""
+        """Return reference minus what was reached, in ``unit``."""
         return self.reference - self.value

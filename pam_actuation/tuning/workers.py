@@ -78,7 +78,7 @@ class Workers:
         self._stack.close()
         self._parallel = None
 
-    def map(self, function, problem, items):
+    def map(self, function, problem, items):  # noqa: A003
         """
         Return ``[function(problem, item) for item in items]``, computed in parallel.
 

@@ -73,13 +73,13 @@ class LawChoice:
     """
 
     name: str = 'sarosi'
-    set: str = None
+    set: str = None  # noqa: A003
     parameters: dict = field(default_factory=dict)
     table: LookupTable = None
 
     @cached_property
     def law(self):
-        """The law itself; made once."""
+        """Return the law itself; made once."""
         if self.table is not None:
             return make_law(self.name, self.table)
         return make_law(self.name, self.parameters or None, self.set)
