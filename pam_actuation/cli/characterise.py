@@ -14,7 +14,9 @@
 
 """``pam characterise``: lookup surfaces from recordings or tables of static points."""
 
-from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, progress
+from pam_actuation.cli.common import (
+    add_recover_option, add_seed_option, emit, EXIT_DONE, progress)
+from pam_actuation.cli.options import count, number, out_path, source
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
 EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
@@ -22,27 +24,32 @@ EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('source', nargs='*', metavar='BAG|CSV',
+    parser.add_argument('source', type=source, nargs='*', metavar='BAG|CSV',
                         help='bags, one fixed load each, or one table measured by others')
-    parser.add_argument('--out', required=True, metavar='DIR', help='folder for the results')
-    parser.add_argument('--simulate', metavar='RIG', default=None,
+    parser.add_argument('--out', type=out_path, required=True, metavar='DIR',
+                        help='folder for the results')
+    parser.add_argument('--simulate', type=source, metavar='RIG', default=None,
                         help='first simulate the bags with this rig (0 to 150 N in 10 N steps, '
                              'about 100 MB)')
-    parser.add_argument('--seed', type=int, default=0, help='seed of the simulated sensors')
-    parser.add_argument('--jobs', type=int, default=2, help='processes that simulate')
-    parser.add_argument('--experiment', default='pressure_increments', metavar='NAME|FILE',
+    add_seed_option(parser, 'seed of the simulated sensors')
+    parser.add_argument('--jobs', type=count(1, 64), default=2, metavar='N',
+                        help='processes that simulate (default: %(default)s)')
+    parser.add_argument('--experiment', type=source, default='pressure_increments',
+                        metavar='NAME|FILE',
                         help='experiment to simulate (default: %(default)s)')
     parser.add_argument('--namespace', default=None, help='which muscle of a bag with several')
-    parser.add_argument('--load-n', type=float, nargs='+', default=None, metavar='N',
+    parser.add_argument('--load-n', type=number(0.0, 1e4, 'N'), nargs='+', default=None,
+                        metavar='N',
                         help='loads, one per bag in their order, instead of the measured ones; '
                              'with --simulate the loads to hang on')
-    parser.add_argument('--load-step-n', type=float, default=None, metavar='N',
+    parser.add_argument('--load-step-n', type=number(0.01, 1e3, 'N'), default=None, metavar='N',
                         help='spacing of loads in the table (default: as measured)')
-    parser.add_argument('--length-m', type=float, default=None, metavar='M',
+    parser.add_argument('--length-m', type=number(0.01, 20.0, 'm'), default=None, metavar='M',
                         help='length of the muscle at rest, where no rig says it')
-    parser.add_argument('--bore-m', type=float, default=None, metavar='M',
+    parser.add_argument('--bore-m', type=number(1e-4, 0.2, 'm'), default=None, metavar='M',
                         help='inner diameter at rest, where no rig says it')
-    parser.add_argument('--dead-volume-m3', type=float, default=None, metavar='M3',
+    parser.add_argument('--dead-volume-m3', type=number(0.0, 1.0, 'm^3'), default=None,
+                        metavar='M3',
                         help='air beside the muscle (default: of the rig, else 0)')
     parser.add_argument('--note', action='append', default=[], metavar='TEXT',
                         help='a line for the provenance, may be repeated')
@@ -77,8 +84,6 @@ def _simulated(args):
     from pam_sim.errors import InputError
     if args.source:
         raise InputError('takes no bags: it makes them', '--simulate')
-    if not 1 <= args.jobs <= 64:
-        raise InputError(f'is {args.jobs}; allowed is 1 to 64', '--jobs')
     rig = with_sensor_noise(load_rig(args.simulate))
     loads = args.load_n or LOADS_N
     with progress(args, len(loads), ' bags', 'simulating') as bar:

@@ -18,6 +18,7 @@ import json
 import os
 import sys
 
+from pam_actuation.cli.options import count, HIGHEST_SEED, source
 from tqdm import tqdm
 
 EXIT_DONE = 0
@@ -57,7 +58,7 @@ def progress(args, total, unit='', description=''):
 def add_rig_options(parser):
     """Add the options that choose the rig, as used by several verbs."""
     parser.add_argument(
-        '--rig', default='dmsp_5_300_realistic', metavar='NAME|FILE',
+        '--rig', type=source, default='dmsp_5_300_realistic', metavar='NAME|FILE',
         help='rig preset or model YAML (default: %(default)s)')
     parser.add_argument(
         '--valve', metavar='ppr|hsv', default=None,
@@ -69,20 +70,20 @@ def add_controller_options(
         'in force'):
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
-        '--controller', default=None, metavar='NAME|FILE',
+        '--controller', type=source, default=None, metavar='NAME|FILE',
         help=f'controller preset or YAML (default: {default})')
     parser.add_argument(
-        '--rules', default=None, metavar='FILE', help='rule file to start from')
+        '--rules', type=source, default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
         '--freeze', action='store_true', help='keep the rules frozen: no learning')
 
 
 def add_experiment_options(parser):
     """Add what ``run`` and ``simulate`` both need: experiment, rig, controller, seed."""
-    parser.add_argument('experiment', help='experiment name or YAML file')
+    parser.add_argument('experiment', type=source, help='experiment name or YAML file')
     add_rig_options(parser)
     add_controller_options(parser)
-    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    add_seed_option(parser, 'seed of the sensor noise')
     parser.add_argument('--overwrite', action='store_true', help='replace an existing bag')
 
 
@@ -118,6 +119,12 @@ def load_setup(args):
 def default_controller(args, valve):
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'
+
+
+def add_seed_option(parser, text):
+    """Add the option of the seed, said to be that of ``text``."""
+    parser.add_argument(
+        '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
 
 
 def add_recover_option(parser):

@@ -18,6 +18,7 @@ import os
 import time
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.options import out_path
 
 HELP = ('Run the real nodes as separate processes on DDS for both valves: record, replay, tune, '
         'gap between model and recording, one HTML page. Takes about three minutes.')
@@ -26,7 +27,7 @@ EXAMPLE = 'pam demo --out runs/demo'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='folder for bags and page (default: runs/demo-TIME)')
     parser.add_argument('--quick', action='store_true',
                         help='two short cycles per run and a short gap search: only to see that '

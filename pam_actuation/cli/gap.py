@@ -17,6 +17,7 @@
 import json
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING, progress
+from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
@@ -26,12 +27,13 @@ MODEL = 'dmsp_5_300_hanging_mass'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('run', nargs='*', help='recorded bags')
-    parser.add_argument('--model', default=MODEL, metavar='NAME|FILE',
+    parser.add_argument('run', type=source, nargs='*', help='recorded bags')
+    parser.add_argument('--model', type=source, default=MODEL, metavar='NAME|FILE',
                         help='model YAML or rig preset to hold against the recording '
                         '(default: %(default)s)')
-    parser.add_argument('--out', default=None, metavar='DIR', help='folder for the results')
-    parser.add_argument('--explain', default=None, metavar='EFFECT',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
+                        help='folder for the results')
+    parser.add_argument('--explain', type=source, default=None, metavar='EFFECT',
                         help='say what an effect is, from which size on it shows and what looks '
                         'like it; in the bag, or without one in a simulated identification')
     parser.add_argument('--plan', action='store_true',
@@ -42,14 +44,14 @@ def add_arguments(parser):
                         help='plan for a model preset with this valve')
     parser.add_argument('--no-force', action='store_true',
                         help='plan for a rig without a load cell')
-    parser.add_argument('--certify', default=None, metavar='RUN',
+    parser.add_argument('--certify', type=source, default=None, metavar='RUN',
                         help='bag for the proof (default: every fifth block of the first bag)')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
-    parser.add_argument('--effects', default=None, metavar='A,B',
+    parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names to try (default: all)')
-    parser.add_argument('--seconds', type=float, default=SECONDS, metavar='N',
+    parser.add_argument('--seconds', type=number(1.0, None, 's'), default=SECONDS, metavar='N',
                         help='time budget of the search (default: %(default)g)')
-    parser.add_argument('--materiality', type=float, default=1.0, metavar='S',
+    parser.add_argument('--materiality', type=number(0.01, 1000.0), default=1.0, metavar='S',
                         help='an effect is named when it moves a signal by more than S standard '
                         'deviations of its sensor (default: %(default)g)')
 

@@ -17,6 +17,7 @@
 from pathlib import Path
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.options import source
 
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
@@ -24,7 +25,7 @@ EXAMPLE = 'pam info runs/first'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', help='bag directory, or a lone .mcap file')
+    parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
         '--recover', action='store_true',
         help='first repair a recording that broke off: rebuild the index of its files and '

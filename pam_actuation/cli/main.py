@@ -20,6 +20,7 @@ import os
 import sys
 
 from pam_actuation.cli.common import EXIT_BAD_INPUT
+from pam_actuation.cli.options import Parser
 from pam_sim.errors import InputError
 
 VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
@@ -29,7 +30,7 @@ VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap
 def build_parser():
     """Return the argument parser with one sub-parser per verb."""
     from pam_actuation import __version__
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog='pam', description='Simulate, run, record, replay and tune a pneumatic muscle rig.',
         epilog='Start with "pam demo", or "pam simulate sine_quarter_hz --out runs/first".')
     parser.add_argument('--version', action='version', version=f'pam_actuation {__version__}')
@@ -58,7 +59,10 @@ def main(argv=None):
     """
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    args = build_parser().parse_args(argv)
+    try:
+        args = build_parser().parse_args(argv)
+    except SystemExit as ended:     # --help, or an option that is not allowed
+        return ended.code
     try:
         return args.call(args)
     except InputError as mistake:

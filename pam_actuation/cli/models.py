@@ -15,6 +15,7 @@
 """``pam models``: the laws, valves, loads, effects, sensors and rigs the simulator knows."""
 
 from pam_actuation.cli.common import emit, EXIT_DONE
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'List muscle laws, valves, loads and effects with equations, parameters and sources.'
 EXAMPLE = 'pam models hysteresis'
@@ -22,10 +23,11 @@ EXAMPLE = 'pam models hysteresis'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('name', nargs='?', default=None, help='show this entry in full')
-    parser.add_argument('--html', metavar='FILE', default=None,
+    parser.add_argument('name', type=source, nargs='?', default=None,
+                        help='show this entry in full')
+    parser.add_argument('--html', type=out_path, metavar='FILE', default=None,
                         help='write all entries as one HTML page')
-    parser.add_argument('--markdown', metavar='FILE', default=None,
+    parser.add_argument('--markdown', type=out_path, metavar='FILE', default=None,
                         help='write all entries as a Markdown page')
 
 

@@ -17,6 +17,7 @@
 from pathlib import Path
 
 from pam_actuation.cli.common import emit, EXIT_DONE
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'List the nodes with parameters, topics and services; write their pages.'
 EXAMPLE = 'pam nodes valve_driver'
@@ -24,8 +25,9 @@ EXAMPLE = 'pam nodes valve_driver'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('name', nargs='?', default=None, help='show the page of this node')
-    parser.add_argument('--markdown', metavar='DIR', default=None,
+    parser.add_argument('name', type=source, nargs='?', default=None,
+                        help='show the page of this node')
+    parser.add_argument('--markdown', type=out_path, metavar='DIR', default=None,
                         help='write a Markdown page per node into this folder')
 
 

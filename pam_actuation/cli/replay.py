@@ -15,6 +15,7 @@
 """``pam replay``: step controller, driver and plant offline on what was recorded."""
 
 from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.options import out_path, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
         'chained, and compare with the recording.')
@@ -23,7 +24,7 @@ EXAMPLE = 'pam replay runs/first --chain'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', help='bag directory, or a lone .mcap file')
+    parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bag')
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
@@ -33,11 +34,13 @@ def add_arguments(parser):
         '--chain', action='store_true',
         help='repeat the experiment: controller, driver and plant in a closed loop')
     parser.add_argument(
-        '--set', dest='changes', action='append', default=None, metavar='FILE|NAME=VALUE',
+        '--set', dest='changes', type=source, action='append', default=None,
+        metavar='FILE|NAME=VALUE',
         help='another controller YAML or one changed setting (may be repeated): what would '
         'this tuning have commanded; with --chain: how would it have gone')
     parser.add_argument(
-        '--out', default=None, metavar='FILE', help='write the replayed signals as an .npz file')
+        '--out', type=out_path, default=None, metavar='FILE',
+        help='write the replayed signals as an .npz file')
     add_recover_option(parser)
 
 

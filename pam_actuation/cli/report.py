@@ -17,6 +17,7 @@
 import os
 
 from pam_actuation.cli.common import add_recover_option, emit, EXIT_DONE
+from pam_actuation.cli.options import out_path, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
 EXAMPLE = 'pam report runs/first --out first.html'
@@ -24,9 +25,9 @@ EXAMPLE = 'pam report runs/first --out first.html'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', nargs='+', help='bag directories or .mcap files')
+    parser.add_argument('bag', type=source, nargs='+', help='bag directories or .mcap files')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
-    parser.add_argument('--out', default=None, metavar='FILE',
+    parser.add_argument('--out', type=out_path, default=None, metavar='FILE',
                         help='page to write (default: report.html beside the first bag)')
     add_recover_option(parser)
 

@@ -20,6 +20,7 @@ import sys
 
 from pam_actuation.cli.common import (
     add_recover_option, add_rig_options, emit, EXIT_DONE, progress)
+from pam_actuation.cli.options import count, out_path, source
 
 HELP = 'Show the rules of a controller: tables, what changed, how often each fired, in words.'
 EXAMPLE = 'pam rules runs/first --top 20 --html rules.html'
@@ -27,15 +28,17 @@ EXAMPLE = 'pam rules runs/first --top 20 --html rules.html'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('rules', metavar='FILE|BAG|CONTROLLER',
+    parser.add_argument('rules', type=source, metavar='FILE|BAG|CONTROLLER',
                         help='rule file (.json), bag, controller YAML or preset')
-    parser.add_argument('--against', metavar='FILE|BAG|CONTROLLER', default=None,
+    parser.add_argument('--against', type=source, metavar='FILE|BAG|CONTROLLER',
+                        default=None,
                         help='count changes against these rules (default: the rules at the '
                         'start of a bag, else the initial ones)')
-    parser.add_argument('--top', type=int, default=12, metavar='N',
+    parser.add_argument('--top', type=count(0), default=12, metavar='N',
                         help='how many rules to say in words (default: %(default)s)')
-    parser.add_argument('--html', metavar='FILE', default=None, help='write an HTML page too')
-    parser.add_argument('--save', metavar='FILE', default=None,
+    parser.add_argument('--html', type=out_path, metavar='FILE', default=None,
+                        help='write an HTML page too')
+    parser.add_argument('--save', type=out_path, metavar='FILE', default=None,
                         help='write the rules to a rule file, for --rules of other verbs')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in a bag')
     add_rig_options(parser)
@@ -47,8 +50,6 @@ def run(args):
     from pam_actuation.rules.text import as_text
     from pam_actuation.rules.view import view_of
     from pam_sim.errors import InputError
-    if args.top < 0:
-        raise InputError(f'is {args.top}; allowed is 0 or more', '--top')
     if args.save is not None and not args.save.endswith('.json'):
         raise InputError('a rule file ends in .json', f'--save {args.save}')
     found = _find(args, args.rules)

@@ -19,6 +19,7 @@ import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress)
+from pam_actuation.cli.options import count, out_path
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
@@ -27,9 +28,9 @@ EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 def add_arguments(parser):
     """Declare the options of the verb."""
     add_experiment_options(parser)
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
-    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: a free one, this machine only)')
     parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
 

@@ -19,6 +19,7 @@ import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, load_setup, progress)
+from pam_actuation.cli.options import out_path
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
@@ -27,7 +28,7 @@ EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
 def add_arguments(parser):
     """Declare the options of the verb."""
     add_experiment_options(parser)
-    parser.add_argument('--out', default=None, metavar='DIR',
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE)')
 
 

@@ -17,7 +17,9 @@
 import os
 
 from pam_actuation.cli.common import (
-    add_controller_options, default_controller, emit, EXIT_DONE, EXIT_FINDING, progress)
+    add_controller_options, add_seed_option, default_controller, emit, EXIT_DONE, EXIT_FINDING,
+    progress)
+from pam_actuation.cli.options import count, out_path, source
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
         'writes controller YAML, initial rules and report.')
@@ -28,36 +30,38 @@ CHECK = 'tuning_check'
 
 def add_arguments(parser):
     """Declare the options of the verb."""
-    parser.add_argument('bag', nargs='*', help='bags that say rig, controller and experiment')
-    parser.add_argument('--model', '--rig', dest='rig', default=None, metavar='NAME|FILE',
+    parser.add_argument('bag', type=source, nargs='*',
+                        help='bags that say rig, controller and experiment')
+    parser.add_argument('--model', '--rig', dest='rig', type=source, default=None,
+                        metavar='NAME|FILE',
                         help='model to tune on (default: the rig of the first bag)')
     parser.add_argument('--valve', metavar='ppr|hsv', default=None, help='valve type')
     parser.add_argument(
-        '--experiment', action='append', default=None, metavar='NAME|FILE',
+        '--experiment', type=source, action='append', default=None, metavar='NAME|FILE',
         help='experiment to tune for, may be repeated (default: those of the bags; without '
         f'bags {", ".join(EXPERIMENTS)})')
     parser.add_argument(
-        '--check', action='append', default=None, metavar='NAME|FILE',
+        '--check', type=source, action='append', default=None, metavar='NAME|FILE',
         help=f'experiment of the held-out check, may be repeated (default: {CHECK} and those of '
         'the search, with other noise)')
     add_controller_options(
         parser, 'that of the first bag, else sofc_ppr or sofc_hsv, after the valve; it tracks '
         'contraction')
-    parser.add_argument('--rollouts', type=int, default=3000, metavar='N',
+    parser.add_argument('--rollouts', type=count(10), default=3000, metavar='N',
                         help='budget of simulated runs of the search (default: %(default)s)')
-    parser.add_argument('--randomise', type=int, default=0, metavar='N',
+    parser.add_argument('--randomise', type=count(0, 1000), default=0, metavar='N',
                         help='tune on so many random rigs beside the model (default: 0)')
-    parser.add_argument('--patience', type=int, default=30, metavar='N',
+    parser.add_argument('--patience', type=count(0), default=30, metavar='N',
                         help='stop after so many generations without progress, 0 = never '
                         '(default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=-1, metavar='N',
+    parser.add_argument('--jobs', type=count(1, 1024, {-1: 'one a core'}), default=-1,
+                        metavar='N',
                         help='threads; -1 = one a core (default)')
-    parser.add_argument('--cluster', default=None, metavar='ADDRESS',
+    parser.add_argument('--cluster', type=source, default=None, metavar='ADDRESS',
                         help='run on a Dask scheduler (tcp://HOST:PORT) or a Ray cluster '
                         '(ray://HOST:PORT) instead')
-    parser.add_argument('--seed', type=int, default=0,
-                        help='seed of search, sensor noise and random rigs')
-    parser.add_argument('--out', default='tuned.yaml', metavar='FILE.yaml',
+    add_seed_option(parser, 'seed of search, sensor noise and random rigs')
+    parser.add_argument('--out', type=out_path, default='tuned.yaml', metavar='FILE.yaml',
                         help='controller to write; its rules and the report go beside it '
                         '(default: %(default)s)')
 
@@ -107,13 +111,8 @@ def run(args):
 
 
 def _checked(args):
-    """Return the path of ``--out`` without its ending; raise InputError for bad options."""
+    """Return the path of ``--out`` without its ending; raise InputError without its folder."""
     from pam_sim.errors import InputError
-    for name, least in (('rollouts', 10), ('randomise', 0), ('patience', 0)):
-        if getattr(args, name) < least:
-            raise InputError(f'is {getattr(args, name)}; allowed is {least} or more', f'--{name}')
-    if args.jobs == 0:
-        raise InputError('is 0; allowed is 1 or more, or -1 for one a core', '--jobs')
     folder = os.path.dirname(os.path.abspath(args.out))
     if not os.path.isdir(folder):
         raise InputError('the folder does not exist', folder)

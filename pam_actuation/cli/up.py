@@ -15,6 +15,7 @@
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.options import count, number, out_path, source
 from pam_sim.errors import InputError
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
@@ -26,23 +27,24 @@ def add_arguments(parser):
     parser.add_argument('what', choices=('rig', 'knee', 'exo'),
                         help='one muscle, a joint with two, two joints')
     parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
-    parser.add_argument('--model', default='', metavar='NAME',
+    parser.add_argument('--model', type=source, default=None, metavar='NAME',
                         help='rig or joint: preset, or path of a model file')
-    parser.add_argument('--controller', default='', metavar='NAME',
+    parser.add_argument('--controller', type=source, default=None, metavar='NAME',
                         help='controller preset or file (default: that of valve and experiment)')
-    parser.add_argument('--experiment', default='', metavar='NAME',
+    parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
-    parser.add_argument('--hardware', default='sim', metavar='NAME',
+    parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
                         help='rig only: sim, another name in config/hardware, or a file')
-    parser.add_argument('--record', default='', metavar='DIR', help='rig only: folder of a bag')
+    parser.add_argument('--record', type=out_path, default=None, metavar='DIR',
+                        help='rig only: folder of a bag')
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
-    parser.add_argument('--domain-id', type=int, default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
-    parser.add_argument('--realtime-priority', type=int, choices=range(97), default=0,
+    parser.add_argument('--realtime-priority', type=count(0, 96), default=0,
                         metavar='N', help='of all nodes, 1 to 96 (default: none)')
-    parser.add_argument('--seconds', type=float, default=None, metavar='S',
+    parser.add_argument('--seconds', type=number(0.0, None, 's'), default=None, metavar='S',
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
-    parser.add_argument('--policy', metavar='FILE', default=None,
+    parser.add_argument('--policy', type=out_path, metavar='FILE', default=None,
                         help='start nothing; write the access policy of these nodes (SROS2)')
 
 
@@ -85,14 +87,14 @@ def _write_policy(args, nodes):
 def _nodes(args):
     """Return the nodes that are asked for."""
     from pam_actuation.rigging import layouts
-    options = {'valve': args.valve, 'controller': args.controller,
-               'experiment': args.experiment}
+    options = {'valve': args.valve, 'controller': args.controller or '',
+               'experiment': args.experiment or ''}
     if args.namespace is not None:
         options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     if args.what == 'rig':
-        return layouts.rig(hardware=args.hardware, record=args.record, **options)
+        return layouts.rig(hardware=args.hardware, record=args.record or '', **options)
     for name, given in (('--hardware', args.hardware != 'sim'), ('--record', args.record)):
         if given:
             raise InputError(f'is for a rig only, not for {args.what}', name)

@@ -14,7 +14,8 @@
 
 """``pam valves compare``: the regulator and the on/off pair, measured on the same rig."""
 
-from pam_actuation.cli.common import emit, EXIT_DONE, progress
+from pam_actuation.cli.common import add_seed_option, emit, EXIT_DONE, progress
+from pam_actuation.cli.options import number, out_path, source
 
 HELP = 'Compare the valve types on one rig: accuracy, response, air, ripple, power, power loss.'
 EXAMPLE = 'pam valves compare --rig dmsp_5_300_realistic --html valves.html'
@@ -24,13 +25,14 @@ def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('what', choices=('compare',), help='what to do with the valves')
     parser.add_argument(
-        '--rig', default='dmsp_5_300_realistic', metavar='NAME|FILE',
+        '--rig', type=source, default='dmsp_5_300_realistic', metavar='NAME|FILE',
         help='rig preset or model YAML; its valve is replaced (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=0, help='seed of the sensor noise')
+    add_seed_option(parser, 'seed of the sensor noise')
     parser.add_argument(
-        '--hold', type=float, default=60.0, metavar='SECONDS',
+        '--hold', type=number(2.0, 3600.0, 's'), default=60.0, metavar='SECONDS',
         help='length of the holds (default: %(default)g)')
-    parser.add_argument('--html', metavar='FILE', default=None, help='write an HTML page too')
+    parser.add_argument('--html', type=out_path, metavar='FILE', default=None,
+                        help='write an HTML page too')
     parser.add_argument(
         '--power', action='append', default=[], metavar='NAME=VALUE',
         help='a power number: ppr_power_w, hsv_peak_power_w, hsv_peak_time_s, hsv_hold_power_w')

@@ -1,0 +1,140 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Types of command line options: numbers with range and unit, whole numbers, paths, names.
+
+Each is given to ``add_argument(type=…)``. A value that is not allowed ends the program with
+one sentence and exit code 2, before anything is loaded.
+"""
+
+import argparse
+import math
+import os
+import re
+
+LONGEST_NAME_BYTES = 255      # of one file or folder, on every file system in use
+HIGHEST_SEED = 2**32 - 1
+_DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that tells a mistake in one line, without repeating the usage."""
+
+    def error(self, message):
+        """Print the mistake and exit with code 2."""
+        said = ' '.join(message.removeprefix('argument ').split())
+        self.exit(2, f'{self.prog}: {said}\n')
+
+
+def allowed_text(lowest=None, highest=None, unit=''):
+    """Return a range in words: ``0 to 5 s``, ``0 s or more``, ``at most 5 s``, ``any number``."""
+    end = f' {unit}' if unit else ''
+    if lowest is None and highest is None:
+        return f'any number, in {unit}' if unit else 'any number'
+    if highest is None:
+        return f'{lowest:.10g}{end} or more'
+    if lowest is None:
+        return f'at most {highest:.10g}{end}'
+    return f'{lowest:.10g} to {highest:.10g}{end}'
+
+
+def number(lowest=None, highest=None, unit=''):
+    """
+    Return the type of an option that is a finite number.
+
+    Parameters
+    ----------
+    lowest, highest : float, optional
+        Bounds, themselves allowed.
+    unit : str
+        What the user writes the number in, for the message.
+
+    """
+    allowed = allowed_text(lowest, highest, unit)
+
+    def read(text):
+        try:
+            value = float(text)
+        except ValueError:
+            raise _refused(text, 'is not a number', allowed) from None
+        if not math.isfinite(value):
+            raise _refused(text, 'is not a finite number', allowed)
+        _check_range(value, text, lowest, highest, allowed)
+        return value
+    return read
+
+
+def count(lowest=0, highest=None, also=None):
+    """
+    Return the type of an option that is a whole number.
+
+    Parameters
+    ----------
+    lowest, highest : int, optional
+        Bounds, themselves allowed.
+    also : dict, optional
+        Single values outside the bounds and what they mean, such as ``{-1: 'one a core'}``.
+
+    """
+    also = also or {}
+    allowed = ', or '.join([allowed_text(lowest, highest),
+                            *(f'{value} for {meaning}' for value, meaning in also.items())])
+
+    def read(text):
+        try:
+            value = int(text)
+        except ValueError:
+            raise _refused(text, 'is not a whole number', allowed) from None
+        if value not in also:
+            _check_range(value, text, lowest, highest, allowed)
+        return value
+    return read
+
+
+def out_path(text):
+    """Return the path of a file or folder to write; refuse what can be none."""
+    _check_text(text, 'give a file or folder')
+    for name in text.split(os.sep):
+        length = len(os.fsencode(name))
+        if length > LONGEST_NAME_BYTES:
+            raise argparse.ArgumentTypeError(
+                f'the name {name[:20]}… is {length} bytes long; allowed is '
+                f'{LONGEST_NAME_BYTES} at most')
+    return text
+
+
+def source(text):
+    """Return the name or path of something to read; refuse what can be neither."""
+    _check_text(text, 'give a name or a file')
+    return text
+
+
+def _check_text(text, wanted):
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f'is empty; {wanted}')
+    if '\0' in text:
+        raise argparse.ArgumentTypeError(f'holds a zero byte; {wanted}')
+
+
+def _check_range(value, text, lowest, highest, allowed):
+    if lowest is not None and value < lowest or highest is not None and value > highest:
+        raise argparse.ArgumentTypeError(f'is {text}; allowed is {allowed}')
+
+
+def _refused(text, why, allowed):
+    """Return the error of a text that is no number of the kind wanted."""
+    if _DECIMAL_COMMA.fullmatch(text.strip()):
+        why += ': write a decimal point, not a comma'
+    return argparse.ArgumentTypeError(f'{text!r} {why}; allowed is {allowed}')

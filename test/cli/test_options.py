@@ -1,0 +1,104 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Options of every verb: values that are not allowed are told with range, in one sentence."""
+
+import argparse
+
+from pam_actuation.cli.main import build_parser, main, VERBS
+from pam_actuation.cli.options import count, number, out_path, source
+import pytest
+
+# What each verb needs before an option is looked at.
+NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
+         'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
+         'valves': ['compare'], 'rules': ['sofc_ppr']}
+WRONG_NUMBERS = {
+    'number': ('-5', 'nan', 'inf', 'five', '3,5', '', '1e999'),
+    'count': ('-5', 'nan', '2.5', 'five', '3,5', '', '99999999999999999999x')}
+# Range of every number an option takes, as a user reads it.
+NUMBERS = {
+    ('run', '--seed'): '0 to 4294967295', ('run', '--domain-id'): '0 to 232',
+    ('simulate', '--seed'): '0 to 4294967295',
+    ('up', '--domain-id'): '0 to 232', ('up', '--realtime-priority'): '0 to 96',
+    ('up', '--seconds'): '0 s or more',
+    ('tune', '--rollouts'): '10 or more', ('tune', '--randomise'): '0 to 1000',
+    ('tune', '--patience'): '0 or more', ('tune', '--jobs'): '1 to 1024, or -1 for one a core',
+    ('tune', '--seed'): '0 to 4294967295',
+    ('characterise', '--seed'): '0 to 4294967295', ('characterise', '--jobs'): '1 to 64',
+    ('characterise', '--load-n'): '0 to 10000 N',
+    ('characterise', '--load-step-n'): '0.01 to 1000 N',
+    ('characterise', '--length-m'): '0.01 to 20 m',
+    ('characterise', '--bore-m'): '0.0001 to 0.2 m',
+    ('characterise', '--dead-volume-m3'): '0 to 1 m^3',
+    ('gap', '--seconds'): '1 s or more', ('gap', '--materiality'): '0.01 to 1000',
+    ('valves', '--seed'): '0 to 4294967295', ('valves', '--hold'): '2 to 3600 s',
+    ('rules', '--top'): '0 or more'}
+
+
+def _options():
+    """Return (verb, action) of every option and argument of every verb."""
+    verbs = next(action for action in build_parser()._actions
+                 if isinstance(action, argparse._SubParsersAction))
+    return [(verb, action) for verb in VERBS for action in verbs.choices[verb]._actions]
+
+
+def _kind(action):
+    return getattr(action.type, '__qualname__', '').partition('.')[0]
+
+
+def test_every_number_of_every_verb_has_a_range():
+    numbers = {(verb, action.option_strings[0]) for verb, action in _options()
+               if _kind(action) in WRONG_NUMBERS}
+    assert numbers == set(NUMBERS)
+    assert not [action.dest for _, action in _options() if action.type in (int, float)]
+
+
+def test_what_is_written_or_read_is_never_an_empty_name():
+    words = {action.dest for _, action in _options() if action.metavar in (
+        'DIR', 'FILE', 'FILE.yaml', 'NAME|FILE', 'FILE|BAG|CONTROLLER', 'BAG|CSV', 'RIG', 'RUN')
+        and _kind(action) not in ('out_path', 'source')}
+    assert not words
+
+
+def test_wrong_numbers_are_told_with_range_and_exit_code_2(capsys):
+    kinds = {(verb, action.option_strings[0]): _kind(action) for verb, action in _options()
+             if action.option_strings}
+    for (verb, option), allowed in NUMBERS.items():
+        for text in WRONG_NUMBERS[kinds[verb, option]]:
+            assert main([verb, *NEEDS.get(verb, ()), option, text]) == 2, (verb, option, text)
+            said = capsys.readouterr().err
+            assert said.startswith(f'pam {verb}: {option}: ') and said.count('\n') == 1, said
+            assert said.endswith(f'allowed is {allowed}\n'), said
+            assert ('decimal point' in said) == (text == '3,5'), said
+
+
+def test_empty_and_impossible_paths_are_told(capsys):
+    for arguments in (['simulate', 'short_sine', '--out', ''], ['report', 'bag', '--out', ' '],
+                      ['rules', 'sofc_ppr', '--html', ''], ['tune', '--out', ''],
+                      ['gap', 'bag', '--out', ''], ['gap', '', '--out', 'gap'], ['info', ''],
+                      ['simulate', '', '--out', 'x'], ['replay', 'bag', '--set', '']):
+        assert main(arguments) == 2, arguments
+        said = capsys.readouterr().err
+        assert 'is empty' in said and said.count('\n') == 1, said
+    assert main(['simulate', 'short_sine', '--out', 300 * 'x']) == 2
+    assert '300 bytes' in capsys.readouterr().err
+
+
+def test_allowed_values_are_read():
+    assert number(0.0, 5.0, 's')('5') == 5.0 and number()('-1e3') == -1000.0
+    assert count(1, 64, {-1: 'one a core'})('-1') == -1 and count(0)('7') == 7
+    assert out_path('runs/ä b') == 'runs/ä b' and source('x.yaml') == 'x.yaml'
+    with pytest.raises(argparse.ArgumentTypeError, match='at most 3 mm'):
+        number(None, 3.0, 'mm')('4')
