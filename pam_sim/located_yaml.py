@@ -21,12 +21,11 @@ file and line in the message.
 """
 
 from collections.abc import Mapping
-import difflib
 import math
 import os
 import re
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 import yaml
 
 # Bounds of what is read at all. The largest file of this kind holds some 10 kB and 500 values.
@@ -134,10 +133,9 @@ class Located(Mapping):
         allowed = list(allowed)
         for key in self._values:
             if key not in allowed:
-                near = difflib.get_close_matches(str(key), allowed, n=1)
-                hint = f' (did you mean `{near[0]}`?)' if near else ''
                 raise self.error(
-                    f'unknown {what} `{key}`{hint}; allowed: {", ".join(allowed) or "none"}', key)
+                    f'unknown {what} `{key}`{did_you_mean(key, allowed)}; allowed: '
+                    f'{", ".join(allowed) or "none"}', key)
         return self
 
     def require(self, key, type=None,  # noqa: A002
@@ -241,10 +239,15 @@ def check_value(value, what, where, type=None,  # noqa: A002
             + _range_text(lower, upper, unit), where)
     if choices is not None and value not in choices:
         raise InputError(
-            f'{what} is {_shown(value)}, allowed: {", ".join(map(str, choices))}', where)
+            f'{what} is {_shown(value)}{_near(value, choices)}, allowed: '
+            f'{", ".join(map(str, choices))}', where)
     if lower is not None and value < lower or upper is not None and value > upper:
         raise InputError(f'{what} is {value!r}' + _range_text(lower, upper, unit), where)
     return float(value) if wanted is float else value
+
+
+def _near(value, choices):
+    return did_you_mean(value, choices) if isinstance(value, str) else ''
 
 
 def _shown(value):

@@ -33,14 +33,16 @@ def add_arguments(parser):
 
 def run(args):
     """Print the names, or one page; write the pages asked for."""
-    from pam_sim.errors import InputError
+    from pam_sim.errors import did_you_mean, InputError
     try:
         from pam_actuation.nodes.pages import pages
     except ImportError as error:
-        raise InputError(f'the nodes need ROS 2 ({error.name} is missing)') from None
+        from pam_actuation.ros_missing import ros_missing
+        raise InputError(ros_missing(error.name)) from None
     texts = {Path(file).stem: text for file, text in pages().items()}
     if args.name is not None and args.name not in texts:
-        raise InputError(f'no node {args.name!r}, known are {", ".join(texts)}', 'name')
+        raise InputError(f'no node {args.name!r}{did_you_mean(args.name, texts)}; known are '
+                         f'{", ".join(texts)}', 'name')
     if args.markdown is not None:
         from pam_actuation.report.page import write_text
         Path(args.markdown).mkdir(parents=True, exist_ok=True)

@@ -82,7 +82,7 @@ def minimise(costs_of, start, members, generations, seed, patience=0):
         lambda point: 0.0, [(0.0, 1.0)] * len(start), workers=mapped, updating='deferred',
         init=_first_generation(start, members, seed), maxiter=max(generations - 1, 1),
         seed=np.random.default_rng(seed), tol=0.0, polish=False, mutation=(0.4, 0.9),
-        recombination=0.8, callback=lambda *_: bool(patience) and best['since'] >= patience)
+        recombination=0.8, callback=lambda *_, **__: bool(patience) and best['since'] >= patience)
     stopped = bool(patience) and best['since'] >= patience
     return Found(found.x, float(found.fun),
                  f'no progress in {patience} generations' if stopped else 'budget used up')

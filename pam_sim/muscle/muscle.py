@@ -25,7 +25,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
 from pam_sim.muscle.lookup_table import LookupTable, read_table
@@ -175,7 +175,9 @@ def get_muscle(name):
 
     """
     if name not in muscle_names():
-        raise InputError(f'muscle `{name}` is not known; allowed: {", ".join(muscle_names())}')
+        raise InputError(
+            f'muscle `{name}` is not known{did_you_mean(name, muscle_names())}; allowed: '
+            f'{", ".join(muscle_names())}')
     return read_muscle(_SIZES.read(name), name)
 
 
