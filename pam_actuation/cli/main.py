@@ -39,7 +39,8 @@ def build_parser():
         module = importlib.import_module(f'pam_actuation.cli.{name}')
         sub = verbs.add_parser(
             name, help=one_line(name), description=module.HELP,
-            epilog=f'Example: {module.EXAMPLE}', formatter_class=argparse.RawDescriptionHelpFormatter)
+            epilog=f'Example: {module.EXAMPLE}',
+            formatter_class=argparse.RawDescriptionHelpFormatter)
         sub.add_argument(
             '--json', action='store_true', help='print the result as JSON, for programs')
         module.add_arguments(sub)

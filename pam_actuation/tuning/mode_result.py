@@ -18,8 +18,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_actuation.tuning.tracking_errors import TrackingErrors
+from pam_sim.short_repr import short_repr
 
 
+@short_repr
 @dataclass
 class ModeResult(TrackingErrors):
     """

@@ -23,6 +23,7 @@ samples the whole box does not get stuck in the first valley.
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.short_repr import short_repr
 from scipy.optimize import differential_evolution
 
 SMALLEST = 5                    # members differential evolution needs
@@ -30,6 +31,7 @@ MEMBERS = 24                    # fewer settle too early, also with few settings
 _NEAR = 0.12                    # spread of the cloud about the start, in widths of the box
 
 
+@short_repr
 @dataclass
 class Found:
     """Best point and its cost, and why the search ended."""

@@ -151,7 +151,8 @@ def test_every_node_says_what_to_install_where_ros_is_missing(tmp_path):
     started = {}
     for name in names:
         executable = tmp_path / name
-        executable.write_text(f'{WITHOUT_ROS}from pam_actuation.nodes.{name} import main\nmain()\n')
+        executable.write_text(
+            f'{WITHOUT_ROS}from pam_actuation.nodes.{name} import main\nmain()\n')
         module = f'{WITHOUT_ROS}sys.orig_argv = [sys.executable, "-m", "pam_actuation.nodes.' \
             f'{name}"]\nsys.argv = ["-m"]\nrunpy.run_module("pam_actuation.nodes.{name}", ' \
             'run_name="__main__", alter_sys=True)\n'
