@@ -24,6 +24,7 @@ import sys
 
 from pam_actuation import interrupts
 from pam_actuation.nodes import arguments
+from pam_actuation.ros_missing import ros_missing
 
 
 def start(name):
@@ -43,8 +44,7 @@ def start(name):
     try:
         import rclpy  # noqa: F401
     except ImportError as error:
-        print(f'{name}: a node needs ROS 2 ({error.name or error} is missing): source its setup '
-              'file or install the extra ros, pip install "pam_actuation[ros]"', file=sys.stderr)
+        print(f'{name}: {ros_missing(error.name or error)}', file=sys.stderr)
         return arguments.EXIT_BAD_INPUT
     return importlib.import_module(f'pam_actuation.nodes.{name}').main()
 

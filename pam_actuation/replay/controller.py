@@ -31,6 +31,7 @@ from pam_actuation.control.tick import (
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 # Input of a tick -> (topic it came from, field of that topic).
 _MEASURED = {
@@ -40,6 +41,7 @@ _MEASURED = {
 _PROGRESS_EVERY = 2000    # ticks
 
 
+@short_repr
 @dataclass
 class ReplayResult:
     """

@@ -26,10 +26,12 @@ import numpy as np
 from pam_actuation.control.sofc.membership import SET_NAMES, SET_WORDS
 from pam_actuation.control.sofc.words import DIRECTION, number, shown
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 _SHORT = dict(zip(SET_WORDS, SET_NAMES))
 
 
+@short_repr
 @dataclass(frozen=True)
 class Axis:
     """
@@ -59,6 +61,7 @@ class Axis:
             if self.names else tuple(texts)
 
 
+@short_repr
 @dataclass(frozen=True)
 class Grid:
     """
@@ -77,7 +80,7 @@ class Grid:
 
     @property
     def change(self):
-        """What was changed [kPa]."""
+        """Return what was changed [kPa]."""
         return self.values - self.before
 
     @property
