@@ -76,8 +76,8 @@ FAULT_TABLE = (
           'a publisher (by its GID) is heard again after another one within 1 s', VENT, False,
           'no such message for 1 s, ' + _RAMP),
     Fault('second_publisher_seen', 'Second publisher on the graph',
-          'the graph shows more than one publisher of pressure_command that sends or was never '
-          'heard (one that was heard and is silent has ended)', IGNORE, False,
+          'beside the publisher of pressure_command that sends, the graph shows one that was '
+          'never heard (one that was heard before has ended)', IGNORE, False,
           'warning ends with the second publisher'),
     Fault('command_out_of_order', 'Single command out of order',
           'stamp not newer than the last accepted one', IGNORE, False,
