@@ -89,9 +89,9 @@ class Senders:
     def _recent(self, time_ns, now_ns):
         return time_ns is not None and 0 <= now_ns - time_ns <= self._clear_ns
 
-    def known(self, writer):
-        """Tell whether a writer has been heard, be it long ago."""
-        return writer in self._heard_ns
+    def replaced(self, writer):
+        """Tell whether a writer has been heard before another one, and not since."""
+        return writer in self._heard_ns and writer != self._last
 
     def active(self, now_ns):
         """Return the writers that were heard lately."""

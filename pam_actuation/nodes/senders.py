@@ -121,12 +121,11 @@ class DriverEar:
         """
         Return how many publishers of a topic send or may yet, and their names as words.
 
-        One that was heard and has fallen silent has ended; the graph keeps it for a while.
+        One that was heard before another one has ended or is the cause of a fault; the graph
+        keeps what was killed for up to 20 s.
         """
         heard, found = self._senders.topics[topic], self._on_graph(full_topic)
-        active = heard.active(self._node.now_ns())
-        names = [name for writer, name in found.items()
-                 if writer in active or not heard.known(writer)]
+        names = [name for writer, name in found.items() if not heard.replaced(writer)]
         return len(names), told(names)
 
 

@@ -53,7 +53,8 @@ def test_a_writer_that_comes_back_shows_that_there_are_two(writers):
 def test_a_writer_that_comes_back_after_a_second_of_silence_takes_the_place_again():
     senders = Senders()
     now_ns = heard(senders, 'a' * 10 + 'b' * 110 + 'a')
-    assert not senders.rivals(now_ns) and senders.known('b')
+    assert not senders.rivals(now_ns) and senders.replaced('b') and not senders.replaced('a')
+    assert not senders.replaced('c')
     assert set(senders.active(now_ns)) == {'a', 'b'}
 
 
