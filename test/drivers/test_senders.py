@@ -58,6 +58,12 @@ def test_a_writer_that_comes_back_after_a_second_of_silence_takes_the_place_agai
     assert set(senders.active(now_ns)) == {'a', 'b'}
 
 
+def test_one_that_ended_just_before_is_not_taken_for_one_of_two():
+    senders = Senders()
+    now_ns = heard(senders, 'aaabbbcbcbc')
+    assert set(senders.rivals(now_ns)) == {'b', 'c'}
+
+
 def test_who_is_not_known_is_not_judged_and_a_clock_that_goes_back_begins_anew():
     senders = Senders()
     now_ns = heard(senders, [None, 'a', None, 'a'])
@@ -86,6 +92,7 @@ def test_a_name_that_is_on_its_way_is_waited_for_but_not_with_an_open_valve():
 def test_names_are_told_as_words():
     assert told(['/b', '/a']) == '/a and /b'
     assert told(['/a', '/a']) == 'two nodes named /a'
+    assert told(['/a', '/b', '/a', '/a']) == '3 nodes named /a and /b'
     assert told(['', '/a']) == 'a program without a node name and /a'
 
 
