@@ -53,7 +53,7 @@ while True:
 
 
 class Stranger:
-    """Once discovered, send what ``make`` returns for a time [ns] on a topic, 500 times a second."""
+    """Once discovered, send what ``make`` returns for a time [ns], 500 times a second."""
 
     def __init__(self, rig, topic, make):
         self._publisher, self._writer = rig.publisher(topic), RosWriter(topic)
