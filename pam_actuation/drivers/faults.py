@@ -76,8 +76,8 @@ FAULT_TABLE = (
           'a publisher (by its GID) is heard again after another one within 1 s', VENT, False,
           'no such message for 1 s, ' + _RAMP),
     Fault('second_publisher_seen', 'Second publisher on the graph',
-          'the graph shows more than one publisher of pressure_command that sends or was never '
-          'heard (one that was heard and is silent has ended)', IGNORE, False,
+          'beside the publisher of pressure_command that sends, the graph shows one that was '
+          'never heard (one that was heard before has ended)', IGNORE, False,
           'warning ends with the second publisher'),
     Fault('command_out_of_order', 'Single command out of order',
           'stamp not newer than the last accepted one', IGNORE, False,
@@ -136,6 +136,10 @@ FAULT_TABLE = (
           'valve_watchdog, a process of its own, sends the safe valve_signal after 0.05 s of '
           'silence; behind a hardware back end another one vents the device after 0.1 s; with '
           'the computer lost only hardware can'),
+    Fault('watchdog_vented', 'Driver silent for a moment, watchdog vented',
+          'the safe signal of another node, valve_watchdog as a rule, heard by the driver: a busy '
+          'machine kept it from sending', IGNORE, False,
+          'warning; the driver goes on with a slow rise from atmospheric pressure'),
     Fault('reference_lost', 'Reference lost',
           'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,
           'the driver follows the controller'),

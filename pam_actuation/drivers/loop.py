@@ -120,6 +120,10 @@ class DriverLoop:
         """Tell of a second sender: (key in ``FAULTS``, sentence), None where there is none."""
         self.safety.sender_fault = fault
 
+    def vented_elsewhere(self, now_ns):
+        """Tell that another node, such as the watchdog, sent the signal that vents."""
+        self.safety.vented_elsewhere(now_ns)
+
     def emergency_stop(self, why='requested'):
         """Latch the emergency stop; return (True, sentence). Vents from the next tick on."""
         self.safety.emergency_stop(why)

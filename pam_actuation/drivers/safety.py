@@ -165,6 +165,12 @@ class SafetySupervisor:
         if self._latched is None:
             self._latch('emergency_stop', f'emergency stop: {why}')
 
+    def vented_elsewhere(self, now_ns):
+        """Tell that another node sent the signal that vents: the pressure rises slowly again."""
+        self._rise.begin()
+        self._warn('watchdog_vented', 'the watchdog vented, since this driver fell silent for a '
+                   'moment (busy machine?)', now_ns)
+
     def on_device(self, problem):
         """Tell how the device took the last signal: a problem latches, '' is all right."""
         self._device_problem = problem

@@ -37,8 +37,7 @@ def told(names):
         if not name:
             words.append('a program without a node name')
         elif count > 1:
-            words.append(f'{("two", "three")[count > 2]}{" or more" * (count > 3)} nodes '
-                         f'named {name}')
+            words.append(f'{"two" if count == 2 else count} nodes named {name}')
         else:
             words.append(name)
     return ' and '.join(words)
@@ -68,30 +67,35 @@ class Senders:
 
     def __init__(self, clear_s=CLEAR_S):
         self._clear_ns = round(clear_s * _NS)
+        self._forget()
+
+    def _forget(self):
         self._heard_ns = {}         # writer to the time of its newest message
+        self._rival_ns = {}         # writer to the time when it was heard in turn with another
         self._last = None
-        self._mixed_ns = None
 
     def heard(self, writer, now_ns):
         """Note a message that was taken at a time."""
         if writer is None:
             return
+        if self._last is not None and now_ns < self._heard_ns[self._last]:
+            self._forget()          # the clock was set back
         if writer != self._last:
             if self._recent(self._heard_ns.get(writer), now_ns):
-                self._mixed_ns = now_ns
+                self._rival_ns[writer] = self._rival_ns[self._last] = now_ns
             self._heard_ns = {one: time_ns for one, time_ns in self._heard_ns.items()
-                              if 0 <= now_ns - time_ns <= _REMEMBERED_NS}
+                              if now_ns - time_ns <= _REMEMBERED_NS}
+            self._rival_ns = {one: time_ns for one, time_ns in self._rival_ns.items()
+                              if one in self._heard_ns}
             self._last = writer
-        elif self._mixed_ns is not None and now_ns < self._mixed_ns:
-            self._mixed_ns = None       # the clock was set back
         self._heard_ns[writer] = now_ns
 
     def _recent(self, time_ns, now_ns):
         return time_ns is not None and 0 <= now_ns - time_ns <= self._clear_ns
 
-    def known(self, writer):
-        """Tell whether a writer has been heard, be it long ago."""
-        return writer in self._heard_ns
+    def replaced(self, writer):
+        """Tell whether a writer has been heard before another one, and not since."""
+        return writer in self._heard_ns and writer != self._last
 
     def active(self, now_ns):
         """Return the writers that were heard lately."""
@@ -100,7 +104,8 @@ class Senders:
 
     def rivals(self, now_ns):
         """Return the writers that send at the same time, () for a single one."""
-        return self.active(now_ns) if self._recent(self._mixed_ns, now_ns) else ()
+        return tuple(one for one, time_ns in self._rival_ns.items()
+                     if self._recent(time_ns, now_ns))
 
 
 class SignalSenders:

@@ -79,6 +79,7 @@ class DriverEar:
     def __init__(self, node):
         names = WriterNames(node)
         self._node = node
+        self.vented = False         # whether another node sent the safe signal at the last look
         self._on_graph = names.on_graph
         self._signals = node.add_subscription('valve_signal', plain=False, writers=True)
         self._read = WireReader('valve_signal')
@@ -102,6 +103,7 @@ class DriverEar:
     def listen(self):
         """Take what was said on ``valve_signal``; return whether another one opens the valve."""
         opens, taken = False, self._signals.take()
+        self.vented = False
         now_ns = self._node.now_ns()
         for raw, info in taken:
             writer, signals = info['writer'], self._senders.signals
@@ -111,6 +113,7 @@ class DriverEar:
             safe = message is not None and is_safe(message)
             name = self._name_of(self._signals.topic, writer)
             opens |= signals.heard(writer, name, safe, now_ns) and not safe
+            self.vented |= safe and writer is not None
         return opens
 
     def fault(self, now_ns):
@@ -121,12 +124,11 @@ class DriverEar:
         """
         Return how many publishers of a topic send or may yet, and their names as words.
 
-        One that was heard and has fallen silent has ended; the graph keeps it for a while.
+        One that was heard before another one has ended or is the cause of a fault; the graph
+        keeps what was killed for up to 20 s.
         """
         heard, found = self._senders.topics[topic], self._on_graph(full_topic)
-        active = heard.active(self._node.now_ns())
-        names = [name for writer, name in found.items()
-                 if writer in active or not heard.known(writer)]
+        names = [name for writer, name in found.items() if not heard.replaced(writer)]
         return len(names), told(names)
 
 

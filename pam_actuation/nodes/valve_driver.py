@@ -206,6 +206,8 @@ class ValveDriver(ManagedNode):
             self.loop.on_supply(message)
         self.ear.listen()
         now_ns = self.now_ns()
+        if self.ear.vented:
+            self.loop.vented_elsewhere(now_ns)
         fault = self.ear.fault(now_ns)
         self.loop.set_sender_fault(fault)
         self._answering.every(ANSWER_PERIOD_S if fault else IDLE_PERIOD_S)

@@ -16,7 +16,8 @@
 
 import argparse
 
-from pam_actuation.cli.main import build_parser, main, VERBS
+from pam_actuation.cli.main import build_parser, main
+from pam_actuation.cli.overview import VERBS
 from pam_actuation.cli.options import count, number, out_path, source
 import pytest
 

@@ -21,7 +21,8 @@ import re
 import subprocess
 import sys
 
-from pam_actuation.cli.main import main, VERBS
+from pam_actuation.cli.main import main
+from pam_actuation.cli.overview import VERBS
 import pytest
 
 

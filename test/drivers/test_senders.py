@@ -53,8 +53,15 @@ def test_a_writer_that_comes_back_shows_that_there_are_two(writers):
 def test_a_writer_that_comes_back_after_a_second_of_silence_takes_the_place_again():
     senders = Senders()
     now_ns = heard(senders, 'a' * 10 + 'b' * 110 + 'a')
-    assert not senders.rivals(now_ns) and senders.known('b')
+    assert not senders.rivals(now_ns) and senders.replaced('b') and not senders.replaced('a')
+    assert not senders.replaced('c')
     assert set(senders.active(now_ns)) == {'a', 'b'}
+
+
+def test_one_that_ended_just_before_is_not_taken_for_one_of_two():
+    senders = Senders()
+    now_ns = heard(senders, 'aaabbbcbcbc')
+    assert set(senders.rivals(now_ns)) == {'b', 'c'}
 
 
 def test_who_is_not_known_is_not_judged_and_a_clock_that_goes_back_begins_anew():
@@ -85,6 +92,7 @@ def test_a_name_that_is_on_its_way_is_waited_for_but_not_with_an_open_valve():
 def test_names_are_told_as_words():
     assert told(['/b', '/a']) == '/a and /b'
     assert told(['/a', '/a']) == 'two nodes named /a'
+    assert told(['/a', '/b', '/a', '/a']) == '3 nodes named /a and /b'
     assert told(['', '/a']) == 'a program without a node name and /a'
 
 

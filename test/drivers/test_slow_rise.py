@@ -101,3 +101,14 @@ def test_openings_of_the_valves_leave_it_as_it_is():
     rise.hold()
     assert rise.limited(FULL_PA, 0.01) == P_ATM_PA + 0.01 * RISE_PA_PER_S
     assert SafetyLimits().resume_rate_pa_per_s == RISE_PA_PER_S
+
+
+def test_a_vent_of_the_watchdog_is_a_vent():
+    """A driver that fell silent for a moment only does not take the pressure up at once."""
+    bench = Bench(SafetyLimits())
+    bench.run(3000)
+    bench.safety.vented_elsewhere(bench.now)
+    decisions = bench.run(200)
+    assert decisions[0].pressure_pa <= P_ATM_PA + 0.01 * RISE_PA_PER_S
+    assert rises([decision.pressure_pa for decision in decisions]) <= RISE_PA_PER_S * 1.001
+    assert 'the watchdog vented' in decisions[-1].message

@@ -1,0 +1,45 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test that a rig that was launched ends as a whole: the one rule of the safety page."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+LAUNCH = Path(__file__).resolve().parents[1] / 'launch'
+
+
+def names_in(tree):
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+def makes_nodes(tree):
+    return any(isinstance(node, ast.Call) and getattr(node.func, 'id', '') == '_node'
+               for node in ast.walk(tree))
+
+
+@pytest.mark.parametrize('name', ['rig', 'knee'])
+def test_the_end_of_any_node_ends_the_launch(name):
+    tree = ast.parse((LAUNCH / f'{name}.launch.py').read_text(encoding='utf-8'))
+    described = next(node for node in tree.body if isinstance(node, ast.FunctionDef)
+                     and node.name == 'generate_launch_description')
+    given = {node.targets[0].id: node.value for node in ast.walk(described)
+             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)}
+    started = {variable for variable, value in given.items() if makes_nodes(value)}
+    assert len(started) >= 5
+    assert started <= names_in(given['ends']) and 'OnProcessExit' in names_in(given['ends'])
+    # Every node is one of these, none is made on the way.
+    assert sum(makes_nodes(statement) for statement in described.body) == len(started)
