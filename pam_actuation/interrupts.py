@@ -15,14 +15,14 @@
 """
 What Ctrl-C does to a program of this package, from its first lines to its last.
 
-Python raises KeyboardInterrupt wherever the main thread happens to be. In the middle of an import,
-of a callback from C or of the end of the interpreter that is a page of traceback, a wrong error,
-or nothing at all. A program therefore says how far it is:
+Python raises KeyboardInterrupt wherever the main thread happens to be: also in an import, in a
+callback from C, at the end of the interpreter. The user then sees a page of traceback, a wrong
+error, or nothing at all. A program therefore says how far it is:
 
 * It begins: nothing is there to be lost. The process ends at once, with one line.
-* It works: KeyboardInterrupt, so that files and processes are left in order; in the middle of an
-  import or a destructor only after it, and once more where a callback swallowed it. Impatient
-  repetitions are ignored.
+* It works: KeyboardInterrupt, so that files and processes are left in order. In an import or a
+  destructor it waits for the end of that. Where a callback swallowed it, it comes once more.
+  Impatient repetitions are ignored.
 * It ends: the result is out, and nothing may change the exit code any more.
 
 This module imports next to nothing: what comes before it cannot be guarded.

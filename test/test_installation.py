@@ -99,6 +99,15 @@ def test_colcon_puts_executables_where_ros2_run_looks(isolated_install):
 
 
 @pytest.mark.slow
+def test_installed_executables_answer_at_once(isolated_install, tmp_path):
+    folder = isolated_install / 'pam_actuation' / 'lib' / 'pam_actuation'
+    environment = environment_of(isolated_install / 'setup.bash')
+    for name in (*NODES, *FOR_OTHER_RIGS):
+        shown = run([folder / name, '--help'], cwd=tmp_path, env=environment, timeout=20)
+        assert shown.startswith(f'usage: {name} ') and 'Parameters of every node:' in shown
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize('option', ['--merge-install', '--symlink-install'])
 def test_other_layouts_of_colcon_find_their_files(tmp_path, option):
     install = colcon_build(tmp_path / 'ws', option)
@@ -184,7 +193,8 @@ def test_a_wheel_holds_packages_shared_files_and_executables(tmp_path):
         assert f'\n{name} = pam_actuation.' in scripts
     data = f'{wheel.name.rsplit("-", 3)[0]}.data/data/share/pam_actuation'
     for name in ('package.xml', 'config/experiments/sine_quarter_hz.yaml',
-                 'config/controllers/sofc_ppr.yaml', 'launch/rig.launch.py', 'msg_docs/README.md'):
+                 'config/controllers/sofc_ppr.yaml', 'launch/rig.launch.py', 'msg_docs/README.md',
+                 'docs/nodes/valve_driver.md'):
         assert f'{data}/{name}' in names
     for preset in (ROOT / 'pam_sim' / 'presets').glob('*.yaml'):
         assert f'pam_sim/presets/{preset.name}' in names

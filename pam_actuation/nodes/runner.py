@@ -21,6 +21,7 @@ out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad inpu
 """
 
 import os
+import re
 import signal
 import socket
 import sys
@@ -124,6 +125,9 @@ def _run(node_class, args, stopper):
     except Exception as error:
         if type(error).__name__ in ('UnknownROSArgsError', 'RCLInvalidROSArgsError'):
             return _refuse(node_class, f'these ROS arguments are not known: {error}')
+        unread = re.search("Couldn't parse ([^:]*): '(.*?)'", str(error))
+        if unread:
+            return _refuse(node_class, f'ROS cannot read the {unread[1]} {unread[2]}')
         raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)
