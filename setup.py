@@ -30,22 +30,24 @@ SHARED_FOLDERS = ('config', 'launch', 'msg_docs')
 RUN_REQUIRES = [
     'numpy>=1.26',
     'scipy>=1.11',
-    'numba>=0.58',
+    'numba>=0.58.1',     # the first one for numpy 1.26
     'PyYAML>=6.0',
-    'mcap>=1.1',
+    'mcap>=1.1.1',       # 1.1.0 reads no file without chunks
     'mcap-ros2-support>=0.5',
     'lz4>=4.3',
     'zstandard>=0.22',
-    'rosbags>=0.10.4',
+    'rosbags>=0.11.0',   # messages of Jazzy from 0.10.8 on, sqlite3 bags from here on
     'plotly>=5.15',
     'matplotlib>=3.6',
     'joblib>=1.3',
     'tqdm>=4.66',
+    'argcomplete>=3.1',
 ]
 
 # An extra, never a requirement: where ROS 2 is installed these would shadow it.
 ROS_REQUIRES = [
     'ros-jazzy-rclpy',
+    'ros-jazzy-ament-index-python',
     'ros-jazzy-common-interfaces',
     'ros-jazzy-lifecycle-msgs',
     'ros-jazzy-rmw-fastrtps-cpp',
@@ -58,7 +60,14 @@ TEST_REQUIRES = [
     'hypothesis>=6.98',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
+    # What ament_flake8 and ament_pep257 bring on a ROS 2 machine.
     'flake8>=7.0',
+    'flake8-blind-except>=0.2.1',
+    'flake8-builtins>=2.1',
+    'flake8-class-newline>=1.6',
+    'flake8-comprehensions>=3.14',
+    'flake8-deprecated>=2.2',
+    'flake8-docstrings>=1.6',
     'flake8-import-order>=0.18.2',
     'flake8-quotes>=3.4',
     'pydocstyle>=6.3',
@@ -69,6 +78,11 @@ TEST_REQUIRES = [
 # To run `pam tune --cluster` on a Dask scheduler that exists already.
 CLUSTER_REQUIRES = [
     'distributed>=2022.12',
+]
+
+# The same on a Ray cluster; `ray` alone cannot speak to one (ray://).
+RAY_REQUIRES = [
+    'ray[client]>=2.9',
 ]
 
 # Only to compare speeds; nothing in the package imports it.
@@ -109,6 +123,7 @@ setup(
     install_requires=RUN_REQUIRES,
     extras_require={
         'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'cluster': CLUSTER_REQUIRES,
+        'ray': RAY_REQUIRES,
         'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',

@@ -22,6 +22,7 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.units import P_ATM_PA
+from scipy.integrate import trapezoid
 
 NAMES = ('coulomb_friction', 'coulomb_friction_presliding', 'pressure_friction',
          'pressure_friction_presliding', 'braid_contact_friction', 'history_friction',
@@ -55,7 +56,7 @@ def half_width_n(contraction_m, change_n):
 
 def lost_mj(contraction_m, change_n):
     """Return the energy a cycle loses [mJ]."""
-    return -1e3 * np.trapezoid(change_n, contraction_m)
+    return -1e3 * trapezoid(change_n, contraction_m)
 
 
 def hanging(name, seconds=20):
@@ -68,7 +69,7 @@ def hanging(name, seconds=20):
     x = response.contraction_m[count:]
     top = int(np.argmax(x))
     width = np.interp(12e-3, x[:top], p[:top]) - np.interp(12e-3, x[:top:-1], p[:top:-1])
-    return 0.5e-3 * width, 1e3 * np.trapezoid(p, rig.volume_m3(x))
+    return 0.5e-3 * width, 1e3 * trapezoid(p, rig.volume_m3(x))
 
 
 def stated_n(name):

@@ -136,7 +136,7 @@ def compare(name, valve, seconds, folder, domain_id):
             print(f'{name} {valve}: {result.failure} {result.findings}', flush=True)
     live = Recording.of(bag, contraction)
     ticks = live_ticks(live, contraction)
-    quiet = rig.with_(sensors={key: 0.0 for key in rig.sensors})
+    quiet = rig.with_(sensors=dict.fromkeys(rig.sensors, 0.0))
 
     delay_ns = transport_ns(bag)
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Run a rig in lockstep over DDS: how fast is it, and are two runs the same to the byte?
+Run a rig in lockstep over DDS: its speed, and whether two runs are the same to the byte.
 
     python benchmarks/lockstep.py
     python benchmarks/lockstep.py --simulated-seconds 60 --runs 1 --silent

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Do the loops of a live rig keep their periods, and how late is a command?
+Measure whether the loops of a live rig keep their periods, and how late a command is.
 
     python benchmarks/loop_timing.py --seconds 600
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Record a fast rig on live nodes: is everything there, and what does the recorder cost?
+Record a fast rig on live nodes: whether all is there, and what the recorder costs.
 
     python benchmarks/recording_load.py --seconds 600
     python benchmarks/recording_load.py --seconds 120 --extra 8

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Is a replay the same twice, and the same on two Python versions?
+Check that a replay is the same twice, and the same on two Python versions.
 
 ::
 

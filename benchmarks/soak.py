@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Does a rig that runs for an hour still do so as in its first minutes?
+Run a rig for an hour and compare its last minutes with its first ones.
 
     python benchmarks/soak.py --seconds 3600 --valve hsv
 

@@ -116,8 +116,8 @@ def main():
             print(f'| {problem.controller.kind} | {valve} | {one:,.0f} | {all_cores:,.0f} '
                   f'| {busy_ms:.2f} |', flush=True)
 
-    rig = load_rig('dmsp_5_300_hanging_mass').with_(sensors={
-        name: 0.0 for name in ('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n')})
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(sensors=dict.fromkeys(
+        ('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n'), 0.0))
     controller = load_controller(PEER_CONTROLLER, rig)
     loop = ClosedLoop(rig, experiment, latency_s=LATENCY_S)
     problem = Problem([loop], controller)

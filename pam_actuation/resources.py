@@ -23,7 +23,7 @@ share folder that the ament index names. No ROS is needed for the first two.
 
 from pathlib import Path
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 PACKAGE = 'pam_actuation'
 
@@ -100,9 +100,10 @@ def find_config(kind: str, name) -> Path:
     path = config_dir() / kind / f'{text}.yaml'
     if path.is_file():
         return path
-    known = ', '.join(list_config(kind)) or 'none'
+    known = list_config(kind)
     raise InputError(
-        f'there is no such entry in config/{kind} (there are: {known}); '
+        f'there is no such entry in config/{kind}{did_you_mean(text, known)}; there are: '
+        f'{", ".join(known) or "none"}; '
         'a file of your own is given with its .yaml ending', where=text)
 
 

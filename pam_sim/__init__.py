@@ -17,23 +17,34 @@ Physics and models of a rig with a pneumatic artificial muscle; no ROS.
 
 ``load_rig`` gives a rig from a preset or a model file; ``Rig.simulate`` runs
 it on arrays, ``Rig.plant`` step by step. ``load_joint`` does the same for two muscles
-that turn a joint.
+that turn a joint. A recorded run is a ``Run`` of ``Series``, a simulated one a ``Response``;
+``simulate_batch`` simulates many ``Record`` on all cores.
 """
+
+import importlib
 
 from pam_sim.errors import InputError
 
-__all__ = ['InputError', 'Rig', 'load_joint', 'load_rig', 'preset_names']
+# Name -> module that has it.
+_PLACES = {
+    'Grid': 'run', 'JointRig': 'joint.rig', 'Record': 'rollout.batch', 'Response': 'response',
+    'Rig': 'rig', 'Run': 'run', 'Series': 'run', 'get_muscle': 'muscle.muscle',
+    'joint_preset_names': 'joint.model_file', 'load_joint': 'joint.model_file',
+    'load_rig': 'model_file', 'muscle_names': 'muscle.muscle', 'preset_names': 'model_file',
+    'simulate_batch': 'rollout.batch'}
+
+__all__ = ['Grid', 'InputError', 'JointRig', 'Record', 'Response', 'Rig', 'Run', 'Series',
+           'get_muscle', 'joint_preset_names', 'load_joint', 'load_rig', 'muscle_names',
+           'preset_names', 'simulate_batch']
 
 
 def __getattr__(name):
     """Import the simulation only when it is asked for: it brings the compiler with it."""
-    if name in ('load_rig', 'preset_names'):
-        from pam_sim import model_file
-        return getattr(model_file, name)
-    if name == 'load_joint':
-        from pam_sim.joint.model_file import load_joint
-        return load_joint
-    if name == 'Rig':
-        from pam_sim.rig import Rig
-        return Rig
+    if name in _PLACES:
+        return getattr(importlib.import_module(f'pam_sim.{_PLACES[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__():
+    """Return what there is, without importing it."""
+    return sorted([*__all__, *(name for name in globals() if name.startswith('__'))])

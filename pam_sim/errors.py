@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one error a user's mistake raises, anywhere in the two packages."""
+"""The one error a user's mistake raises, anywhere in the two packages, and its hints."""
+
+import difflib
 
 
 class InputError(ValueError):
@@ -35,3 +37,39 @@ class InputError(ValueError):
         self.problem = problem
         self.where = where
         super().__init__(f'{where}: {problem}' if where else problem)
+
+
+def did_you_mean(name, known, quote='`', inside=' (did you mean {}?)'):
+    """
+    Return a hint at the known name that a wrong one is nearest to, empty without any.
+
+    Capitals count for nothing, nor does ``-`` instead of ``_``. Without a similar
+    name the first one that begins with the wrong one, or holds it, is near.
+
+    Parameters
+    ----------
+    name : str
+        What the user wrote.
+    known : iterable of str
+        What would have been right.
+    quote : str
+        Put about the name in the hint.
+    inside : str
+        The hint, with ``{}`` for the name.
+
+    """
+    known = [str(one) for one in known]
+    plain = _plain(name)
+    if not plain:
+        return ''
+    spelled = {}
+    for one in known:
+        spelled.setdefault(_plain(one), one)
+    near = difflib.get_close_matches(plain, spelled, n=1) \
+        or [one for one in spelled if len(plain) > 1 and one.startswith(plain)] \
+        or [one for one in spelled if len(plain) > 2 and plain in one]
+    return inside.format(f'{quote}{spelled[near[0]]}{quote}') if near else ''
+
+
+def _plain(name):
+    return str(name).strip().lower().replace('-', '_')

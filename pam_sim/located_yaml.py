@@ -21,12 +21,11 @@ file and line in the message.
 """
 
 from collections.abc import Mapping
-import difflib
 import math
 import os
 import re
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import refuse_pipe
 import yaml
 
@@ -135,13 +134,13 @@ class Located(Mapping):
         allowed = list(allowed)
         for key in self._values:
             if key not in allowed:
-                near = difflib.get_close_matches(str(key), allowed, n=1)
-                hint = f' (did you mean `{near[0]}`?)' if near else ''
                 raise self.error(
-                    f'unknown {what} `{key}`{hint}; allowed: {", ".join(allowed) or "none"}', key)
+                    f'unknown {what} `{key}`{did_you_mean(key, allowed)}; allowed: '
+                    f'{", ".join(allowed) or "none"}', key)
         return self
 
-    def require(self, key, type=None, lower=None, upper=None, choices=None, unit=''):
+    def require(self, key, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
         """
         Return a value that must be there.
 
@@ -170,7 +169,8 @@ class Located(Mapping):
         return check_value(
             self._values[key], f'`{key}`', self.where(key), type, lower, upper, choices, unit)
 
-    def get(self, key, type=None, default=None, lower=None, upper=None, choices=None, unit=''):
+    def get(self, key, type=None,  # noqa: A002
+            default=None, lower=None, upper=None, choices=None, unit=''):
         """Return a checked value as :meth:`require` does, or ``default`` if the key is absent."""
         if key not in self._values:
             return default
@@ -195,7 +195,8 @@ class LocatedList(list):
         known = index is not None and 0 <= index < len(self._lines)
         return f'{self.name}:{self._lines[index] if known else self.line}'
 
-    def require(self, index, type=None, lower=None, upper=None, choices=None, unit=''):
+    def require(self, index, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
         """Return item ``index`` checked as :meth:`Located.require` does."""
         if not 0 <= index < len(self):
             raise InputError(f'item {index + 1} is missing', self.where())
@@ -218,7 +219,8 @@ def _has_type(value, wanted):
     return isinstance(value, wanted)
 
 
-def check_value(value, what, where, type=None, lower=None, upper=None, choices=None, unit=''):
+def check_value(value, what, where, type=None,  # noqa: A002
+                lower=None, upper=None, choices=None, unit=''):
     """
     Return ``value`` (a number as ``float`` where ``type`` is float) or raise.
 
@@ -238,10 +240,15 @@ def check_value(value, what, where, type=None, lower=None, upper=None, choices=N
             + _range_text(lower, upper, unit), where)
     if choices is not None and value not in choices:
         raise InputError(
-            f'{what} is {_shown(value)}, allowed: {", ".join(map(str, choices))}', where)
+            f'{what} is {_shown(value)}{_near(value, choices)}, allowed: '
+            f'{", ".join(map(str, choices))}', where)
     if lower is not None and value < lower or upper is not None and value > upper:
         raise InputError(f'{what} is {value!r}' + _range_text(lower, upper, unit), where)
     return float(value) if wanted is float else value
+
+
+def _near(value, choices):
+    return did_you_mean(value, choices) if isinstance(value, str) else ''
 
 
 def _shown(value):

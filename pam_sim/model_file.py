@@ -17,7 +17,7 @@
 from dataclasses import replace
 
 from pam_sim.effects.registry import get_effect
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import dump_yaml, Located
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
@@ -68,7 +68,8 @@ def load_rig(source, valve=None, fidelity=None):
         rig = _from_mapping(data, name or file_stem(source), (name,) if name else ())
     for value, choices, what in ((valve, VALVES, 'valve'), (fidelity, hsv.FIDELITIES, 'fidelity')):
         if value is not None and value not in choices:
-            raise InputError(f'{what} `{value}` is not known; allowed: {", ".join(choices)}')
+            raise InputError(f'{what} `{value}` is not known{did_you_mean(value, choices)}; '
+                             f'allowed: {", ".join(choices)}')
     return rig.with_(valve=valve, fidelity=fidelity)
 
 

@@ -17,7 +17,7 @@
 import os
 from pathlib import Path
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import load_yaml, Located
 
 _HERE = Path(__file__).parent
@@ -78,6 +78,7 @@ class NamedFiles:
                 return self.read(source), source
             if '\n' not in source and not os.path.exists(source) \
                     and ': ' not in source and not source.endswith(('.yaml', '.yml')):
-                raise InputError(f'{what} `{source}` is neither a preset nor a file; presets: '
-                                 + ', '.join(self.names()))
+                raise InputError(
+                    f'{what} `{source}` is neither a preset nor a file'
+                    f'{did_you_mean(source, self.names())}; presets: ' + ', '.join(self.names()))
         return load_yaml(source), None

@@ -15,10 +15,9 @@
 """Numbers of the rig with unit, bounds, tolerance and source."""
 
 from dataclasses import dataclass
-import difflib
 import math
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 
 @dataclass(frozen=True)
@@ -100,9 +99,8 @@ def check_parameters(parameters, values, what='parameter', where=''):
     for name, value in values.items():
         place = values.where(name) if hasattr(values, 'where') else where
         if name not in known:
-            near = difflib.get_close_matches(str(name), known, n=1)
-            hint = f' (did you mean `{near[0]}`?)' if near else ''
             raise InputError(
-                f'unknown {what} `{name}`{hint}; allowed: {", ".join(known) or "none"}', place)
+                f'unknown {what} `{name}`{did_you_mean(name, known)}; allowed: '
+                f'{", ".join(known) or "none"}', place)
         result[name] = known[name].check(value, place)
     return result

@@ -19,14 +19,13 @@ A folder of this package and the folders an environment variable names are searc
 a module is a plug-in by being there.
 """
 
-import difflib
 import importlib
 import importlib.util
 import os
 from pathlib import Path
 import sys
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 
 def plugin_files(own_folder, variable, not_plugins=()):
@@ -82,8 +81,7 @@ def pick(known, name, what, where=''):
 
     """
     if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f' (did you mean `{near[0]}`?)' if near else ''
         raise InputError(
-            f'unknown {what} `{name}`{hint}; allowed: {", ".join(sorted(known))}', where)
+            f'unknown {what} `{name}`{did_you_mean(name, known)}; allowed: '
+            f'{", ".join(sorted(known))}', where)
     return known[name]

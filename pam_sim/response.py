@@ -34,6 +34,11 @@ COLUMNS = {
 }
 
 
+def brief_span(time_s):
+    """Return the first and the last of some times as text."""
+    return f'{time_s[0]:.6g} to {time_s[-1]:.6g} s' if len(time_s) else 'empty'
+
+
 class Response:
     """
     Signals of a simulated run, each an ndarray of shape (N + 1,), row 0 the start.
@@ -65,6 +70,11 @@ class Response:
     def __len__(self):
         """Return the number of samples, N + 1."""
         return len(self.outputs)
+
+    def __repr__(self):
+        """Return length and names in one line."""
+        return (f'{type(self).__name__}({len(self)} samples, {brief_span(self.time_s)}: '
+                f'{", ".join(self._columns)})')
 
     def __getattr__(self, name):
         """Return a signal by name."""

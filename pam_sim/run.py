@@ -14,10 +14,11 @@
 
 """A recorded or simulated run as named arrays with units: what every analysis starts from."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
+from pam_sim.short_repr import short_repr
 
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = (
@@ -26,10 +27,33 @@ HELD_TOPICS = (
 MAX_GRID_POINTS = 100_000_000
 
 
-@dataclass
+class Seconds(np.ndarray):
+    """
+    Times of messages in seconds, shape (N,): an array as any other.
+
+    Calling it, ``series.time_s(origin_ns)``, is the former way and gives seconds after that
+    stamp, by default after stamp 0.
+    """
+
+    def __new__(cls, stamp_ns, start_ns):
+        """Return the stamps in seconds after ``start_ns``."""
+        self = _seconds(stamp_ns, start_ns).view(cls)
+        self._stamp_ns = stamp_ns
+        return self
+
+    def __call__(self, origin_ns=0):
+        """Return the stamps in seconds after ``origin_ns``."""
+        return _seconds(self._stamp_ns, origin_ns)
+
+
+def _seconds(stamp_ns, origin_ns):
+    return (np.asarray(stamp_ns, dtype=np.int64) - int(origin_ns)) * 1e-9
+
+
+@dataclass(repr=False)
 class Series:
     """
-    One topic of a run.
+    One topic of a run; ``series['pressure_pa']`` is short for ``series.values['pressure_pa']``.
 
     Parameters
     ----------
@@ -39,26 +63,52 @@ class Series:
         Field name to samples, SI.
     unit : dict of str to str
         Field name to SI unit.
+    start_ns : int, optional
+        Stamp of ``time_s`` = 0. A run sets it to its own start, the same for all its topics;
+        without a run it is the first stamp.
 
     """
 
     stamp_ns: np.ndarray
     values: dict
     unit: dict = field(default_factory=dict)
+    start_ns: int = field(default=None, compare=False)
 
     def __len__(self):
         """Return the number of messages."""
         return len(self.stamp_ns)
 
-    def time_s(self, origin_ns=0):
-        """Return stamps in seconds after ``origin_ns``, shape (N,)."""
-        return (np.asarray(self.stamp_ns, dtype=np.int64) - int(origin_ns)) * 1e-9
+    def __getitem__(self, name):
+        """Return the samples of one field; the error names those there are."""
+        if name not in self.values:
+            raise KeyError(f'{name}{did_you_mean(name, self.values)}; there are: '
+                           + ', '.join(self.values))
+        return self.values[name]
+
+    def __repr__(self):
+        """Return number, span and fields in one line."""
+        span = f'{self.time_s[0]:.6g} to {self.time_s[-1]:.6g} s' if len(self) else 'empty'
+        fields = [f'{name} [{self.unit[name]}]' if name in self.unit else name
+                  for name in self.values]
+        shown = ', '.join(fields[:6] + [f'and {len(fields) - 6} more'] * (len(fields) > 6))
+        return f'Series({len(self)} messages, {span}: {shown})'
+
+    @property
+    def time_s(self):
+        """Seconds since the start of the run, shape (N,)."""
+        start_ns = self.start_ns
+        if start_ns is None:
+            start_ns = int(np.min(self.stamp_ns)) if len(self) else 0
+        return Seconds(self.stamp_ns, start_ns)
 
 
-@dataclass
+@dataclass(repr=False)
 class Run:
     """
     Topics of one run by short name (``pressure``, ``valve_signal``, …) with its metadata.
+
+    ``run['pressure']`` is short for ``run.topics['pressure']``; ``run['pressure'].time_s``
+    holds seconds since the start of the run, as ``time_s`` of a grid or a response does.
 
     Parameters
     ----------
@@ -79,6 +129,32 @@ class Run:
     metadata: dict = field(default_factory=dict)
     namespace: str = ''
     path: str = ''
+
+    def __post_init__(self):
+        """Give all topics one start; a series of another run is copied, its arrays are not."""
+        start_ns = self.start_ns
+        for series in self.topics.values():
+            if series.start_ns is None:
+                series.start_ns = start_ns
+        self.topics = {
+            name: series if series.start_ns == start_ns else replace(series, start_ns=start_ns)
+            for name, series in self.topics.items()}
+
+    def __getitem__(self, topic):
+        """Return the series of a topic; like ``require``, but the mistake is a KeyError."""
+        if topic not in self.topics:
+            raise KeyError(f'{topic}{did_you_mean(topic, self.topics)}; there are: '
+                           + (', '.join(self.topics) or 'none'))
+        return self.topics[topic]
+
+    def __repr__(self):
+        """Return where it came from, its length and its topics in a few lines."""
+        topics = ', '.join(f'{name} {len(series)}' for name, series in self.topics.items())
+        parts = [repr(self.path)] if self.path else []
+        parts += [self.namespace] if self.namespace else []
+        parts += [f'{self.duration_s:.6g} s', f'messages: {topics or "none"}']
+        parts += [f'metadata: {", ".join(self.metadata)}'] if self.metadata else []
+        return f'{type(self).__name__}({"; ".join(parts)})'
 
     def __contains__(self, topic):
         """Return whether a topic is there with at least one message."""
@@ -177,6 +253,7 @@ class Run:
         return Grid(int(start_ns), dt_s, time_s, values)
 
 
+@short_repr
 @dataclass
 class Grid:
     """
@@ -188,6 +265,7 @@ class Grid:
         Stamp of ``time_s`` = 0.
     dt_s : float
     time_s : ndarray, shape (N,)
+        Seconds since ``start_ns``.
     values : dict of str to dict of str to ndarray, shape (N,)
         Topic to field to samples; ``grid['pressure', 'pressure_pa']`` is short for it.
 

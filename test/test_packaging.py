@@ -44,6 +44,7 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
                  'skfuzzy': 'scikit-fuzzy'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
 ROSDEP_KEYS = {
+    'argcomplete': 'python3-argcomplete',
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
     'matplotlib': 'python3-matplotlib', 'numba': 'python3-numba', 'numpy': 'python3-numpy',
@@ -175,8 +176,18 @@ def test_every_import_is_declared(manifest, setup_keywords):
         assert DISTRIBUTIONS.get(name, name) in pip_names, (name, modules[name])
         assert name in ROSDEP_KEYS, (name, modules[name])
         assert ROSDEP_KEYS[name] is None or ROSDEP_KEYS[name] in keys, name
-    for name in ros - {'ament_index_python'}:
+    for name in ros:
         assert name in keys, (name, modules[name])
+    assert 'ros-jazzy-ament-index-python' in setup_keywords['extras_require']['ros']
+
+
+def test_the_lower_bounds_are_versions_that_work(setup_keywords):
+    """Found with every library at its lowest version; below these a traceback is what one sees."""
+    lowest = dict(re.split('>=', one) for one in setup_keywords['install_requires'])
+    # The messages of Jazzy came with 0.10.8, what opens sqlite3 bags here with 0.11.
+    assert lowest['rosbags'] == '0.11.0' and hasattr(Stores, 'ROS2_JAZZY')
+    assert lowest['numba'] == '0.58.1' and lowest['mcap'] == '1.1.1'
+    assert setup_keywords['extras_require']['ray'][0].startswith('ray[client]')
 
 
 def test_no_requirement_without_an_import(setup_keywords):

@@ -24,7 +24,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from pam_actuation.bags import codecs, series
+from pam_actuation.bags import codecs, renamed, series
 from pam_actuation.bags.plausibility import recorded_length_m, topic_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.messages import VALVE_NAMES, valve_of
@@ -41,7 +41,7 @@ _UNIT_OF_ENDING = (
 )
 
 
-@dataclass
+@dataclass(repr=False)
 class RecordedRun(Run):
     """
     A run read from a bag.
@@ -82,7 +82,7 @@ class RecordedRun(Run):
         return tuple(found.sentence for found in self.findings if found.unusable)
 
 
-def load_run(path, namespace=None, recover=False):
+def load_run(path, namespace=None, recover=False, topics=None):
     """
     Load one muscle's run from a bag.
 
@@ -94,6 +94,10 @@ def load_run(path, namespace=None, recover=False):
         Which muscle, as in ``/left_knee/flexor``; needed only if the bag has several.
     recover : bool
         Also read what precedes the damage in a bag that ended early.
+    topics : dict of str to str, optional
+        Topics with other names than ours, such as ``{'contraction': '/robot/encoder',
+        'pressure': '/robot/p'}``; their message types are those of our topics. The others
+        come from the namespace, if there is one and no choice is left.
 
     Returns
     -------
@@ -105,12 +109,20 @@ def load_run(path, namespace=None, recover=False):
     ------
     InputError
         Missing, empty, damaged or foreign file, several namespaces or none with
-        a pressure or contraction.
+        a pressure or contraction; a name in ``topics`` that is not ours or not in the bag, or a
+        topic of another type.
 
     """
-    bag = read_bag(path, recover=recover, wanted=is_read)
-    namespace = _choose_namespace(bag, namespace)
-    found = topics_of(bag, namespace)
+    named = renamed.checked(topics)
+    bag = read_bag(path, recover=recover, wanted=lambda name, type_name, encoding: (
+        name in named.values() or is_read(name, type_name, encoding)))
+    given = renamed.topics_by_name(bag, named)
+    if given and namespace is None:
+        present = list(namespaces(bag))
+        chosen = present[0] if len(present) == 1 else None
+    else:
+        chosen = _choose_namespace(bag, namespace)
+    found = {**(topics_of(bag, chosen) if chosen is not None else {}), **given}
     remarks = list(bag.remarks)
     topics, trajectories = {}, ()
     for short, topic in found.items():
@@ -121,7 +133,7 @@ def load_run(path, namespace=None, recover=False):
             if len(one):
                 topics[short] = one
     return RecordedRun(
-        topics=topics, metadata=bag.experiment, namespace=namespace, path=str(path),
+        topics=topics, metadata=bag.experiment, namespace=chosen or '', path=str(path),
         reference_trajectories=trajectories, remarks=tuple(remarks))
 
 

@@ -20,6 +20,8 @@ The layout is worked out once and all messages that have the same bytes in the
 deciding places are read together as columns of one array.
 """
 
+import struct
+
 import numpy as np
 from pam_actuation.bags import cdr, codecs
 from pam_actuation.bags.payloads import Payloads
@@ -39,6 +41,8 @@ VALUES = {
     'controller_state': (),
 }
 
+# What unreadable bytes raise; rosbags 0.11 hands on what struct and str raise.
+UNREADABLE = (cdr.CdrError, SerdeError, struct.error, ValueError)
 # Layouts of equal length that are looked for together; what is left is read one by one.
 _MAX_LAYOUTS = 8
 
@@ -107,7 +111,7 @@ def _read_alike(short, indices, rows, stamp_ns, values, bad, only):
     try:
         raw = codecs.little_endian(short, first)
         layout = codecs.value_layout(short, raw)
-    except (cdr.CdrError, SerdeError):
+    except UNREADABLE:
         bad[indices[0]] = True
         return indices[1:], rows[1:]
     if only is not None:

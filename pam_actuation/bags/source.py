@@ -30,6 +30,7 @@ from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
+from pam_sim.short_repr import short_repr
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
@@ -41,6 +42,7 @@ def _no_times():
     return np.zeros(0, dtype=np.int64)
 
 
+@short_repr
 @dataclass
 class TopicData:
     """The N messages of one topic as bytes, in file order, with their times [ns], shape (N,)."""

@@ -18,12 +18,9 @@ import json
 import os
 import sys
 
-from pam_actuation.cli.options import count, HIGHEST_SEED, source
+from pam_actuation.cli.options import (  # noqa: F401, the codes are for the verbs
+    count, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, HIGHEST_SEED, source)
 from tqdm import tqdm
-
-EXIT_DONE = 0
-EXIT_FINDING = 1       # the verb worked and found something the user should look at
-EXIT_BAD_INPUT = 2
 
 
 def emit(args, payload, text):

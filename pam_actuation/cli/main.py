@@ -12,6 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+# PYTHON_ARGCOMPLETE_OK
 """Entry point of ``pam``: finds the verbs, parses, runs, turns mistakes into exit code 2."""
 
 import argparse
@@ -19,13 +20,12 @@ import importlib
 import os
 import sys
 
-from pam_actuation.cli.common import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING
-from pam_actuation.cli.options import Parser
+from pam_actuation.cli import completion
+from pam_actuation.cli.options import (
+    complain, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, EXIT_INTERRUPTED, Parser)
+from pam_actuation.cli.overview import one_line, overview, VERBS
 from pam_sim.errors import InputError
 from pam_sim.files import reason, shown
-
-VERBS = ('demo', 'run', 'up', 'simulate', 'replay', 'tune', 'characterise', 'gap', 'report',
-         'info', 'models', 'nodes', 'valves', 'rules')
 
 
 def build_parser():
@@ -39,7 +39,8 @@ def build_parser():
     for name in VERBS:
         module = importlib.import_module(f'pam_actuation.cli.{name}')
         sub = verbs.add_parser(
-            name, help=module.HELP, description=module.HELP, epilog=f'Example: {module.EXAMPLE}',
+            name, help=one_line(name), description=module.HELP,
+            epilog=f'Example: {module.EXAMPLE}',
             formatter_class=argparse.RawDescriptionHelpFormatter)
         sub.add_argument(
             '--json', action='store_true', help='print the result as JSON, for programs')
@@ -60,8 +61,13 @@ def main(argv=None):
     """
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    if not (sys.argv[1:] if argv is None else argv) and not completion.asked():
+        print(overview())
+        return EXIT_DONE
     try:
-        args = build_parser().parse_args(argv)
+        parser = build_parser()
+        completion.complete(parser)
+        args = parser.parse_args(argv)
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code
     try:
@@ -70,18 +76,18 @@ def main(argv=None):
         # A verb that did its work on data that cannot be right has found something.
         return EXIT_FINDING if code == EXIT_DONE and getattr(args, 'implausible', ()) else code
     except InputError as mistake:
-        print(f'pam {args.verb}: {" ".join(str(mistake).split())}', file=sys.stderr)
-        return EXIT_BAD_INPUT
+        said = ' '.join(str(mistake).split())
+        return complain(said, EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
     except KeyboardInterrupt as stop:
-        print(f'pam {args.verb}: stopped' + (f'; {stop}' if str(stop) else ''), file=sys.stderr)
-        return 130
+        said = f'stopped; {stop}' if str(stop) else 'stopped'
+        return complain(said, EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()
         return 0
     except OSError as error:  # the file system refuses where nobody looked before
         place = f'{shown(str(error.filename))}: ' if error.filename else ''
-        print(f'pam {args.verb}: {place}{reason(error)}', file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return complain(
+            f'{place}{reason(error)}', EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
 
 
 if __name__ == '__main__':

@@ -35,16 +35,18 @@ def add_arguments(parser):
 
 def run(args):
     """Print the names, or one page; write the pages asked for."""
-    from pam_sim.errors import InputError
+    from pam_sim.errors import did_you_mean, InputError
     from pam_sim.files import check_folder, whole_files, write_text
     if args.markdown is not None:
         check_folder(args.markdown)
     try:
         from pam_actuation.nodes.pages import pages, VARIANTS
     except ImportError as error:
-        raise InputError(f'the nodes need ROS 2 ({error.name} is missing)') from None
+        from pam_actuation.ros_missing import ros_missing
+        raise InputError(ros_missing(error.name)) from None
     if args.name is not None and args.name not in VARIANTS:
-        raise InputError(f'no node {args.name!r}, known are {", ".join(VARIANTS)}', 'name')
+        raise InputError(f'no node {args.name!r}{did_you_mean(args.name, VARIANTS)}; known are '
+                         f'{", ".join(VARIANTS)}', 'name')
     texts = {Path(file).stem: text for file, text in pages().items()}
     if args.markdown is not None:
         files = {f'{name}.md': text for name, text in texts.items()}

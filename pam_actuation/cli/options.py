@@ -20,12 +20,19 @@ one sentence and exit code 2, before anything is loaded.
 """
 
 import argparse
+import json
 import math
 import os
 import re
+import sys
 
+from pam_sim.errors import did_you_mean
 from pam_sim.files import shown
 
+EXIT_DONE = 0
+EXIT_FINDING = 1        # the verb worked and found something the user should look at
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
 LONGEST_NAME_BYTES = 255      # of one file or folder, on every file system in use
 HIGHEST_SEED = 2**32 - 1
 _DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
@@ -34,10 +41,47 @@ _DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
 class Parser(argparse.ArgumentParser):
     """A parser that tells a mistake in one line, without repeating the usage."""
 
+    as_json = False
+
+    def parse_known_args(self, args=None, namespace=None):
+        """Parse as always; note first whether mistakes are to be told as JSON."""
+        words = sys.argv[1:] if args is None else list(args)
+        self.as_json = any(len(word) > 2 and '--json'.startswith(word) for word in words)
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown and self._subparsers is None:        # of a verb: its options are known here
+            known = [word for action in self._actions for word in action.option_strings]
+            hint = did_you_mean(unknown[0].partition('=')[0], known, '')
+            self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
+        return found, unknown
+
     def error(self, message):
-        """Print the mistake and exit with code 2."""
+        """Tell the mistake and exit with code 2."""
         said = ' '.join(message.removeprefix('argument ').split())
-        self.exit(2, f'{self.prog}: {said}\n')
+        complain(said, EXIT_BAD_INPUT, self.prog, self.as_json)
+        self.exit(EXIT_BAD_INPUT)
+
+    def _check_value(self, action, value):
+        """Refuse what is not among the choices, with the nearest one of them."""
+        if action.choices is not None and value not in action.choices:
+            names = [str(one) for one in action.choices]
+            what = 'not a verb of pam' if action.dest == 'verb' else 'not allowed'
+            shown = f'{names[0]} to {names[-1]}' if len(names) > 30 else ', '.join(names)
+            raise argparse.ArgumentError(
+                None if action.dest == 'verb' else action,
+                f'{str(value)!r} is {what}{did_you_mean(value, names)}; allowed: {shown}')
+
+
+def complain(sentence, code, program, as_json=False):
+    """
+    Tell why a verb did not do its work; return the exit code.
+
+    One line on stderr, ``program: sentence``. For programs, beside it, one JSON document on
+    stdout, where they look for the result: ``{"error": sentence, "exit_code": code}``.
+    """
+    if as_json:
+        print(json.dumps({'error': sentence, 'exit_code': code}, indent=2))
+    print(f'{program}: {sentence}', file=sys.stderr)
+    return code
 
 
 def allowed_text(lowest=None, highest=None, unit=''):

@@ -106,7 +106,7 @@ class CompiledController:
 
     @property
     def input_array(self):
-        """The array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
+        """Return the array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
         return self._inputs
 
     def state_values(self):

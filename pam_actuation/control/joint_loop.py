@@ -115,7 +115,7 @@ class JointControllerLoop:
 
     @property
     def rejected_references(self):
-        """Number of references and trajectories that were not usable."""
+        """Return the number of references and trajectories that were not usable."""
         return self.references.refused + self._refused_trajectories
 
     def forget(self):
@@ -241,9 +241,10 @@ class JointControllerLoop:
             return reason
         pressures_pa = self._fresh_pressures_pa(now_ns)
         wanted_pa = self._commands_pa or (P_ATM_PA, P_ATM_PA)
-        # A list: both are to be asked, also where the first one is slack.
-        if any([muscle.judge(now_ns, *pair) for muscle, *pair in zip(
-                self._slack, wanted_pa, pressures_pa)]):
+        # Into a list first: both are to be asked, also where the first one is slack.
+        slack = [muscle.judge(now_ns, *pair) for muscle, *pair in zip(
+            self._slack, wanted_pa, pressures_pa)]
+        if any(slack):
             return codes.MUSCLE_SLACK
         if self.follows_torque:
             self._frozen.pause()

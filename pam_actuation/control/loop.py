@@ -150,12 +150,12 @@ class ControllerLoop:
 
     @property
     def rejected_references(self):
-        """Number of references and trajectories that were not usable."""
+        """Return the number of references and trajectories that were not usable."""
         return self.references.refused
 
     @property
     def ticks(self):
-        """Number of ticks run."""
+        """Return the number of ticks run."""
         return self._core.ticks
 
     def on_contraction(self, message):

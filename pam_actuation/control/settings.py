@@ -15,9 +15,8 @@
 """Settings of a controller: named numbers with unit, default and allowed range."""
 
 from dataclasses import dataclass
-import difflib
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,7 @@ def checked_settings(specification, given, where=None):
     known = {setting.name: setting for setting in specification}
     for name in given:
         if name not in known:
-            near = difflib.get_close_matches(str(name), known, 1)
-            hint = f'; did you mean {near[0]}' if near else ''
+            hint = did_you_mean(name, known, '', '; did you mean {}')
             raise InputError(
                 f'unknown setting {name}{hint}; known are {", ".join(sorted(known))}',
                 place(name))

@@ -20,14 +20,13 @@ parameters behind ``ppr.`` or ``hsv.``.
 """
 
 from dataclasses import dataclass, field, fields, replace
-import difflib
 import math
 
 from pam_actuation.drivers.hsv import HsvConfig
 from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.drivers.ppr import PprConfig
 from pam_actuation.drivers.safety import SafetyLimits
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 VALVE_TYPES = ('ppr', 'hsv')
 
@@ -152,8 +151,7 @@ class DriverConfig:
 
 def _checked(name, value, where):
     if name not in _RANGES:
-        near = difflib.get_close_matches(name, _RANGES, n=1, cutoff=0.4)
-        hint = f', did you mean {near[0]}?' if near else ''
+        hint = did_you_mean(name, _RANGES, '', ', did you mean {}?')
         raise InputError(f'unknown parameter {name!r}{hint}', where)
     lower, upper, _ = _RANGES[name]
     if isinstance(value, bool) or not isinstance(value, (int, float)):

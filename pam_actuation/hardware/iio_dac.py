@@ -34,7 +34,7 @@ class IioDac(ValveOutput):
                         'volts at the regulator per volt of the analog output'),
     )
 
-    def open(self):
+    def open(self):  # noqa: A003
         """Find the channel, check that it reaches the regulator's range, vent."""
         self._voltage = IioVoltage(
             self.values['sysfs_root'], self.values['dac.device'], 'out',

@@ -76,7 +76,7 @@ class PwmChannel:
         self.set(opening)
         sysfs.write(self.folder / 'enable', 1)
 
-    def set(self, opening):
+    def set(self, opening):  # noqa: A003
         """Set the mean opening of the valve, 0..1, from the next period on."""
         sysfs.write(*self.write_of(opening))
 
@@ -100,7 +100,7 @@ class PwmPair(ValveOutput):
                         'whether the venting valve is open without current'),
     )
 
-    def open(self):
+    def open(self):  # noqa: A003
         """Find and start both channels, venting."""
         values = self.values
         if values['pwm.fill_channel'] == values['pwm.vent_channel']:

@@ -53,7 +53,7 @@ class ValveOutput:
         self.values = values
         self.config = config
 
-    def open(self):
+    def open(self):  # noqa: A003
         """Find the device, check it and vent; raise DeviceError if it is not usable."""
 
     def write(self, efforts):

@@ -18,3 +18,7 @@ The ROS 2 nodes of the rig: thin shells around classes that know no ROS.
 Each node declares parameters, takes messages in, calls one plain object and
 sends messages out; ``managed.py`` holds what they share.
 """
+
+from pam_actuation.ros_missing import end_without_ros
+
+end_without_ros()

@@ -20,9 +20,8 @@ its text and turns a wrong value, at start or live, into one sentence.
 """
 
 from dataclasses import dataclass
-import difflib
 
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
@@ -98,8 +97,7 @@ def _check_overrides(node, table):
             if problem:
                 raise InputError(problem, f'parameter {name}')
         elif name != 'use_sim_time' and not name.startswith('qos_overrides.'):
-            near = difflib.get_close_matches(name, table, n=1)
-            hint = f'; did you mean {near[0]}?' if near else ''
+            hint = did_you_mean(name, table, '', '; did you mean {}?')
             node.get_logger().warning(f'parameter {name} is not known here, ignored{hint}')
 
 

@@ -35,6 +35,7 @@ from pam_actuation.replay.arrivals import arrivals, ORDER
 from pam_actuation.replay.difference import difference
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 SENSORS = ('pressure', 'contraction', 'force', 'supply_pressure')
 _UNITS = {'pressure_pa': 'Pa', 'contraction_m': 'm', 'force_n': 'N', 'ppr_voltage': 'V',
@@ -45,6 +46,7 @@ _FIELD = {'pressure': 'pressure_pa', 'supply_pressure': 'pressure_pa', 'force': 
 _SAMPLES = 20_000
 
 
+@short_repr
 @dataclass(frozen=True)
 class ChainReplay:
     """

@@ -30,6 +30,7 @@ from pam_actuation.control.tick import (
     input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 # Input of a tick -> (topic it came from, field of that topic).
 _MEASURED = {
@@ -39,6 +40,7 @@ _MEASURED = {
 _PROGRESS_EVERY = 2000    # ticks
 
 
+@short_repr
 @dataclass
 class ReplayResult:
     """

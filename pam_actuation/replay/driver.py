@@ -32,6 +32,7 @@ from pam_actuation.replay.arrivals import arrivals
 from pam_actuation.replay.difference import difference
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 UNITS = {'ppr_voltage': 'V', 'fill_duty': '1', 'vent_duty': '1'}
 COMMANDS = ('pressure_command', 'valve_command')
@@ -39,6 +40,7 @@ _TAKEN_BY = {'pressure': 'on_pressure', 'supply_pressure': 'on_supply',
              'pressure_command': 'on_command', 'valve_command': 'on_valve_command'}
 
 
+@short_repr
 @dataclass(frozen=True)
 class DriverReplay:
     """

@@ -23,11 +23,13 @@ from pam_sim.errors import InputError
 from pam_sim.gap.free_run import free_run, Recording
 from pam_sim.gap.health import recorded_valve
 from pam_sim.gap.result import FIELD
+from pam_sim.short_repr import short_repr
 
 MIN_DURATION_S = 0.1         # the start is read from half of it
 UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 
 
+@short_repr
 @dataclass(frozen=True)
 class PlantReplay:
     """

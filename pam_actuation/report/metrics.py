@@ -26,6 +26,7 @@ import numpy as np
 
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
+from pam_sim.short_repr import short_repr
 from pam_sim.units import RHO_REFERENCE
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
@@ -58,6 +59,7 @@ class StepResponse:
     overshoot_m: float
 
 
+@short_repr
 @dataclass(frozen=True)
 class RunMetrics:
     """All figures of one run; None where the recording does not hold what is needed."""

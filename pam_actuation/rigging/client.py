@@ -122,7 +122,7 @@ class RigClient:
 
         """
         deadline = time.monotonic() + timeout_s
-        waiting = {name: None for name in full_names}
+        waiting = dict.fromkeys(full_names)
         refused = []
         while waiting and time.monotonic() < deadline:
             for name, future in list(waiting.items()):

@@ -37,6 +37,7 @@ from pam_actuation.rigging.processes import end_all, node_environment, NodeProce
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
     TRANSITION_TIMEOUT_S)
+from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 import yaml
@@ -107,9 +108,7 @@ class RigSession:
             from pam_actuation.rigging.client import RigClient
             self._new_client = RigClient
         except ImportError as error:
-            raise InputError(
-                f'live nodes need ROS 2 ({error.name} is missing): source its setup file or '
-                'install the extra ros, pip install "pam_actuation[ros]"') from None
+            raise InputError(ros_missing(error.name)) from None
         self.plan = plan
         self.namespace = namespace
         self.processes = {}

@@ -32,6 +32,7 @@ from pam_actuation.rigging.plan import DRIVER, RECORDER
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S)
+from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import InputError
 
 START_TIMEOUT_S = 60.0
@@ -63,7 +64,7 @@ class Supervisor:
         try:
             from pam_actuation.rigging.client import RigClient
         except ImportError as error:
-            raise InputError(f'live nodes need ROS 2 ({error.name} is missing)') from None
+            raise InputError(ros_missing(error.name)) from None
         self._new_client = RigClient
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))

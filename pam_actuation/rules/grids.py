@@ -26,10 +26,13 @@ import numpy as np
 from pam_actuation.control.sofc.membership import SET_NAMES, SET_WORDS
 from pam_actuation.control.sofc.words import DIRECTION, number, shown
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
+SHOWN_KPA = 0.005          # what two digits of a number show
 _SHORT = dict(zip(SET_WORDS, SET_NAMES))
 
 
+@short_repr
 @dataclass(frozen=True)
 class Axis:
     """
@@ -59,6 +62,7 @@ class Axis:
             if self.names else tuple(texts)
 
 
+@short_repr
 @dataclass(frozen=True)
 class Grid:
     """
@@ -77,13 +81,27 @@ class Grid:
 
     @property
     def change(self):
-        """What was changed [kPa]."""
+        """Return what was changed [kPa]."""
         return self.values - self.before
 
     @property
     def never(self):
         """Which rules never fired."""
         return self.fired_s <= 0.0
+
+    def firing(self, mark=''):
+        """
+        Return in words how many rules never fired, ``mark`` being how these are marked.
+
+        Running changes only rules that fired. Where others differ, it says where from.
+        """
+        never, size = int(self.never.sum()), self.never.size
+        text = f'None of the {size} rules has fired' if never == size \
+            else f'{never} of {size} rules never fired{mark}'
+        came = int(np.sum(self.never & (np.abs(self.change) >= SHOWN_KPA)))
+        return text if not came else (
+            f'{text}; {came} of them differ all the same: they came so from tuning or from '
+            'another file, not from running')
 
 
 def grids(rules, before=None):

@@ -35,6 +35,7 @@ from pam_actuation.tuning.loop_setup import (
 from pam_actuation.tuning.tracking_errors import TrackingErrors
 from pam_sim.errors import InputError
 from pam_sim.rollout import layout
+from pam_sim.short_repr import short_repr
 
 
 @functools.cache
@@ -45,6 +46,7 @@ def compiled_rollouts():
         (sofc_step, pid_step, lqi_step))
 
 
+@short_repr
 @dataclass
 class LoopResult(TrackingErrors):
     """
@@ -66,7 +68,7 @@ class LoopResult(TrackingErrors):
 
     @property
     def error_m(self):
-        """Reference minus contraction [m]."""
+        """Return reference minus contraction [m]."""
         return self.reference_m - self.contraction_m
 
     error = error_m

@@ -18,8 +18,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_actuation.tuning.tracking_errors import TrackingErrors
+from pam_sim.short_repr import short_repr
 
 
+@short_repr
 @dataclass
 class ModeResult(TrackingErrors):
     """
@@ -39,5 +41,5 @@ class ModeResult(TrackingErrors):
 
     @property
     def error(self):
-        """Reference minus what was reached, in ``unit``."""
+        """Return reference minus what was reached, in ``unit``."""
         return self.reference - self.value

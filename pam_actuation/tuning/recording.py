@@ -30,6 +30,7 @@ from pam_actuation.control.tick import RUNNING
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.replay.plant import replay_plant
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 # Error of the free run as a share of the recorded range; design values.
 TRUSTED_SHARE = 0.03
@@ -73,6 +74,7 @@ class ModelCheck:
         return {**asdict(self), 'verdict': self.verdict, 'sentence': self.sentence()}
 
 
+@short_repr
 @dataclass(frozen=True)
 class Counterfactual:
     """

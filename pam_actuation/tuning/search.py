@@ -23,6 +23,7 @@ samples the whole box does not get stuck in the first valley.
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.short_repr import short_repr
 from scipy.optimize import differential_evolution
 
 SMALLEST = 5                    # members differential evolution needs
@@ -30,6 +31,7 @@ MEMBERS = 24                    # fewer settle too early, also with few settings
 _NEAR = 0.12                    # spread of the cloud about the start, in widths of the box
 
 
+@short_repr
 @dataclass
 class Found:
     """Best point and its cost, and why the search ended."""
@@ -82,7 +84,7 @@ def minimise(costs_of, start, members, generations, seed, patience=0):
         lambda point: 0.0, [(0.0, 1.0)] * len(start), workers=mapped, updating='deferred',
         init=_first_generation(start, members, seed), maxiter=max(generations - 1, 1),
         seed=np.random.default_rng(seed), tol=0.0, polish=False, mutation=(0.4, 0.9),
-        recombination=0.8, callback=lambda *_: bool(patience) and best['since'] >= patience)
+        recombination=0.8, callback=lambda *_, **__: bool(patience) and best['since'] >= patience)
     stopped = bool(patience) and best['since'] >= patience
     return Found(found.x, float(found.fun),
                  f'no progress in {patience} generations' if stopped else 'budget used up')

@@ -78,7 +78,7 @@ class Workers:
         self._stack.close()
         self._parallel = None
 
-    def map(self, function, problem, items):
+    def map(self, function, problem, items):  # noqa: A003
         """
         Return ``[function(problem, item) for item in items]``, computed in parallel.
 
@@ -89,6 +89,10 @@ class Workers:
             function, problem = functools.partial(_unpacked_call, function), pickle.dumps(problem)
         return self._parallel(
             joblib.delayed(function)(problem, item) for item in items)
+
+
+_NO_RAY_CLIENT = ('needs the client of Ray, which `ray` alone does not bring: '
+                  'pip install "pam_actuation[ray]"')
 
 
 @functools.lru_cache(maxsize=4)
@@ -126,10 +130,15 @@ def _ray(address):
         from ray.util.joblib import register_ray
     except ImportError:
         raise InputError(
-            'needs Ray: pip install ray, here and on the workers', 'cluster') from None
+            'needs Ray: pip install "pam_actuation[ray]", here and on the workers',
+            'cluster') from None
     try:
         ray.init(address)
+    except ImportError:     # raised where the address is first looked at
+        raise InputError(_NO_RAY_CLIENT, 'cluster') from None
     except (ConnectionError, OSError, ValueError) as error:
+        if 'ray[client]' in str(error):
+            raise InputError(_NO_RAY_CLIENT, 'cluster') from None
         raise InputError(f'no Ray cluster answers at {address}: {error}', 'cluster') from None
     try:
         register_ray()

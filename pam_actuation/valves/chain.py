@@ -53,7 +53,7 @@ class Record(Response):
 
     @property
     def gauge_pa(self):
-        """True gauge pressure [Pa] at the ends of the steps, shape (N,)."""
+        """Return the true gauge pressure [Pa] at the ends of the steps, shape (N,)."""
         return self.true_pressure_pa[1:] - P_ATM_PA
 
 

@@ -24,9 +24,11 @@ from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import loads_of_table, points_of_map
 from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
+from pam_sim.short_repr import short_repr
 from pam_sim.units import absolute_pa
 
 
+@short_repr
 @dataclass
 class Characterisation:
     """

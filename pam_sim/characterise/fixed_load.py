@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_sim.characterise.holds import find_holds
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 from pam_sim.units import GRAVITY_M_PER_S2
 
 HANGING_STRAIN = 2e-3        # from this contraction on, the load certainly hangs on the muscle
@@ -26,6 +27,7 @@ SAME_LOAD_N = 0.5            # closer loads are repetitions of one load
 SCATTER_N, SCATTER = 0.5, 0.02     # a load whose force varies more is not fixed
 
 
+@short_repr
 @dataclass(frozen=True)
 class FixedLoad:
     """

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from pam_sim.characterise.fixed_load import by_load
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
 
 EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its end
@@ -35,6 +36,7 @@ LEAST = 4                   # points a cubic needs along an axis
 SAME_PA = 1e3               # grid pressures are rounded to this
 
 
+@short_repr
 @dataclass(frozen=True)
 class Points:
     """

@@ -22,6 +22,7 @@ from pam_sim.characterise.points import load_grid, with_enough_pressures, with_n
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.muscle.lookup_table import LookupTable
+from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 STRAIN_STEP = 0.01          # of the tabulated F(eps, P)
@@ -29,6 +30,7 @@ REST_SIGMAS = 5.0           # a contraction of fewer standard deviations of its 
 _DIGITS_STRAIN, _DIGITS_MASS = 7, 13     # far below any uncertainty; keeps files short
 
 
+@short_repr
 @dataclass(frozen=True)
 class Surfaces:
     """

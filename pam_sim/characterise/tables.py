@@ -29,6 +29,7 @@ from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
 from pam_sim.errors import InputError
 from pam_sim.muscle.lookup_table import read_commented_csv
+from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
 
 # Column name in lower case -> (quantity, factor to SI).
@@ -45,6 +46,7 @@ COLUMNS = {
 MAP_LOADS = 16              # loads at which a force map is read
 
 
+@short_repr
 @dataclass(frozen=True)
 class MeasuredTable:
     """

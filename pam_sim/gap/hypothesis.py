@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.gap.cuts import acts_on
+from pam_sim.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Hypothesis:
                 or any(k.name in self.freed for k in cut.known))
 
 
+@short_repr
 @dataclass
 class Found:
     """
@@ -92,6 +94,7 @@ class Found:
         return [c.setting(v) for c, v in zip(self.hypothesis.effects, self.values())]
 
 
+@short_repr
 @dataclass(frozen=True)
 class Precision:
     """

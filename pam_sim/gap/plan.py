@@ -33,6 +33,7 @@ from pam_sim.gap.cuts import acts_on, cuts_of
 from pam_sim.gap.fit import BOX
 from pam_sim.gap.parts import UNUSED
 from pam_sim.gap.side_by_side import side_by_side
+from pam_sim.short_repr import short_repr
 
 APART = 0.3                  # floors (rms) that the best rival must leave in some signal
 LARGE = 10.0                 # times the visible size; rivals that need more are called inseparable
@@ -42,6 +43,7 @@ STEPS = 10
 GENTLE = 1e-9                # keeps columns that say the same solvable
 
 
+@short_repr
 @dataclass(frozen=True)
 class Outlook:
     """
@@ -92,6 +94,7 @@ def _size(effect, values, rig):
             'equivalent': {n: {'value': float(v), 'unit': u} for n, (v, u) in report.items()}}
 
 
+@short_repr
 @dataclass
 class Inner:
     """

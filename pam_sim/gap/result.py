@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
+from pam_sim.short_repr import short_repr
 
 SCHEMA = 1
 SIGNALS = ('pressure', 'contraction', 'force')
@@ -94,6 +95,7 @@ class Calibrated:
                 'unit': self.unit, 'ci95': list(self.ci95)}
 
 
+@short_repr
 @dataclass(frozen=True)
 class Trace:
     """A signal measured and simulated at the measured stamps, SI units."""
@@ -105,6 +107,7 @@ class Trace:
     after: np.ndarray
 
 
+@short_repr
 @dataclass
 class GapResult:
     """

@@ -16,7 +16,9 @@
 
 from pam_sim.joint import layout
 from pam_sim.joint.parameters import SIDES
-from pam_sim.response import Response
+from pam_sim.response import brief_span, Response
+
+OWN = ('time_s', 'angle_rad', 'velocity_rad_per_s', 'acceleration_rad_per_s2', 'torque_n_m')
 
 
 class JointResponse:
@@ -50,10 +52,14 @@ class JointResponse:
         """Return the number of samples, N + 1."""
         return len(self.outputs)
 
+    def __repr__(self):
+        """Return length and names in one line."""
+        return (f'JointResponse({len(self)} samples, {brief_span(self.time_s)}: {", ".join(OWN)}; '
+                'flexor, extensor)')
+
     def as_dict(self):
         """Return name -> ndarray; names of a muscle begin with ``flexor/`` or ``extensor/``."""
-        signals = {name: getattr(self, name) for name in (
-            'time_s', 'angle_rad', 'velocity_rad_per_s', 'acceleration_rad_per_s2', 'torque_n_m')}
+        signals = {name: getattr(self, name) for name in OWN}
         for side in SIDES:
             signals.update({f'{side}/{name}': values
                             for name, values in getattr(self, side).as_dict().items()})

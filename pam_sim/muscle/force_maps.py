@@ -26,10 +26,12 @@ from pathlib import Path
 
 import numpy as np
 from pam_sim.errors import InputError
+from pam_sim.short_repr import short_repr
 
 LENGTH_M = {'dmsp_10_250': 0.250, 'dmsp_20_300': 0.300}
 
 
+@short_repr
 @dataclass(frozen=True)
 class ForceMap:
     """

@@ -21,11 +21,13 @@ from pathlib import Path
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, whole_file
+from pam_sim.short_repr import short_repr
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class LookupTable:
     """

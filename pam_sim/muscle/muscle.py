@@ -25,7 +25,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
 from pam_sim.muscle.lookup_table import LookupTable, read_table
@@ -73,13 +73,13 @@ class LawChoice:
     """
 
     name: str = 'sarosi'
-    set: str = None
+    set: str = None  # noqa: A003
     parameters: dict = field(default_factory=dict)
     table: LookupTable = None
 
     @cached_property
     def law(self):
-        """The law itself; made once."""
+        """Return the law itself; made once."""
         if self.table is not None:
             return make_law(self.name, self.table)
         return make_law(self.name, self.parameters or None, self.set)
@@ -175,7 +175,9 @@ def get_muscle(name):
 
     """
     if name not in muscle_names():
-        raise InputError(f'muscle `{name}` is not known; allowed: {", ".join(muscle_names())}')
+        raise InputError(
+            f'muscle `{name}` is not known{did_you_mean(name, muscle_names())}; allowed: '
+            f'{", ".join(muscle_names())}')
     return read_muscle(_SIZES.read(name), name)
 
 

@@ -33,9 +33,11 @@ from pam_sim.response import COLUMNS, Response
 from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.sampling import Placed
 from pam_sim.rollout.simulate import check_outputs, prepare
+from pam_sim.short_repr import short_repr
 from pam_sim.units import P_ATM_PA
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Record:
     """

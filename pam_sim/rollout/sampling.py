@@ -20,8 +20,10 @@ from numba import njit
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.response import COLUMNS
+from pam_sim.short_repr import short_repr
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Measured:
     """

@@ -275,6 +275,7 @@ def test_a_full_disk_between_two_files_keeps_the_first(tmp_path, monkeypatch):
 
 def test_a_disk_too_full_for_the_index_keeps_what_is_indexed(tmp_path, monkeypatch):
     class SmallDisk(io.BytesIO):
+
         def write(self, data):
             if self.tell() + len(data) > 300:
                 raise OSError(errno.ENOSPC, 'No space left on device')
@@ -309,6 +310,7 @@ def test_where_no_file_without_a_name_can_be_made_the_index_stays_in_memory(
 
 def test_an_index_that_cannot_be_closed_spoils_nothing(tmp_path, monkeypatch):
     class NetworkDisk(io.BytesIO):
+
         def close(self):
             super().close()
             raise OSError(errno.EDQUOT, 'Disk quota exceeded')

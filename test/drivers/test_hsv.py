@@ -216,7 +216,7 @@ def test_dead_time_longer_than_memory():
 
 
 def test_missing_measurements(rig):
-    """NaN every second period: the model bridges; never measured: both shut."""
+    """Without a measurement every second period: the model bridges; never measured: both shut."""
     plant, law = rig.plant(1), HsvLaw(driver_config(rig).hsv)
     assert law.step(P_ATM_PA + 3e5, math.nan) == (0.0, 0.0)
     for k in range(200):

@@ -171,6 +171,7 @@ def test_beside_another_effect_the_better_of_two_sensor_causes_takes_the_place(t
             Named('threshold_pressure', 'muscle', [], ('threshold_pressure',))]
 
     class Given(Search):
+
         def __init__(self):
             self.choice = SimpleNamespace(
                 shares=lambda found: {},

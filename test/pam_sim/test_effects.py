@@ -52,7 +52,7 @@ def with_effect(rig, name, **parameters):
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_zero_amplitude_changes_no_bit(rig, name, valve):
     rig = rig.with_(valve=valve)
-    zero = with_effect(rig, name, **{key: 0.0 for key in effects()[name].amplitude})
+    zero = with_effect(rig, name, **dict.fromkeys(effects()[name].amplitude, 0.0))
     assert np.array_equal(run(zero).outputs, run(rig).outputs)
     # Nor beside another effect.
     other = {'name': 'hysteresis' if name != 'hysteresis' else 'creep'}

@@ -71,9 +71,8 @@ def test_a_rig_with_any_law_rests_where_the_law_says(name, chosen):
 
 def test_the_damper_of_a_law_slows_the_rig():
     plain = load_rig(RIG).with_(law='repperger')
-    free = plain.with_(law=LawChoice('repperger', 'reynolds_2003', {
-        key: 0.0 for key in ('b0_n_s_per_m', 'b1_n_s_per_m_pa', 'c0_n_s_per_m',
-                             'c1_n_s_per_m_pa')}))
+    free = plain.with_(law=LawChoice('repperger', 'reynolds_2003', dict.fromkeys(
+        ('b0_n_s_per_m', 'b1_n_s_per_m_pa', 'c0_n_s_per_m', 'c1_n_s_per_m_pa'), 0.0)))
     signal = np.full(400, 4.0)
     assert np.abs(plain.simulate(signal).velocity_m_per_s).max() \
         < 0.8 * np.abs(free.simulate(signal).velocity_m_per_s).max()

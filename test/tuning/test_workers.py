@@ -75,6 +75,7 @@ def test_a_missing_library_is_named(monkeypatch, address, library, says):
 
 def test_results_keep_the_order_of_the_items():
     class Square:
+
         def cost_mm(self, item):
             return item * item
 

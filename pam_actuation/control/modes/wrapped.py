@@ -63,7 +63,7 @@ class WrappedLaw:
 
     @property
     def settings(self):
-        """Settings of the law, metres being those of the equivalent contraction."""
+        """Return the settings of the law, metres being those of the equivalent contraction."""
         return self.law.settings
 
     @property
@@ -83,7 +83,7 @@ class WrappedLaw:
 
     @property
     def rules_replaced(self):
-        """Times the rules were exchanged from outside."""
+        """Return how often the rules were exchanged from outside."""
         return self.law.rules_replaced
 
     @property

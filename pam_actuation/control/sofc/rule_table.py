@@ -36,6 +36,7 @@ import numpy as np
 from pam_actuation.control.sofc.membership import (
     SET_COUNT, SET_WORDS, signed_logarithmic_knots)
 from pam_sim.compiled import compiled
+from pam_sim.short_repr import short_repr
 
 CONTRACTING, EXTENDING = 0, 1
 DIRECTIONS = ('contracting', 'extending')
@@ -88,6 +89,7 @@ def linear_feedback_table():
     return np.stack([surface, surface])
 
 
+@short_repr
 @dataclass(frozen=True)
 class Antecedent:
     """One input of a table of rules: ``words`` for sets with names, else ``knots`` in ``unit``."""
@@ -98,6 +100,7 @@ class Antecedent:
     words: tuple = ()
 
 
+@short_repr
 @dataclass(frozen=True)
 class RuleTable:
     """
@@ -124,6 +127,7 @@ TRACKED_UNITS = ('N', 'rad')
 _WAYS = {'N': ('rising', 'falling'), 'rad': ('flexing', 'extending')}
 
 
+@short_repr
 @dataclass
 class RuleBase:
     """

@@ -1,0 +1,71 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Topics of a bag that have other names than those of this project."""
+
+from pam_actuation.bags import codecs
+from pam_sim.errors import did_you_mean, InputError
+
+# What a run can hold, by the names of this project.
+NAMES = tuple(name for name in codecs.TOPIC_TYPES if name != 'diagnostics')
+
+
+def checked(topics):
+    """
+    Return {own name: name in the bag, beginning with a slash} of what a user gave.
+
+    Raises
+    ------
+    InputError
+        A name that is none of this project, a topic that is no text, or one given twice.
+
+    """
+    found = {}
+    for short, name in (topics or {}).items():
+        if short not in NAMES:
+            raise InputError(f'`{short}` is no topic of a run{did_you_mean(short, NAMES)}; '
+                             f'allowed: {", ".join(NAMES)}', 'topics')
+        if not isinstance(name, str) or not name.strip('/ '):
+            raise InputError(f'`{short}` needs the name of a topic in the bag, not {name!r}',
+                             'topics')
+        name = '/' + name.strip().strip('/')
+        if name in found.values():
+            raise InputError(f'{name} is given for two topics', 'topics')
+        found[short] = name
+    return found
+
+
+def topics_by_name(bag, wanted):
+    """
+    Return {own name: TopicData} of the topics that ``wanted`` names in a bag.
+
+    Raises
+    ------
+    InputError
+        A topic that the bag does not have, is of another message type, or has no messages.
+
+    """
+    found = {}
+    for short, name in wanted.items():
+        if name not in bag.topics:
+            raise InputError(f'has no topic {name}{did_you_mean(name, bag.topics)}; its topics: '
+                             f'{", ".join(sorted(bag.topics)) or "none"}', bag.path)
+        topic, needed = bag.topics[name], codecs.TOPIC_TYPES[short]
+        if (topic.type_name, topic.encoding) != (needed, 'cdr'):
+            raise InputError(f'{name} is {topic.type_name} in {topic.encoding}; `{short}` is read '
+                             f'from {needed} in cdr', bag.path)
+        if not len(topic.payloads):
+            raise InputError(f'{name} has no messages', bag.path)
+        found[short] = topic
+    return found

@@ -1,0 +1,103 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Completion of the command line in a shell: verbs, options, and names of what there is.
+
+argcomplete starts ``pam`` at every press of the tab key, so nothing here imports the simulator.
+"""
+
+import os
+
+RIG, JOINT, MUSCLE = 'presets', 'joint/presets', 'muscle/sizes'      # folders of pam_sim
+ASKED = '_ARGCOMPLETE'      # in the environment while a shell asks
+
+
+def asked():
+    """Tell whether it is a shell that starts this process, to complete a command line."""
+    return ASKED in os.environ
+
+
+def complete(parser):
+    """Answer the shell and end the process if it is a shell that asks; else do nothing."""
+    if not asked():
+        return
+    import argcomplete
+    _add_names(parser)
+    argcomplete.autocomplete(parser)
+
+
+def _add_names(parser):
+    """Give every argument of every verb that takes a name the names there are."""
+    for verb, sub in verbs_of(parser).items():
+        for action in sub._actions:
+            names = _names_for(verb, action.dest)
+            if names is not None:
+                action.completer = _with_files(names)
+
+
+def verbs_of(parser):
+    """Return name to parser of all verbs."""
+    return next(action.choices for action in parser._actions
+                if isinstance(action.choices, dict))
+
+
+def _names_for(verb, argument):
+    """Return the function that lists the names of an argument, None for one without names."""
+    if argument == 'valve':
+        return lambda: ['ppr', 'hsv']
+    if argument in ('experiment', 'check') or (verb, argument) == ('experiments', 'name'):
+        return lambda: configured('experiments')
+    if argument in ('controller', 'changes', 'against') or (verb, argument) == ('rules', 'rules'):
+        return lambda: configured('controllers')
+    if argument == 'hardware':
+        return lambda: configured('hardware')
+    if (verb, argument) in (('up', 'model'), ('rules', 'rig')):
+        return lambda: presets(RIG) + presets(JOINT)
+    if argument in ('rig', 'model', 'simulate'):
+        return lambda: presets(RIG)
+    if (verb, argument) == ('nodes', 'name'):
+        return nodes
+    if (verb, argument) == ('models', 'name'):
+        return lambda: presets(RIG) + presets(JOINT) + presets(MUSCLE)
+    return None
+
+
+def configured(kind):
+    """Return the names in one folder of ``config``."""
+    from pam_actuation.resources import list_config
+    return list_config(kind)
+
+
+def presets(folder):
+    """Return the names of presets in one folder of ``pam_sim``."""
+    from pam_sim.named_files import NamedFiles
+    return NamedFiles(folder).names()
+
+
+def nodes():
+    """Return the names of the nodes, each a module with a main function."""
+    from pathlib import Path
+    folder = Path(__file__).resolve().parent.parent / 'nodes'
+    return sorted(path.stem for path in folder.glob('*.py')
+                  if '\ndef main(' in path.read_text(encoding='utf-8'))
+
+
+def _with_files(names):
+    """Return what argcomplete asks: names that fit, and files, which may stand for them."""
+    def completer(prefix, **_):
+        from argcomplete.completers import FilesCompleter
+        return [name for name in names() if name.startswith(prefix)] + list(
+            FilesCompleter()(prefix))
+    return completer
