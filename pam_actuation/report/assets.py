@@ -14,13 +14,17 @@
 
 """Style sheet and script of the page, kept in Python so that they are always installed."""
 
-CSS = """
+# Of the pages, and of the still figures that are images in them.
+COLOURS = """
 :root { color-scheme: light dark;
   --bg: #f6f7f8; --card: #ffffff; --text: #1c2126; --soft: #5c6670; --rule: #d9dee3;
-  --good: #00694e; --bad: #a63c00; --accent: #00578a; }
+  --good: #00694e; --bad: #a63c00; --accent: #00578a; --shade: #0002; --pure: 100%; }
 @media (prefers-color-scheme: dark) { :root {
   --bg: #14181b; --card: #1d2226; --text: #e7eaec; --soft: #a0aab3; --rule: #353d44;
-  --good: #4fd1a5; --bad: #ff9d5c; --accent: #6cc0f5; } }
+  --good: #4fd1a5; --bad: #ff9d5c; --accent: #6cc0f5; --shade: #fff3; --pure: 60%; } }
+"""
+
+CSS = COLOURS + """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--bg); color: var(--text);
   font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
@@ -46,7 +50,13 @@ section { background: var(--card); border: 1px solid var(--rule); border-radius:
 .number span { display: block; font-size: .9rem; }
 .number small { color: var(--soft); display: block; margin-top: 2px; }
 .good b { color: var(--good); } .bad b { color: var(--bad); }
-.scroll { overflow-x: auto; }
+/* What does not fit scrolls; a shadow at the edge says so. */
+.scroll { overflow-x: auto;
+  background:
+    linear-gradient(90deg, var(--card) 30%, transparent) left / 40px 100% no-repeat local,
+    linear-gradient(270deg, var(--card) 30%, transparent) right / 40px 100% no-repeat local,
+    linear-gradient(90deg, var(--shade), transparent) left / 12px 100% no-repeat scroll,
+    linear-gradient(270deg, var(--shade), transparent) right / 12px 100% no-repeat scroll; }
 table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); text-align: right;
   vertical-align: top; }
@@ -56,13 +66,35 @@ table.facts td { text-align: left; overflow-wrap: anywhere; } table.facts td:fir
   color: var(--soft); white-space: nowrap; }
 td.text, th.text, table.words th, table.words td { text-align: left; }
 .plot { width: 100%; margin: 4px 0 0; } figure { margin: 8px 0 4px; }
+figure svg, figure img { max-width: 100%; height: auto; }
 details { margin: .5rem 0; } summary { cursor: pointer; color: var(--accent); }
 pre { overflow-x: auto; font-size: .82rem; background: var(--bg); padding: 10px; margin: 6px 0;
   border-radius: 6px; max-height: 420px; }
 footer { max-width: 1120px; margin: 0 auto; padding: 6px 20px 40px; color: var(--soft);
   font-size: .88rem; }
-@media (max-width: 640px) { section { padding: 14px 12px; } main, header.top { padding: 0 10px; } }
-@media print { section { break-inside: avoid; } nav { display: none; } }
+/* On a phone every row of a table is a card: no value stands outside the screen. */
+@media (max-width: 640px) { section { padding: 14px 12px; } main, header.top { padding: 0 10px; }
+  figure.scroll svg { max-width: none; width: 600px; }
+  table.cards, table.cards tbody, table.cards tr { display: block; }
+  table.cards thead, table.cards td:empty { display: none; }
+  table.cards tr { border-bottom: 1px solid var(--rule); padding: 6px 0; }
+  table.cards tr td { display: flex; justify-content: space-between; gap: 14px; border: 0;
+    padding: 1px 0; text-align: right; white-space: normal; overflow-wrap: anywhere; }
+  table.cards tr td::before { content: attr(data-label); color: var(--soft); text-align: left;
+    font-weight: 400; flex: 0 1 auto; min-width: 30%; }
+  table.cards tr td:first-child { font-weight: 600; color: var(--text); text-align: left; }
+}
+/* Paper is white and has an end: nothing is cut by the edge of a page. */
+@media print {
+  :root { color-scheme: light; --bg: #ffffff; --card: #ffffff; --text: #1c2126; --soft: #5c6670;
+    --rule: #d9dee3; --good: #00694e; --bad: #a63c00; --accent: #00578a; --shade: transparent;
+    --pure: 100%; }
+  nav, summary::marker { display: none; } main, header.top { max-width: none; padding: 0; }
+  section { border: 0; padding: 4px 0; margin: 8px 0; }
+  figure, tr, pre, .number { break-inside: avoid; } h2, h3, thead { break-after: avoid; }
+  .plot { min-height: 0 !important; } .scroll { overflow: visible; background: none; }
+  pre { max-height: none; overflow: visible; white-space: pre-wrap; }
+  figure svg { max-height: 250mm; } }
 """
 
 SCRIPT = """
@@ -76,10 +108,13 @@ SCRIPT = """
     frozen: ['#8a929a', '#9aa3ab'], after: ['#0072b2', '#56b4e9'],
     before: ['#8a929a', '#9aa3ab'], second: ['#d55e00', '#ff8c42']
   };
+  var printing = false, PAPER = { width: 680, height: 920 };     // px of A4 within its margins
+  var ink = { '--text': '#1c2126', '--soft': '#5c6670', '--rule': '#d9dee3', '--card': '#ffffff',
+    '--accent': '#00578a' };
   function colour(role) {
     var fill = role.slice(-5) === '+fill';
     var pair = roles[fill ? role.slice(0, -5) : role] || roles.measured;
-    var hex = pair[dark && dark.matches ? 1 : 0];
+    var hex = pair[!printing && dark && dark.matches ? 1 : 0];
     return fill ? hex + '33' : hex;
   }
   function paint(value) {
@@ -97,7 +132,8 @@ SCRIPT = """
     return value;
   }
   function css(name) {
-    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+    return printing ? ink[name]
+      : getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   }
   function draw(node) {
     if (!window.Plotly) { return; }
@@ -108,6 +144,10 @@ SCRIPT = """
     layout.font = { family: getComputedStyle(document.body).fontFamily, size: 12.5,
       color: css('--text') };
     layout.dragmode = 'zoom';
+    if (printing) {
+      layout.width = PAPER.width;
+      layout.height = Math.min(layout.height || 300, PAPER.height);
+    }
     layout.hoverlabel = { bgcolor: css('--card'), bordercolor: css('--rule'),
       font: { color: css('--text') } };
     Object.keys(layout).forEach(function (key) {
@@ -122,7 +162,7 @@ SCRIPT = """
     if (source) { node.removeChild(source); }
     layout.modebar = { bgcolor: 'rgba(0,0,0,0)', color: css('--soft'),
       activecolor: css('--accent') };
-    Plotly.react(node, figure.data, layout, { responsive: true, displaylogo: false,
+    Plotly.react(node, figure.data, layout, { responsive: !printing, displaylogo: false,
       displayModeBar: 'hover', modeBarButtons: [['zoom2d', 'pan2d', 'resetScale2d', 'toImage']] });
     node.drawn = true;
   }
@@ -141,9 +181,12 @@ SCRIPT = """
         nodes.forEach(function (node) { if (node.drawn) { draw(node); } });
       });
     }
-    window.addEventListener('beforeprint', function () {
-      nodes.forEach(function (node) { if (!node.drawn) { draw(node); } });
-    });
+    function redraw(paper) {
+      printing = paper;
+      nodes.forEach(draw);
+    }
+    window.addEventListener('beforeprint', function () { redraw(true); });
+    window.addEventListener('afterprint', function () { redraw(false); });
     document.querySelectorAll('details').forEach(function (node) {
       node.addEventListener('toggle', function () { window.dispatchEvent(new Event('resize')); });
     });

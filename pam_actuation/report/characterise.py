@@ -223,9 +223,9 @@ def _page(result, pictures):
 
 
 def _picture(text, caption):
-    """Return a figure whose image is in the page; inline, its style would reach the page."""
-    data = base64.b64encode(text.encode('utf-8')).decode('ascii')
-    return (f'<figure><img style="max-width:100%" src="data:image/svg+xml;base64,{data}" '
+    """Return a figure whose image is in the page, in its colours, with its caption."""
+    data = base64.b64encode(svg.as_image(text).encode('utf-8')).decode('ascii')
+    return (f'<figure><img src="data:image/svg+xml;base64,{data}" '
             f'alt="{caption}"><figcaption>{caption}</figcaption></figure>')
 
 

@@ -86,15 +86,37 @@ def points(x, y, name, role, max_points=700):
             'x': rounded(x[::every]), 'y': rounded(y[::every])}
 
 
+def spikes_aside(traces):
+    """
+    Return (low, high, text) of an axis that short spikes do not stretch, None where none do.
+
+    The axis holds the middle nine tenths of all values with room beyond them. ``text`` says
+    which values lie outside, for the reader.
+    """
+    values = np.array([v for one in traces for v in one['y'] if v is not None], dtype=float)
+    if values.size < 20:
+        return None
+    low, high = np.percentile(values, [5.0, 95.0])
+    room = 0.75 * (high - low)
+    low, high = low - room, high + room
+    outside = [end for end, beyond in ((values.min(), values.min() < low - room),
+                                       (values.max(), values.max() > high + room)) if beyond]
+    if not outside or not room > 0.0:
+        return None
+    return float(low), float(high), 'spikes to {} are cut off; a double click shows them'.format(
+        ' and '.join(f'{end:.3g}' for end in outside))
+
+
 def stack(rows, x_title, row_px=ROW_PX):
     """
     Return a figure of plots one below the other whose x axes zoom together.
 
     Parameters
     ----------
-    rows : list of (y_title, traces)
+    rows : list of (y_title, traces) or (y_title, traces, True)
         From top to bottom. Each row has its own legend in its own strip above the
-        plot, so that legends never cover data.
+        plot, so that legends never cover data. With True, short spikes do not stretch the
+        axis, and the plot says so.
     x_title : str
         Title of the common x axis.
     row_px : int
@@ -107,7 +129,7 @@ def stack(rows, x_title, row_px=ROW_PX):
     layout = {'height': height, 'margin': {'l': 78, 'r': 14, 't': 4, 'b': BOTTOM_PX},
               'hovermode': 'x'}
     data = []
-    for k, (title, traces) in enumerate(rows):
+    for k, (title, traces, *robust) in enumerate(rows):
         suffix = '' if k == 0 else str(k + 1)
         top = 1.0 - (k * (row_px + LEGEND_PX) + LEGEND_PX) / inner
         bottom = max(top - row_px / inner, 0.0)
@@ -119,6 +141,12 @@ def stack(rows, x_title, row_px=ROW_PX):
             layout['xaxis' + suffix]['matches'] = 'x'
         layout['yaxis' + suffix] = {'domain': [bottom, top], 'title': {'text': title},
                                     'anchor': 'x' + suffix}
+        limits = spikes_aside(traces) if any(robust) else None
+        if limits is not None:
+            layout['yaxis' + suffix]['range'] = rounded(limits[:2])
+            layout.setdefault('annotations', []).append({
+                'text': limits[2], 'x': 1.0, 'xref': 'paper', 'xanchor': 'right', 'y': top,
+                'yref': 'paper', 'yanchor': 'top', 'showarrow': False, 'font': {'size': 11}})
         legend = 'legend' + suffix
         layout[legend] = {'orientation': 'h', 'x': 0, 'xanchor': 'left', 'y': top,
                           'yanchor': 'bottom'}
@@ -151,7 +179,7 @@ def bars(categories, groups, x_title, y_title, height=300):
         'height': height, 'barmode': 'group', 'bargap': 0.25, 'hovermode': 'x',
         'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
         'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
-        'xaxis': {'title': {'text': x_title}, 'type': 'category'},
+        'xaxis': {'title': {'text': x_title}, 'type': 'category', 'automargin': True},
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
 
 

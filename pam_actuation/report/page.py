@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 import html
+from itertools import zip_longest
 import json
 
 from pam_actuation.report.assets import CSS, SCRIPT
@@ -58,13 +59,24 @@ def plot(figure, caption=''):
 
 
 def table(head, rows, kind=''):
-    """Return an HTML table; cells are escaped, None becomes a dash."""
+    """
+    Return an HTML table; cells are escaped, None becomes a dash.
+
+    On a phone each row becomes a card in which every cell has its heading beside it. A table
+    of the kind ``grid``, whose columns say nothing alone, scrolls instead.
+    """
     def cell(value):
         return '–' if value is None else text(value)
     top = ''.join(f'<th>{cell(v)}</th>' for v in head)
     top = f'<thead><tr>{top}</tr></thead>' if head else ''
-    body = ''.join('<tr>' + ''.join(f'<td>{cell(v)}</td>' for v in row) + '</tr>'
-                   for row in rows)
+    cards = head and kind != 'grid'
+    # The first cell is the title of the card.
+    labels = [f' data-label="{cell(v)}"' if k else '' for k, v in enumerate(head)] \
+        if cards else []
+    body = ''.join('<tr>' + ''.join(
+        f'<td{label or ""}>{cell(v)}</td>' for v, label in zip_longest(row, labels[:len(row)]))
+        + '</tr>' for row in rows)
+    kind = f'{kind} cards'.strip() if cards else kind
     return f'<div class="scroll"><table class="{kind}">{top}<tbody>{body}</tbody></table></div>'
 
 

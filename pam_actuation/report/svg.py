@@ -22,14 +22,18 @@ imported when the first one is drawn, for it takes a while.
 
 from dataclasses import dataclass, field
 import io
+import re
 
 import numpy as np
+from pam_actuation.report.assets import COLOURS
 
 SIZE_IN = (7.5, 5.0)
 MESHES = (32, 20)           # at most along a surface's rows and columns: files stay small
 INK, SOFT, RULE = '#1c2126', '#5c6670', '#d9dee3'
 DIVERGING = ('#2166ac', '#92c5de', '#f7f7f7', '#fdb863', '#b35806')    # as figures.DIVERGING
 MOST_NUMBERS, MOST_LABELS = 60, 24
+# On coloured cells, which keep their colours in a dark page; not INK and SOFT, which do not.
+CELL_INK, CELL_SOFT = '#1b2025', '#5b6570'
 # Text stays text; the fixed salt and the missing date make equal figures equal files.
 STYLE = {
     'svg.fonttype': 'none', 'svg.hashsalt': 'pam_actuation', 'font.size': 10.0,
@@ -142,12 +146,12 @@ def heat_map_chart(maps, titles, title):
             axes.tick_params(axis='y', labelleft=k == 0)
             axes.tick_params(axis='x', labelrotation=90)
             for i, j in np.argwhere(one.dotted):
-                axes.plot(j + 0.85, i + 0.85, '.', color=SOFT, markersize=2.0)
+                axes.plot(j + 0.85, i + 0.85, '.', color=CELL_SOFT, markersize=2.0)
             if one.values.size <= MOST_NUMBERS:
                 for (i, j), value in np.ndenumerate(one.values):
                     dark = abs(value) > 0.75 * limit
                     axes.text(j + 0.5, i + 0.5, f'{round(value, 1) + 0.0:.1f}', fontsize=7.0,
-                              ha='center', va='center', color='white' if dark else INK)
+                              ha='center', va='center', color='white' if dark else CELL_INK)
         figure.colorbar(image, ax=list(row), label=titles[2], fraction=0.05, pad=0.02)
     return _svg(draw, title, (5.0 * len(maps), 4.6))
 
@@ -184,6 +188,39 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
             axis.labelpad = 8.0
             axis.set_pane_color((1.0, 1.0, 1.0))
     return _svg(draw, title)
+
+
+def in_page(picture):
+    """
+    Return a figure of this module as an element of a page, in the colours of the page.
+
+    Without the white ground; ink, grid and edges are the variables of the style sheet, and
+    lines become lighter on a dark page. The style of the file would reach the whole page: it
+    becomes that of the element.
+    """
+    picture = picture[picture.index('<svg'):]
+    picture = re.sub(r'<defs>\s*<style type="text/css">[^<]*</style>\s*</defs>', '', picture,
+                     count=1)
+    picture = picture.replace('<svg ', '<svg style="stroke-linejoin: round; stroke-linecap: butt; '
+                              'fill: var(--text)" ', 1)
+    picture = re.sub(r'(<path[^>]*style="[^"]*)fill: #ffffff', r'\1fill: none', picture)
+    for fixed, variable in ((INK, 'text'), (SOFT, 'soft'), (RULE, 'rule')):
+        picture = picture.replace(fixed, f'var(--{variable})')
+    picture = picture.replace('stroke: #ffffff', 'stroke: var(--card)')
+    return re.sub(
+        r'stroke: (#(?!000000)[0-9a-f]{6})',
+        r'stroke: \1; stroke: color-mix(in srgb, \1 var(--pure), white)', picture)
+
+
+def as_image(picture):
+    """
+    Return a figure of this module as a file that is an image in a page.
+
+    It has the colours of the page and follows it into the dark; ids and styles stay inside.
+    """
+    picture = in_page(picture)
+    end = picture.index('>') + 1
+    return f'{picture[:end]}<style>{COLOURS}</style>{picture[end:]}'
 
 
 def _svg(draw, title, size_in=SIZE_IN):

@@ -28,6 +28,7 @@ from pam_actuation.control.sofc.words import DIRECTION, number, shown
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
 
+SHOWN_KPA = 0.005          # what two digits of a number show
 _SHORT = dict(zip(SET_WORDS, SET_NAMES))
 
 
@@ -87,6 +88,20 @@ class Grid:
     def never(self):
         """Which rules never fired."""
         return self.fired_s <= 0.0
+
+    def firing(self, mark=''):
+        """
+        Return in words how many rules never fired, ``mark`` being how these are marked.
+
+        Running changes only rules that fired. Where others differ, it says where from.
+        """
+        never, size = int(self.never.sum()), self.never.size
+        text = f'None of the {size} rules has fired' if never == size \
+            else f'{never} of {size} rules never fired{mark}'
+        came = int(np.sum(self.never & (np.abs(self.change) >= SHOWN_KPA)))
+        return text if not came else (
+            f'{text}; {came} of them differ all the same: they came so from tuning or from '
+            'another file, not from running')
 
 
 def grids(rules, before=None):

@@ -14,7 +14,6 @@
 
 """Rules as one self-contained HTML page: heat maps, changes, firing, sentences."""
 
-import numpy as np
 from pam_actuation.control.sofc.words import number
 from pam_actuation.report import svg
 from pam_actuation.report.page import paragraph, render, Section, table
@@ -70,15 +69,14 @@ def _grid(grid, since):
     if grid.never.all() and not grid.values.any() and not grid.change.any():
         return paragraph('All zero, never fired.')
     picture = chart(grid, since)
-    body = f'<figure class="scroll">{picture[picture.index("<svg"):]}</figure>'
-    never = int(np.sum(grid.never))
-    body += paragraph(f'{never} of {grid.never.size} rules never fired'
-                      + (' (dotted).' if len(grid.columns.values) > 2 else '.'), 'note')
-    if never < grid.never.size:
+    body = f'<figure class="scroll">{svg.in_page(picture)}</figure>'
+    dotted = ' (dotted)' if len(grid.columns.values) > 2 else ''
+    body += paragraph(f'{grid.firing(dotted)}.', 'note')
+    if not grid.never.all():
         rows = [(label, *('–' if value <= 0.0 else f'{value:.2f}' for value in row))
                 for label, row in zip(grid.rows.labels, grid.fired_s)]
         body += ('<details><summary>How long each rule acted [s]</summary>'
-                 + table(('', *grid.columns.labels), rows) + '</details>')
+                 + table(('', *grid.columns.labels), rows, 'grid') + '</details>')
     return body
 
 

@@ -16,9 +16,9 @@
 
 import numpy as np
 from pam_actuation.control.sofc.words import number
+from pam_actuation.rules.grids import SHOWN_KPA as _LEAST_KPA
 
 NEVER = '·'
-_LEAST_KPA = 0.005        # what the two digits of a cell show
 _GAP = 2
 _FEW = 2                  # columns that leave room for changes and firing beside them
 # 256-colour codes from little to much: adding pressure towards orange, taking off towards blue.
@@ -61,6 +61,8 @@ def _grid(grid, since, width, colour):
              + (f', {grid.columns.title} across' if grid.columns.name else '')]
     left_out = grid.values.size - len(rows) * len(columns)
     legend = [f'{NEVER} never fired'] if grid.never[np.ix_(rows, columns)].any() else []
+    if (grid.never & (np.abs(grid.change) >= _LEAST_KPA)).any() and grid.before.any():
+        legend.append(grid.firing())
     if grid.change.any() and not grid.before.any():
         legend.append(f'all zero in {since}')
     if left_out:

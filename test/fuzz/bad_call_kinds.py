@@ -131,6 +131,7 @@ VERBS = {
         (Slot('--explain', 'effect', 'coulomb_friction'), Slot('--model', 'rig', RIG))],
     'report': [(BAG, BAG, INSIDE, Slot('--out', 'page', 'new.html'))],
     'info': [(BAG,)],
+    'experiments': [(Slot('', 'experiment'),)],
     'models': [
         (Slot('', 'entry'), Slot('--html', 'page'), Slot('--markdown', 'page'))],
     'nodes': [(Slot('', 'entry'), Slot('--markdown', 'folder'))],
@@ -145,7 +146,7 @@ VERBS = {
 VALUES['demo folder'] = (*VALUES['folder'], 'bag/bag_0.mcap')
 # Wrong whatever the values are.
 COMBINATIONS = (
-    (), ('--nonsense',), ('nonsense',), ('--json',), ('--valve',),
+    ('--nonsense',), ('nonsense',), ('--json',), ('--valve',),
     ('simulate',), ('simulate', 'good.yaml', 'good.yaml'), ('simulate', 'good.yaml', '--out'),
     ('run',), ('up',), ('up', 'knee', '--record', 'new'), ('up', 'exo', '--hardware', 'dummy'),
     ('info',), ('info', 'bag', 'bag'), ('report',), ('replay',), ('gap',), ('gap', 'bag'),

@@ -49,8 +49,8 @@ from pam_sim.rollout.generate import cache_folder  # noqa: E402
 
 LONGEST_LINE = 2500     # of which names to choose from take most
 PROCESSES = 24          # of the calls are made again as real processes
-PROCESS_TIMEOUT_S = 60.0
-CALL_TIMEOUT_S = 20.0
+PROCESS_TIMEOUT_S = 120.0
+CALL_TIMEOUT_S = 120.0   # long enough to compile, on a busy machine
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ VERDICT_TEXT = {
     'no_gap': 'No gap beyond noise', 'parameter': 'A number of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
+EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %
 
 
 def gap_section(result, key='gap', title='Recording against model', remark='',
@@ -96,10 +97,15 @@ def _evidence(result):
     if not result.evidence:
         return ''
     body = '<h3>Evidence against each rival</h3>'
+    idle = [e for e in result.evidence if abs(e['share']) < EXPLAINS_NOTHING]
     body += table(['subsystem', 'name', 'share of the gap it explains', 'worse by t'],
                   [[e['subsystem'], e['name'], f'{100 * e["share"]:.1f} %',
                     None if e['t'] is None else f'{e["t"]:.1f}']
-                   for e in result.evidence])
+                   for e in result.evidence if e not in idle])
+    for subsystem in dict.fromkeys(e['subsystem'] for e in idle):
+        names = [e['name'] for e in idle if e['subsystem'] == subsystem]
+        body += paragraph(f'{subsystem}: {len(names)} more explain nothing (0.0 %): '
+                          f'{", ".join(names)}.', 'note')
     return body + paragraph(
         'Every name was fitted to one part of the data and judged on another. t compares squared '
         'errors block by block; below 3 the data do not tell two names apart.', 'note')
@@ -168,5 +174,5 @@ def _overlay(result, max_points):
                          'recorded − calibrated', 'green', width=1.0,
                          max_points=max_points),
             figures.line(time_s, (trace.measured - trace.after) * factor,
-                         'recorded − final', 'after', width=1.0, max_points=max_points)]))
+                         'recorded − final', 'after', width=1.0, max_points=max_points)], True))
     return figures.stack(rows, 'time [s]', row_px=170)

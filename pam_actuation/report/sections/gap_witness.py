@@ -62,10 +62,10 @@ def coloured_part(result):
             at, motion = _at(result, trace, name, abscissa)
             scale, _, own, _ = SHOWN[name]
             for text, model in (('calibrated', trace.refit), ('final', trace.after)):
-                rows.append((f'{name} [{own}], {text}', [
+                rows.append((f'{name} [{own}]<br>{text}', [
                     figures.points(at[motion == k], ((trace.measured - model) * scale)[
                         motion == k], label, COLOURS[label], MOST_POINTS)
-                    for k, label in zip((-1, 0, 1), MOTIONS)]))
+                    for k, label in zip((-1, 0, 1), MOTIONS)], True))
         body += plot(figures.stack(rows, f'{abscissa} [{unit}]', row_px=120),
                      'Recorded minus simulated in free run, on the data of the proof.')
     return body

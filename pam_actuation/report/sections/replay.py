@@ -67,7 +67,7 @@ def overlays(signals, key='overlays', title='Simulated against recorded', remark
                          width=1.3, max_points=max_points)]))
         rows.append((f'residual [{unit}]', [figures.line(
             one.time_s, residual, 'recorded − simulated', 'residual', width=1.0,
-            max_points=max_points)]))
+            max_points=max_points)], True))
         spread = float(np.max(recorded) - np.min(recorded))
         facts.append([one.signal, f'{rmse(residual):.4g} {unit}',
                       f'{np.max(np.abs(residual)):.4g} {unit}', f'{spread:.4g} {unit}'])

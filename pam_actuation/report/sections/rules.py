@@ -46,8 +46,7 @@ def rules(before, after, key='rules', title='What the rules learned'):
         body += _figure(grid)
     body += ''.join(paragraph(
         f'{grid.title[:1].upper()}{grid.title[1:]}: largest change '
-        f'{np.max(np.abs(grid.change)):.2f} kPa, {int(grid.never.sum())} of {grid.never.size} '
-        'never fired.', 'note') for grid in found)
+        f'{np.max(np.abs(grid.change)):.2f} kPa. {grid.firing()}.', 'note') for grid in found)
     return Section(key, title, body + _words(after))
 
 
