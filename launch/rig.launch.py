@@ -38,9 +38,9 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
-from pam_actuation.resources import find_config
 from pam_actuation.rigging.layouts import NO_CONTROLLER, played
 from pam_sim.errors import InputError
 
@@ -173,7 +173,7 @@ def _note_what_is_needed(context):
     name, raw = played(
         given('experiment'), given('rig'), given('valve'), file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
-    noted = {HARDWARE_FILE: str(find_config('hardware', given('hardware'))),
+    noted = {HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.

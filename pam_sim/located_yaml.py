@@ -27,12 +27,15 @@ import re
 
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import refuse_pipe
+from pam_sim.units import allowed_range
 import yaml
 
 # Bounds of what is read at all. The largest file of this kind holds some 10 kB and 500 values.
 MAX_BYTES = 300_000
 MAX_VALUES = 50_000       # counted where aliases put them, so that few bytes cannot become many
 MAX_DEPTH = 50
+_WHOLE = re.compile(r'[-+]?[0-9]+')
+_COMMA = re.compile(r'[-+]?[0-9]+,[0-9]+')
 MAX_DIGITS = 300          # of a whole number; such a number still fits a float
 
 
@@ -262,7 +265,7 @@ def _shown(value):
 def _range_text(lower, upper, unit):
     unit = f' {unit}' if unit else ''
     if lower is not None and upper is not None:
-        return f'; allowed {lower:g} to {upper:g}{unit}'
+        return f'; allowed {allowed_range(lower, upper, unit.strip())}'
     if lower is not None:
         return f'; allowed from {lower:g}{unit}'
     return f'; allowed up to {upper:g}{unit}' if upper is not None else ''
@@ -373,8 +376,12 @@ class _Conversion:
 
     def _mapping(self, node, line, depth):
         values, lines = {}, {}
+        before = None
         for key_node, value_node in node.value:
             key_line = key_node.start_mark.line + 1
+            if node.flow_style and before is not None:
+                self._check_comma(before, key_node, value_node, key_line)
+            before = key_node, value_node
             if not isinstance(key_node, yaml.ScalarNode):
                 raise InputError('a key must be a plain word', f'{self._name}:{key_line}')
             key = self._scalar(key_node)
@@ -384,8 +391,22 @@ class _Conversion:
             lines[key] = key_line
         return Located(values, lines, self._name, line)
 
+    def _check_comma(self, before, key_node, value_node, line):
+        """Refuse ``{mass_kg: 3,5}``, which to YAML is the key ``5`` without a value."""
+        texts = [getattr(one, 'value', None) for one in (before[1], key_node, value_node)]
+        together = key_node.start_mark.index == before[1].end_mark.index + 1
+        if together and all(isinstance(text, str) for text in texts) and texts[2] == '' \
+                and _WHOLE.fullmatch(texts[0]) and texts[1].isdecimal():
+            raise InputError(
+                f'`{before[0].value}: {texts[0]},{texts[1]}` has a decimal comma; write a decimal '
+                f'point: {texts[0]}.{texts[1]}', f'{self._name}:{line}')
+
     def _scalar(self, node):
         where = f'{self._name}:{node.start_mark.line + 1}'
+        if node.style is None and _COMMA.fullmatch(node.value):
+            raise InputError(
+                f'`{node.value}` has a comma; write a decimal point and no separators: '
+                f'{node.value.replace(",", ".", 1)}', where)
         try:
             value = self._loader.construct_object(node)
         except yaml.YAMLError:

@@ -88,8 +88,7 @@ def _from_mapping(data, name, seen):
             if key in data:
                 raise data.error(f'`{key}` is given by `rig: {base_name}`', key)
     else:
-        if 'load' not in data:
-            raise data.error(f'`rig` is missing; allowed: {", ".join(preset_names())}')
+        _check_made_of(data)
         if isinstance(data.get('muscle'), Located):
             muscle = read_muscle(data['muscle'])
         else:
@@ -114,6 +113,18 @@ def _from_mapping(data, name, seen):
         data.get('fidelity', str, base.fidelity, choices=hsv.FIDELITIES),
         {**base.parameters, **dict(given)}, _effects(data, base),
         {**base.sensors, **dict(sensors)}, tolerance, muscle)
+
+
+def _check_made_of(data):
+    """Raise InputError unless a model without ``rig`` says muscle and load."""
+    missing = [key for key in ('muscle', 'load') if key not in data]
+    if len(missing) == 2:
+        raise data.error(f'`rig` is missing; allowed: {", ".join(preset_names())}')
+    choices = {'muscle': muscle_names, 'load': lambda: LOADS}
+    for key in missing:
+        other = 'muscle' if key == 'load' else 'load'
+        raise data.error(f'`{key}` is missing beside `{other}`; allowed: '
+                         f'{", ".join(choices[key]())}', other)
 
 
 def _effects(data, base):

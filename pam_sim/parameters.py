@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import math
 
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.units import allowed_range
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Parameter:
         """
         is_number = (isinstance(value, (int, float)) or hasattr(value, '__float__')) \
             and not isinstance(value, (bool, str))
-        allowed = f'allowed {self.lower:g} to {self.upper:g} {self.unit}'
+        allowed = f'allowed {allowed_range(self.lower, self.upper, self.unit, self.name)}'
         if not is_number:
             raise InputError(f'`{self.name}` must be a number, not {value!r}; {allowed}', where)
         number = float(value)

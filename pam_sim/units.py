@@ -20,6 +20,11 @@ GAS_CONSTANT_AIR = 287.05     # J/(kg K)
 TEMPERATURE_K = 293.15        # air temperature of the isothermal models
 RHO_REFERENCE = 1.185         # kg/m^3, reference density of ISO 6358
 T_REFERENCE_K = 293.15        # K, reference temperature of ISO 6358
+LEAST_ABSOLUTE_PA, MOST_ABSOLUTE_PA = 101e3, 1e7    # between them a range is one of pressures
+_UNIT_OF_ENDING = (
+    ('_m_per_s', 'm/s'), ('_pa_per_s', 'Pa/s'), ('_pa', 'Pa'), ('_hz', 'Hz'), ('_kg', 'kg'),
+    ('_ns', 'ns'), ('_s', 's'), ('_m', 'm'), ('_n', 'N'), ('_voltage', 'V'), ('_sec', 's'),
+    ('_nanosec', 'ns'), ('_v', 'V'))
 
 
 def gauge_pa(absolute_pa):
@@ -35,3 +40,36 @@ def absolute_pa(gauge_pressure_pa):
 def gauge_kpa(absolute_pressure_pa):
     """Return gauge pressure [kPa] of an absolute pressure [Pa], for people to read."""
     return (absolute_pressure_pa - P_ATM_PA) * 1e-3
+
+
+def unit_of(name):
+    """Return the SI unit a value's name ends in; '1' for plain numbers."""
+    return next((unit for ending, unit in _UNIT_OF_ENDING if name.endswith(ending)), '1')
+
+
+def allowed_range(lower, upper, unit='', name=''):
+    """
+    Return a range in words, in the unit that is to be written: ``0.1 to 500 kg``.
+
+    Pressures are told once more as people read them: gauge kPa.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Bounds, SI.
+    unit : str
+        By default the one that ``name`` ends in.
+    name : str
+        Of the value; one with ``gauge`` in it is a gauge pressure.
+
+    """
+    unit = unit or unit_of(name).replace('1', '')
+    numbers = f'{lower:g} to {upper:g}'
+    if unit.lower() != 'pa':
+        return f'{numbers} {unit}' if unit not in ('', '-', '1') else numbers
+    if 'gauge' in name:
+        return f'{numbers} Pa gauge ({1e-3 * lower:g} to {1e-3 * upper:g} kPa gauge)'
+    if lower < LEAST_ABSOLUTE_PA or upper > MOST_ABSOLUTE_PA:
+        return f'{numbers} Pa'          # a difference, a noise, a modulus
+    return (f'{numbers} Pa absolute ({gauge_kpa(lower):.4g} to {gauge_kpa(upper):.4g} kPa '
+            'gauge)')

@@ -30,15 +30,11 @@ from pam_actuation.bags.source import read_bag
 from pam_actuation.messages import VALVE_NAMES, valve_of
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
+from pam_sim.units import unit_of
 
 _SIGNAL_NAMES = tuple(name for names in VALVE_NAMES.values() for name in names)
 # Any clock that counts from 1970 is far above this; a simulation's may start at 0.
 _WALL_CLOCK_NS = 10**17
-_UNIT_OF_ENDING = (
-    ('_m_per_s', 'm/s'), ('_pa_per_s', 'Pa/s'), ('_pa', 'Pa'), ('_hz', 'Hz'), ('_kg', 'kg'),
-    ('_ns', 'ns'), ('_s', 's'), ('_m', 'm'), ('_n', 'N'), ('_voltage', 'V'), ('_sec', 's'),
-    ('_nanosec', 'ns'),
-)
 
 
 @dataclass(repr=False)
@@ -290,8 +286,3 @@ def _trajectories(topic, remarks):
     if bad:
         remarks.append(f'{topic.name}: {bad} messages are not {topic.type_name}, left out.')
     return tuple(sorted(messages, key=lambda message: message.stamp_ns))
-
-
-def unit_of(name):
-    """Return the SI unit a value's name ends in; '1' for plain numbers."""
-    return next((unit for ending, unit in _UNIT_OF_ENDING if name.endswith(ending)), '1')

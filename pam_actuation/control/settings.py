@@ -68,9 +68,17 @@ def checked_settings(specification, given, where=None):
         if not setting.lower <= value <= setting.upper:
             raise InputError(
                 f'{setting.name} = {_short(value)} {setting.unit} is outside '
-                f'{setting.lower:g}...{setting.upper:g} {setting.unit}', place(setting.name))
+                f'{setting.lower:g}...{setting.upper:g} {setting.unit}'
+                + _as_gauge(setting), place(setting.name))
         values[setting.name] = float(value)
     return values
+
+
+def _as_gauge(setting):
+    """Return the range of a gauge pressure in kPa, '' of anything else."""
+    if setting.unit != 'Pa' or 'gauge' not in setting.name:
+        return ''
+    return f' ({1e-3 * setting.lower:g} to {1e-3 * setting.upper:g} kPa gauge)'
 
 
 def _short(value):

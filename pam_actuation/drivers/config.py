@@ -27,6 +27,7 @@ from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.drivers.ppr import PprConfig
 from pam_actuation.drivers.safety import SafetyLimits
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.units import allowed_range
 
 VALVE_TYPES = ('ppr', 'hsv')
 
@@ -159,7 +160,8 @@ def _checked(name, value, where):
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f'{name} is {value!r}, a number is needed', where)
     if not math.isfinite(value) or not lower <= value <= upper:
-        raise InputError(f'{name} is {value}, allowed are {lower:g} to {upper:g}', where)
+        raise InputError(
+            f'{name} is {value}, allowed are {allowed_range(lower, upper, name=name)}', where)
     return float(value)
 
 

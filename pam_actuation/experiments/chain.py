@@ -19,10 +19,11 @@ from dataclasses import dataclass
 
 from pam_actuation.experiments.primitives import make_primitive
 from pam_sim.errors import InputError
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import allowed_range, P_ATM_PA
 
 CHECK_EVERY_S = 0.01        # as often as the reference is sent
 _MOST_CHECKS = 100_000
+_SHOWN = {'pa': 'Pa'}       # units as people write them
 LONGEST_S = 6 * 3600.0
 
 
@@ -98,18 +99,20 @@ class Chain:
 
     def _check_range(self, primitive, name, where):
         domain, duration_s = self.domain, primitive.duration_s
+        unit = _SHOWN.get(domain.unit, domain.unit)
         count = min(max(round(duration_s / CHECK_EVERY_S), 200), _MOST_CHECKS)
         for k in range(count + 1):
             t = duration_s * k / count
             value, rate = primitive.at(t)
             if not domain.lower - 1e-9 <= value <= domain.upper + 1e-9:
+                allowed = allowed_range(domain.lower, domain.upper, unit)
                 raise InputError(
-                    f'{name} reaches {value:.6g} {domain.unit} after {t:.3g} s; allowed for '
-                    f'{domain.name} is {domain.lower:g} to {domain.upper:g} {domain.unit}', where)
+                    f'{name} reaches {value:.6g} {unit} after {t:.3g} s; allowed for '
+                    f'{domain.name} is {allowed}', where)
             if not abs(rate) <= domain.fastest:
                 raise InputError(
-                    f'{name} moves at {abs(rate):.4g} {domain.unit}/s after {t:.3g} s; allowed '
-                    f'for {domain.name} is up to {domain.fastest:g} {domain.unit}/s', where)
+                    f'{name} moves at {abs(rate):.4g} {unit}/s after {t:.3g} s; allowed '
+                    f'for {domain.name} is up to {domain.fastest:g} {unit}/s', where)
 
     def _index(self, t_s):
         return max(bisect.bisect_right(self._starts, t_s) - 1, 0)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import re
 
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.units import allowed_range
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
@@ -88,7 +89,8 @@ class NodeParameter:
         if self.choices and value not in self.choices:
             return f'{value!r} is not allowed, it must be {self.allowed}'
         if self.lower is not None and not self.lower <= value <= self.upper:
-            return f'{value:g} is not allowed, it must lie in {self.allowed}'
+            allowed = allowed_range(self.lower, self.upper, name=self.name)
+            return f'{value:g} is not allowed, it must lie in {allowed}'
         return ''
 
     def descriptor(self):

@@ -21,8 +21,8 @@ What the launch files of the same names describe, for those who start nodes with
 
 from dataclasses import dataclass, field, replace
 
+from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import namespace_of
-from pam_actuation.resources import find_config
 from pam_sim.joint.parameters import SIDES
 
 # The order in which nodes become active; it is that of the end, read backwards.
@@ -88,7 +88,7 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
                   NodeSpec('valve_watchdog', namespace, kind),
                   NodeSpec('valve_driver', namespace, driver)]
     else:
-        file = str(find_config('hardware', hardware))
+        file = hardware_file(hardware)
         nodes += [NodeSpec('hardware_sensors', namespace, {}, file),
                   NodeSpec('valve_driver', namespace, driver, file)]
     nodes += _reference(namespace, experiment, kind)

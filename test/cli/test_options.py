@@ -17,8 +17,8 @@
 import argparse
 
 from pam_actuation.cli.main import build_parser, main
-from pam_actuation.cli.overview import VERBS
 from pam_actuation.cli.options import count, number, out_path, source
+from pam_actuation.cli.overview import VERBS
 import pytest
 
 # What each verb needs before an option is looked at.

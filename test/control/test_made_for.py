@@ -107,11 +107,15 @@ def test_presets_run_on_every_rig_they_are_for(small):
         load_controller(load_controller('sofc_joint_ppr', load_joint(JOINT)).to_yaml(), small)
 
 
-def test_presets_of_a_valve_are_refused_on_the_other(small):
-    with pytest.raises(InputError, match='sofc_hsv.yaml:.*valve hsv .here ppr'):
-        load_controller('sofc_hsv', small)
-    # One without a valve in its name is for both.
-    assert load_controller('sofc_untuned', small.with_(valve='hsv')).other_rig == ''
+def test_a_hand_written_file_may_say_what_it_is_for(small, tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text('controller: pid\nmade_for: {valve: hsv}\n')
+    with pytest.raises(InputError, match='mine.yaml:2: .*valve hsv .here ppr'):
+        load_controller(path, small)
+    assert load_controller(path, small.with_(valve='hsv')).other_rig == ''
+    path.write_text('controller: pid\nmade_for: {mass: 5}\n')
+    with pytest.raises(InputError, match='mine.yaml:2: unknown key `mass`'):
+        load_controller(path, small)
 
 
 def test_accepted_it_runs_and_the_bag_says_so(tuned, small):

@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameter files of real hardware: found, and checked to be one before a node reads them."""
+
+from pam_actuation.resources import find_config
+from pam_sim.located_yaml import load_yaml, Located
+
+PARAMETERS = 'ros__parameters'
+_DEPTH = 8                  # namespaces above the parameters
+# A key that only another kind of file has, what that is, and where it is given.
+_OTHERS = (
+    ('segments', 'an experiment', '--experiment'), ('controller', 'a controller', '--controller'),
+    ('rig', 'a model of a rig', '--model'), ('muscle', 'a model of a rig', '--model'),
+    ('joint', 'a model of a joint', '--model'))
+
+
+def hardware_file(name):
+    """
+    Return the path of a parameter file of hardware, as a text.
+
+    Parameters
+    ----------
+    name : str
+        A name in config/hardware, or the path of a file.
+
+    Raises
+    ------
+    InputError
+        No such file, or one of another kind.
+
+    """
+    path = find_config('hardware', name)
+    tree = load_yaml(path)
+    if not _holds_parameters(tree, _DEPTH):
+        kind = next((f'is {what}, not hardware; give it with {option}'
+                     for key, what, option in _OTHERS if key in tree),
+                    'is no file of hardware')
+        raise tree.error(
+            f'{kind}. A file of hardware holds parameters of nodes below `{PARAMETERS}`, such '
+            'as those in config/hardware')
+    return str(path)
+
+
+def _holds_parameters(tree, depth):
+    """Return whether every branch of a tree leads to parameters of a node."""
+    return bool(tree) and depth > 0 and all(
+        isinstance(value, Located) and (key == PARAMETERS or _holds_parameters(value, depth - 1))
+        for key, value in tree.items())
