@@ -22,9 +22,9 @@ Plant, driver, watchdog, controller and reference run as processes over DDS. The
 back. In a second series random orders of stop, continue, restart, emergency stop and command
 patterns follow each other. Told are the largest excursion beyond the reference, and the largest
 rise of the measured pressure after a vent (of the driver, or atmosphere commanded by the
-controller): over any 0.2 s until the driver has followed commands
-under pressure for 1 s in all. Each outcome is a line of ``--out``; started again with the same
-file, it goes on where it was. ``--print`` only prints the table.
+controller): over any 0.2 s, until the driver has followed commands under pressure for 1 s in all.
+Each outcome is a line of ``--out``; started again with the same file, it goes on where it was.
+``--print`` only prints the table.
 """
 
 import argparse

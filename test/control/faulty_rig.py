@@ -27,6 +27,7 @@ from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 
 MS_NS = 1_000_000
+HELD_M = 0.0089
 FIELD = {'contraction': 'contraction_m', 'force': 'force_n'}
 
 
@@ -132,3 +133,17 @@ def _spoiled(message, field, fault, sound):
     else:
         value = math.nan
     return type(message)(message.stamp_ns + later_ns, value)
+
+
+def hold(time_s):
+    """Return the reference [m] and its rate [m/s] of a muscle that is held."""
+    return HELD_M, 0.0
+
+
+def slow_sine(time_s):
+    """Return reference and rate of a sine at 0.5 Hz after a way of 3 s to its middle."""
+    if time_s < 3.0:
+        part = time_s / 3.0
+        return 0.014 * part * part * (3.0 - 2.0 * part), 0.028 * part * (1.0 - part)
+    phase = math.pi * (time_s - 3.0)
+    return 0.014 - 0.008 * math.sin(phase), -0.008 * math.pi * math.cos(phase)

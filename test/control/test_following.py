@@ -17,29 +17,16 @@
 import math
 import random
 
-from faulty_rig import FaultyRig
+from faulty_rig import FaultyRig, hold, slow_sine
 from pam_actuation.control.following import CommandFollowing, FOLLOWS, LESS, MORE, UNKNOWN
 from pam_actuation.messages import Pressure
 from pam_sim.units import P_ATM_PA
 import pytest
 
 MS = 1_000_000
-HELD_M = 0.0089
 CONTROLLERS = {'ppr': ('sofc_ppr', 'pid', 'pid_plain', 'lqi'),
                'hsv': ('sofc_hsv', 'pid_hsv', 'pid_plain_hsv', 'lqi_hsv')}
 EVERY = [(valve, name) for valve, names in CONTROLLERS.items() for name in names]
-
-
-def hold(time_s):
-    return HELD_M, 0.0
-
-
-def slow_sine(time_s):
-    if time_s < 3.0:
-        part = time_s / 3.0
-        return 0.014 * part * part * (3.0 - 2.0 * part), 0.028 * part * (1.0 - part)
-    phase = math.pi * (time_s - 3.0)
-    return 0.014 - 0.008 * math.sin(phase), -0.008 * math.pi * math.cos(phase)
 
 
 @pytest.mark.parametrize('valve, controller', EVERY)

@@ -1,0 +1,94 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Sensors lost and healed, controllers stopped and continued, at random times: simulated.
+
+    python benchmarks/recoveries_simulated.py --times 100
+
+The classes of the live nodes in a closed loop on a virtual clock, for both valves, SOFC and PID:
+many more faults than there is time for on live nodes (``recoveries.py``). The muscle is held at
+8.9 mm or follows a sine of 8 mm at 0.5 Hz; a fault lasts 0.12 to 3 s. Told is the largest
+excursion beyond all that was wanted; of the sine, beyond that of the same controller without a
+fault.
+"""
+
+import argparse
+from pathlib import Path
+import random
+import statistics
+import sys
+
+import joblib
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / 'test' / 'control'))
+
+from faulty_rig import FaultyRig, hold, slow_sine  # noqa: E402, I100
+
+CONTROLLERS = {'ppr': ('sofc_ppr', 'pid'), 'hsv': ('sofc_hsv', 'pid_hsv')}
+LOST = ('nan', 'silent', 'past', 'future')
+FAULTS = {'sensor lost and back': (LOST, (('pressure',), ('contraction',))),
+          'controller stopped and continued': (('stopped',), ((),))}
+REFERENCES = {'held at 8.9 mm': (hold, 3.5), 'sine at 0.5 Hz': (slow_sine, 9.0)}
+BACK_S = 4.0
+ALLOWED_M = 1e-3
+
+
+def play(valve, controller, fault, reference, number, seed):
+    """Return the excursion [m] and the largest pressure [Pa gauge] of one fault."""
+    rng = random.Random(f'{seed} {valve} {controller} {fault} {reference} {number}')
+    wanted, start_s = REFERENCES[reference]
+    kinds, topics = FAULTS[fault]
+    rig = FaultyRig(valve, controller, seed=number)
+    at_s = start_s + rng.uniform(0.0, 2.0)
+    rig.run(at_s, wanted)
+    usual_m = max(rig.excursion_m(start_s - 2.0), 0.0) if wanted is slow_sine else 0.0
+    rig.run(rng.uniform(0.12, 3.0), wanted, rng.choice(kinds), rng.choice(topics))
+    rig.run(BACK_S, wanted)
+    return rig.excursion_m(at_s) - usual_m, max(rig.gauge_pa[round(at_s * 250.0):])
+
+
+def main():
+    """Play, print the table; exit code 1 if an excursion was too large."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--times', type=int, default=20, help='how often each fault strikes')
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--jobs', type=int, default=2)
+    given = parser.parse_args()
+    rows = [(valve, controller, fault, reference)
+            for valve, names in CONTROLLERS.items() for controller in names
+            for fault in FAULTS for reference in REFERENCES]
+    tasks = [(*row, number) for row in rows for number in range(given.times)]
+    found = joblib.Parallel(given.jobs, return_as='generator')(
+        joblib.delayed(play)(*task, given.seed) for task in tasks)
+    by_row = {row: [] for row in rows}
+    for task, outcome in zip(tasks, tqdm(found, total=len(tasks), unit='fault', disable=None)):
+        by_row[task[:4]].append(outcome)
+    print('| valve | controller | reference | what happens | times '
+          '| beyond the reference, median / largest | highest pressure |')
+    print('|---|---|---|---|---|---|---|')
+    worst_m = 0.0
+    for (valve, controller, fault, reference), outcomes in by_row.items():
+        beyond = [excursion for excursion, _ in outcomes]
+        worst_m = max(worst_m, *beyond)
+        print(f'| {valve} | `{controller}` | {reference} | {fault} | {len(outcomes)} '
+              f'| {statistics.median(beyond) * 1e3:.2f} / {max(beyond) * 1e3:.2f} mm '
+              f'| {max(pressure for _, pressure in outcomes) * 1e-3:.0f} kPa |')
+    return 1 if worst_m > ALLOWED_M else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
