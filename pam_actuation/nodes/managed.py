@@ -52,6 +52,7 @@ from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import TransitionCallbackReturn
 
+DEACTIVATED = 'deactivated'
 EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
 FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
 
@@ -424,9 +425,9 @@ class ManagedNode(LifecycleNode):
     def _deactivate(self):
         was_active = bool(self.loops)
         self._end_loops()
-        self._make_safe('deactivated')
+        self._make_safe(DEACTIVATED)
         if was_active:
-            self._end_work('deactivated')
+            self._end_work(DEACTIVATED)
 
     def _cleanup(self):
         if self.simulated_time is not None:

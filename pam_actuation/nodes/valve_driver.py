@@ -25,6 +25,7 @@ from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.managed import DEACTIVATED
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
@@ -236,12 +237,13 @@ class ValveDriver(ManagedNode):
 
     def last_status(self, why):
         """Return level, message and values of the last status: that it ended, and vented."""
-        ended = {'state': 'ended', 'target_kpa_gauge': 'vent'}
+        ended = {'state': 'ended', 'fault': '', 'target_kpa_gauge': 'vent'}
         values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values)
         level, message, _ = super().last_status(why)
         if self._not_vented:
             return ERROR, f'{message}, not vented: {self._not_vented}', values
-        return level, f'{message}, vented', values
+        # What a lifecycle manager asked for itself is told in the word it knows.
+        return level, message if why == DEACTIVATED else f'{message}, vented', values
 
     def _answer(self):
         """Send the safe signal right after each opening of a second sender."""
