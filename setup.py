@@ -23,7 +23,7 @@ VERSION = '0.1.0'
 HERE = Path(__file__).parent
 
 # Read or shown at run time; found again by pam_actuation/resources.py.
-SHARED_FOLDERS = ('config', 'launch', 'msg_docs')
+SHARED_FOLDERS = ('config', 'launch', 'msg_docs', 'docs/nodes')
 
 # Everything but the live nodes works with these alone. The lower bounds are
 # the versions of Ubuntu 24.04, the platform of ROS 2 Jazzy, where it has them.
@@ -135,16 +135,16 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'valve_driver = pam_actuation.nodes.valve_driver:main',
-            'valve_watchdog = pam_actuation.nodes.valve_watchdog:main',
-            'plant_simulator = pam_actuation.nodes.plant_simulator:main',
-            'sofc_controller = pam_actuation.nodes.sofc_controller:main',
-            'pid_controller = pam_actuation.nodes.pid_controller:main',
-            'joint_simulator = pam_actuation.nodes.joint_simulator:main',
-            'joint_controller = pam_actuation.nodes.joint_controller:main',
-            'reference_generator = pam_actuation.nodes.reference_generator:main',
-            'hardware_sensors = pam_actuation.nodes.hardware_sensors:main',
-            'experiment_recorder = pam_actuation.nodes.experiment_recorder:main',
+            'valve_driver = pam_actuation.nodes.executables:valve_driver',
+            'valve_watchdog = pam_actuation.nodes.executables:valve_watchdog',
+            'plant_simulator = pam_actuation.nodes.executables:plant_simulator',
+            'sofc_controller = pam_actuation.nodes.executables:sofc_controller',
+            'pid_controller = pam_actuation.nodes.executables:pid_controller',
+            'joint_simulator = pam_actuation.nodes.executables:joint_simulator',
+            'joint_controller = pam_actuation.nodes.executables:joint_controller',
+            'reference_generator = pam_actuation.nodes.executables:reference_generator',
+            'hardware_sensors = pam_actuation.nodes.executables:hardware_sensors',
+            'experiment_recorder = pam_actuation.nodes.executables:experiment_recorder',
             'pam = pam_actuation.cli.main:main',
         ],
     },

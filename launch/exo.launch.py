@@ -33,6 +33,7 @@ KNEES = ('left_knee', 'right_knee')
 HANDED_ON = {
     'valve': ('ppr', 'Proportional pressure regulators (ppr) or high-speed valves (hsv).'),
     'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
+    'controller': ('sofc', 'Controllers of both knees: sofc; none: you start your own.'),
     'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),
     'accept_other_rig': ('false', 'Whether to take a controller file made for another rig.'),
     'learning': ('true', 'Whether the rules of the controllers may change.'),

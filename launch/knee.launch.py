@@ -24,21 +24,22 @@ Without an experiment (experiment:=none) it waits for joint_reference or joint_t
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import EmitEvent
+from launch.actions import OpaqueFunction
 from launch.actions import RegisterEventHandler
+from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import AndSubstitution
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
-from launch.substitutions import PythonExpression
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.namespaces import launch_namespace
 
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
-NAME = {'muscle': ParameterValue(PythonExpression(
-    ["'", LaunchConfiguration('namespace'), "'.rsplit('/', 1)[-1]"]), value_type=str)}
+NAME = 'joint_name'         # noted from the namespace
 
 
 def _arguments():
@@ -50,6 +51,9 @@ def _arguments():
         DeclareLaunchArgument(
             'joint', default_value='joint_dmsp_5_300_realistic',
             description='Joint preset, or path of its file.'),
+        DeclareLaunchArgument(
+            'controller', default_value='sofc', choices=['sofc', 'none'],
+            description='Self-organizing fuzzy controller; none: you start your own.'),
         DeclareLaunchArgument(
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and joint.'),
@@ -84,8 +88,8 @@ def _node(executable, *parameters, side='', condition=None):
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable, namespace=namespace,
         output='screen', condition=condition,
-        parameters=[{'realtime_priority': ParameterValue(priority, value_type=int)}, NAME,
-                    *parameters])
+        parameters=[{'realtime_priority': ParameterValue(priority, value_type=int),
+                     'muscle': _text(LaunchConfiguration(NAME))}, *parameters])
 
 
 def generate_launch_description():
@@ -103,7 +107,9 @@ def generate_launch_description():
               side=side) for side in SIDES]
     watchdogs = [_node('valve_watchdog', valve, side=side) for side in SIDES]
     plant = _node('joint_simulator', valve, joint, seed)
-    controller = _node('joint_controller', valve, joint, control)
+    controller = _node(
+        'joint_controller', valve, joint, control, condition=IfCondition(
+            NotEqualsSubstitution(LaunchConfiguration('controller'), 'none')))
     reference = _node(
         'reference_generator',
         {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
@@ -118,7 +124,15 @@ def generate_launch_description():
             *((driver, 'a valve driver ended') for driver in drivers),
             *((watchdog, 'a watchdog ended') for watchdog in watchdogs))]
     return LaunchDescription(
-        [*_arguments(), plant, *drivers, *watchdogs, controller, reference, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_names), plant, *drivers, *watchdogs,
+         controller, reference, *ends])
+
+
+def _note_names(context):
+    """Return the actions that note the namespace in one form, and the joint's name from it."""
+    namespace = launch_namespace(LaunchConfiguration('namespace').perform(context))
+    return [SetLaunchConfiguration('namespace', namespace),
+            SetLaunchConfiguration(NAME, namespace.rsplit('/', 1)[-1] or 'knee')]
 
 
 def _shut_down(reason):

@@ -39,9 +39,11 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.resources import find_config
-from pam_actuation.rigging.layouts import played
+from pam_actuation.rigging.layouts import NO_CONTROLLER, played
+from pam_sim.errors import InputError
 
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
@@ -64,8 +66,8 @@ def _arguments():
             'hardware', default_value='sim',
             description='sim, another name in config/hardware, or a parameter file of your own.'),
         DeclareLaunchArgument(
-            'controller', default_value='sofc', choices=['sofc', 'pid'],
-            description='Self-organizing fuzzy controller or PID.'),
+            'controller', default_value='sofc', choices=['sofc', 'pid', NO_CONTROLLER],
+            description='Self-organizing fuzzy controller or PID; none: you start your own.'),
         DeclareLaunchArgument(
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and experiment.'),
@@ -100,9 +102,7 @@ def _text(name):
 
 def _node(executable, *parameters, condition=None):
     """Return one managed node; it activates by itself."""
-    recorder = IfElseSubstitution(
-        LaunchConfiguration('record'),
-        ['/', LaunchConfiguration('namespace'), '/', RECORDER], '')
+    recorder = IfElseSubstitution(LaunchConfiguration('record'), RECORDER, '')
     priority = LaunchConfiguration('realtime_priority')
     common = {
         'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str),
@@ -168,12 +168,17 @@ def _note_what_is_needed(context):
     def given(name):
         return LaunchConfiguration(name).perform(context)
 
-    kind = given('controller')
+    kind, file = given('controller'), given('controller_file')
+    if kind == NO_CONTROLLER:
+        if file:
+            raise InputError('is of no use with controller:=none', 'controller_file')
+        file = NO_CONTROLLER
     name, raw = played(
-        given('experiment'), given('rig'), given('valve'), given('controller_file'),
+        given('experiment'), given('rig'), given('valve'), file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     noted = {HARDWARE_FILE: str(find_config('hardware', given('hardware'))),
-             CONTROLLER: kind if name else 'none', CONTROLLER_NAME: name, RAW: str(raw).lower(),
+             CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
+             RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == 'sim' else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]

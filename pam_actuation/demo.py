@@ -32,12 +32,14 @@ from pam_actuation.bags.load import load_run
 from pam_actuation.bags.place import check_bag_target
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
+from pam_actuation.parallel import in_processes
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.report.demo_page import demo_report, DemoPart
 from pam_actuation.report.gap import FILES, free_run_overlay, write_gap
 from pam_actuation.rigging.session import run_experiment
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 from pam_sim.files import check_folder, make_folder
 
 RIG = 'dmsp_5_300_realistic'
@@ -159,6 +161,10 @@ class Demo:
         result = run_experiment(
             experiment, RIG, f'sofc_{valve}', valve, os.path.join(self.result.folder, name),
             learning=learning, seed=SEED, progress=lambda done, whole: progress(done / whole))
+        if result.stopped:
+            raise KeyboardInterrupt
+        if not result.bag:
+            raise InputError(result.failure, TITLES[name])
         self.result.bags[name] = result.bag
         if result.failure:
             self.result.findings.append(f'{TITLES[name]}: {result.failure}')
@@ -171,8 +177,8 @@ class Demo:
     def _check(self, progress):
         """Open every bag with readers this project did not write, and count."""
         bags = self.result.bags
-        read_by_others = joblib.Parallel(n_jobs=2)(
-            joblib.delayed(independent_readers)(bag) for bag in bags.values())
+        read_by_others = in_processes(2, (
+            joblib.delayed(independent_readers)(bag) for bag in bags.values()))
         for (name, bag), readers in zip(bags.items(), read_by_others):
             info = bag_info(bag)
             counts = {topic.name: topic.count for topic in info.topics}

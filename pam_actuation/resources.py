@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Finds the files that come with the package: config, launch and msg_docs.
+Finds the files that come with the package: config, launch, msg_docs and pages of the nodes.
 
 They stand in one of three places: beside the package in a source tree (also
 an editable or symlinked installation), in ``share/pam_actuation`` below the
@@ -61,6 +61,23 @@ def launch_dir() -> Path:
 def msg_docs_dir() -> Path:
     """Return the folder that documents the topics, one page each."""
     return share_dir() / 'msg_docs'
+
+
+def node_page(name: str) -> Path:
+    """
+    Return the page of a node, made from the code.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+
+    """
+    path = share_dir() / 'docs' / 'nodes' / f'{name}.md'
+    if not path.is_file():
+        raise InputError('the page of this node is not installed; install the package again',
+                         str(path))
+    return path
 
 
 def list_config(kind: str) -> list:

@@ -34,7 +34,7 @@ FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller', 'va
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',
-    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs')
+    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/nodes')
 
 # Raises on any import of ROS, as on a machine without it.
 NO_ROS = """
@@ -96,6 +96,15 @@ def test_colcon_puts_executables_where_ros2_run_looks(isolated_install):
     assert (prefix / 'share/ament_index/resource_index/packages/pam_actuation').is_file()
     # Marks a package that colcon took for a ROS package, not for plain Python.
     assert (prefix / 'share/pam_actuation/hook/ament_prefix_path.sh').is_file()
+
+
+@pytest.mark.slow
+def test_installed_executables_answer_at_once(isolated_install, tmp_path):
+    folder = isolated_install / 'pam_actuation' / 'lib' / 'pam_actuation'
+    environment = environment_of(isolated_install / 'setup.bash')
+    for name in (*NODES, *FOR_OTHER_RIGS):
+        shown = run([folder / name, '--help'], cwd=tmp_path, env=environment, timeout=20)
+        assert shown.startswith(f'usage: {name} ') and 'Parameters of every node:' in shown
 
 
 @pytest.mark.slow
@@ -184,7 +193,8 @@ def test_a_wheel_holds_packages_shared_files_and_executables(tmp_path):
         assert f'\n{name} = pam_actuation.' in scripts
     data = f'{wheel.name.rsplit("-", 3)[0]}.data/data/share/pam_actuation'
     for name in ('package.xml', 'config/experiments/sine_quarter_hz.yaml',
-                 'config/controllers/sofc_ppr.yaml', 'launch/rig.launch.py', 'msg_docs/README.md'):
+                 'config/controllers/sofc_ppr.yaml', 'launch/rig.launch.py', 'msg_docs/README.md',
+                 'docs/nodes/valve_driver.md'):
         assert f'{data}/{name}' in names
     for preset in (ROOT / 'pam_sim' / 'presets').glob('*.yaml'):
         assert f'pam_sim/presets/{preset.name}' in names

@@ -127,7 +127,7 @@ def test_setup_agrees_with_the_manifest(manifest, setup_keywords):
 def test_executables_are_declared_and_importable_by_path(setup_keywords):
     scripts = dict(
         re.split(r'\s*=\s*', line) for line in setup_keywords['entry_points']['console_scripts'])
-    assert {name: f'pam_actuation.nodes.{name}:main' for name in EXECUTABLES} == {
+    assert {name: f'pam_actuation.nodes.executables:{name}' for name in EXECUTABLES} == {
         name: target for name, target in scripts.items() if name != 'pam'}
     for target in scripts.values():
         module, function = target.split(':')
@@ -157,7 +157,7 @@ def test_shared_files_are_installed(setup_keywords):
     installed = {
         f'{target}/{Path(file).name}'
         for target, files in setup_keywords['data_files'] for file in files}
-    for folder in ('config', 'launch', 'msg_docs'):
+    for folder in ('config', 'launch', 'msg_docs', 'docs/nodes'):
         for path in (ROOT / folder).rglob('*'):
             if path.is_file() and '__pycache__' not in path.parts:
                 assert f'share/pam_actuation/{path.relative_to(ROOT).as_posix()}' in installed

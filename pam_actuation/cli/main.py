@@ -20,17 +20,14 @@ import importlib
 import os
 import sys
 
-from pam_actuation.cli import completion
-from pam_actuation.cli.options import (
-    complain, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, EXIT_INTERRUPTED, Parser)
+from pam_actuation import interrupts
 from pam_actuation.cli.overview import one_line, overview, VERBS
-from pam_sim.errors import InputError
-from pam_sim.files import reason, shown
 
 
 def build_parser():
     """Return the argument parser with one sub-parser per verb."""
     from pam_actuation import __version__
+    from pam_actuation.cli.options import Parser
     parser = Parser(
         prog='pam', description='Simulate, run, record, replay and tune a pneumatic muscle rig.',
         epilog='Start with "pam demo", or "pam simulate sine_quarter_hz --out runs/first".')
@@ -53,12 +50,41 @@ def main(argv=None):
     """
     Run one verb.
 
+    Parameters
+    ----------
+    argv : list of str, optional
+        Arguments; default: those of the process, which is then ended by Ctrl-C with exit code
+        130 and one line, whatever it is doing.
+
     Returns
     -------
     int
-        0 done, 1 finding, 2 bad input.
+        0 done, 1 finding, 2 bad input, 130 interrupted.
 
     """
+    if argv is not None:
+        return _run_verb(argv)
+    interrupts.leave_at_once('pam')
+    try:
+        try:
+            code = _run_verb(None, interrupts.Worker)
+        finally:
+            interrupts.ignore()
+    except KeyboardInterrupt:       # while the verb said its last words
+        code = interrupts.EXIT_INTERRUPTED
+    if code == interrupts.EXIT_INTERRUPTED:
+        interrupts.end_interrupted()
+    return code
+
+
+def _run_verb(argv, begin=lambda: None):
+    """Parse, call ``begin``, run the verb; return the exit code."""
+    # Here and not above: an early Ctrl-C finds main() at work, see interrupts.
+    from pam_actuation.cli import completion
+    from pam_actuation.cli.options import (
+        complain, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, EXIT_INTERRUPTED)
+    from pam_sim.errors import InputError
+    from pam_sim.files import reason, shown
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     if not (sys.argv[1:] if argv is None else argv) and not completion.asked():
@@ -70,6 +96,7 @@ def main(argv=None):
         args = parser.parse_args(argv)
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code
+    begin()
     try:
         code = args.call(args)
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
@@ -79,8 +106,7 @@ def main(argv=None):
         said = ' '.join(str(mistake).split())
         return complain(said, EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
     except KeyboardInterrupt as stop:
-        said = f'stopped; {stop}' if str(stop) else 'stopped'
-        return complain(said, EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
+        return complain(str(stop) or 'stopped', EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
     except BrokenPipeError:   # e.g. "pam info BAG | head"
         sys.stderr.close()
         return 0

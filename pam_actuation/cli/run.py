@@ -54,15 +54,21 @@ def run(args):
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {published} published'
     lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
-             f'recorded{counted}', f'bag: {result.bag}']
+             f'recorded{counted}']
     lines += [f'remark: {text}' for text in remarks]
     if result.failure:
         lines.append(f'not completed: {result.failure}')
     lines += [f'finding: {text}' for text in result.findings]
-    lines.append(f'next: pam report {result.bag}')
+    if result.bag:
+        lines.insert(1, f'bag: {result.bag}')
+        lines.append(f'next: pam report {result.bag}')
+    elif result.stopped:
+        lines = ['nothing is recorded']
     emit(args, {
         'bag': result.bag, 'complete': result.complete, 'failure': result.failure,
         'findings': result.findings, 'remarks': remarks, 'published': result.published,
         'recorded': result.recorded, 'exit_codes': result.exit_codes,
         'cpu_share': result.cpu_share}, '\n'.join(lines))
+    if result.stopped:
+        raise KeyboardInterrupt     # what was recorded is told; the exit code is that of Ctrl-C
     return EXIT_DONE if result.complete and not result.findings else EXIT_FINDING

@@ -32,7 +32,8 @@ def add_arguments(parser):
     parser.add_argument('--model', type=source, default=None, metavar='NAME',
                         help='rig or joint: preset, or path of a model file')
     parser.add_argument('--controller', type=source, default=None, metavar='NAME',
-                        help='controller preset or file (default: that of valve and experiment)')
+                        help='controller preset or file, or none: one of your own commands the '
+                             'pressure (default: that of valve and experiment)')
     add_other_rig_option(parser)
     parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
@@ -53,8 +54,13 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Bring up, watch, take down; exit code 1 if a node ended or did not end in order."""
+    """
+    Bring up, watch, take down; exit code 1 if a node ended or did not end in order.
+
+    Once all are active Ctrl-C is the ordinary end, exit code 0; before, it is an interruption.
+    """
     from pam_actuation.bags.place import check_bag_target
+    from pam_actuation.interrupts import undisturbed
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     if args.policy is not None:
@@ -65,11 +71,12 @@ def run(args):
     _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
-    failure, problems = '', []
+    failure, problems, is_up = '', [], False
     with termination_as_interrupt(), Supervisor(
             nodes, args.domain_id, args.realtime_priority) as supervisor:
         try:
             supervisor.start()
+            is_up = True
             if not args.json:
                 print(f'{len(supervisor.processes)} nodes are active, Ctrl-C vents and ends:\n  '
                       + '\n  '.join(supervisor.processes), flush=True)
@@ -78,8 +85,11 @@ def run(args):
             failure = str(error)
         except KeyboardInterrupt:
             pass
-        problems = supervisor.finish()
-        codes = {name: process.exit_code for name, process in supervisor.processes.items()}
+        with undisturbed():
+            problems = supervisor.finish()
+            codes = {name: process.exit_code for name, process in supervisor.processes.items()}
+    if not is_up and not failure:
+        raise KeyboardInterrupt('stopped while the nodes started')
     findings = list(dict.fromkeys(filter(None, [failure, *problems])))
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
@@ -108,11 +118,12 @@ def _write_policy(args, nodes):
 
 def _nodes(args):
     """Return the nodes that are asked for."""
+    from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller or '',
                'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig}
     if args.namespace is not None:
-        options['namespace'] = '/' + args.namespace.strip('/') if args.namespace else ''
+        options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     if args.what == 'rig':

@@ -29,6 +29,7 @@ import numpy as np
 from pam_actuation.bags.place import check_bag_target
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.parallel import in_processes
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.units import GRAVITY_M_PER_S2
@@ -130,9 +131,9 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
     for path in targets:
         check_bag_target(path, overwrite)
     rig.pack()     # compiled once here, or every process would compile for itself
-    runs = joblib.Parallel(n_jobs=jobs, return_as='generator')(
+    runs = in_processes(jobs, (
         joblib.delayed(simulate_load)(rig, float(load), path, seed, experiment, overwrite)
-        for load, path in zip(loads, targets))
+        for load, path in zip(loads, targets)))
     bags = []
     for bag in runs:
         bags.append(bag)

@@ -248,10 +248,11 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
         if writer is not None:
             writer.discard()        # what is not finished; a whole bag stays
     if stopped() and not ending.early:
-        raise KeyboardInterrupt(f'the bag {writer.directory} is whole')
+        raise KeyboardInterrupt(f'stopped; the bag {writer.directory} is whole')
     if ending.early:
         raise KeyboardInterrupt(
-            f'the bag {writer.directory} holds {ending.reached_s:.1f} of {ending.planned_s:.1f} s')
+            f'stopped; the bag {writer.directory} holds {ending.reached_s:.1f} of '
+            f'{ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
 

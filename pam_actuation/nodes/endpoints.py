@@ -28,6 +28,7 @@ from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 WaitSet = rclpy_implementation.WaitSet
+TELL_AFTER_S, TELL_EVERY_S = 2.0, 5.0       # of a wait
 
 
 class CountedPublisher:
@@ -196,7 +197,7 @@ def full_name(namespace, name):
     return f'{namespace.rstrip("/")}/{name}'
 
 
-def wait_until_matched(publishers, subscriber, timeout_s, stopping):
+def wait_until_matched(publishers, subscriber, timeout_s, stopping, tell=lambda text: None):
     """
     Wait until every publisher reaches the named subscriber, so that no message is lost.
 
@@ -210,6 +211,8 @@ def wait_until_matched(publishers, subscriber, timeout_s, stopping):
         Longest wait [s].
     stopping : callable
         Ends the wait when it returns True.
+    tell : callable
+        Is told for whom a long wait is, from time to time.
 
     Returns
     -------
@@ -217,10 +220,16 @@ def wait_until_matched(publishers, subscriber, timeout_s, stopping):
         Topics that were not matched in time; empty when all are.
 
     """
-    deadline = time.monotonic() + timeout_s
+    begin = time.monotonic()
+    deadline, tell_at = begin + timeout_s, begin + TELL_AFTER_S
     open_ones = list(publishers)
     while open_ones and not stopping() and time.monotonic() < deadline:
         open_ones = [one for one in open_ones if not one.matched_with(subscriber)]
+        if open_ones and time.monotonic() > tell_at:
+            tell_at += TELL_EVERY_S
+            tell(f'waiting for {subscriber} to receive '
+                 f'{", ".join(one.topic for one in open_ones)}, '
+                 f'for {deadline - time.monotonic():.0f} s more at most')
         if open_ones:
             time.sleep(0.01)
     return [one.topic for one in open_ones]

@@ -28,6 +28,7 @@ import gc
 import time
 import traceback
 
+from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.conversions import type_of
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
@@ -58,8 +59,8 @@ COMMON_PARAMETERS = (
     NodeParameter('autostart', True, 'Configure and activate without being told to.'),
     NodeParameter(
         'await_subscriber', '',
-        'Full name of a node that must receive every message, such as the recorder; '
-        'activation waits for it. Empty: none.'),
+        'Name of a node that must receive every message, such as the recorder; activation waits '
+        'for it. Without a slash: in the namespace of this node. Empty: none.'),
     NodeParameter(
         'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].',
         0.1, 600.0),
@@ -107,12 +108,15 @@ class ManagedNode(LifecycleNode):
         super().__init__(self.NAME, **kwargs)
         self._refuse_impossible_transitions()
         declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS))
+        self.awaited = self.value('await_subscriber') and node_name_of(
+            self.value('await_subscriber'), self.get_namespace().rstrip('/'),
+            'parameter await_subscriber')
         self.participants = self._participants()
         self.simulated_time = None
         if self.FOLLOWS_CLOCK and self.uses_simulated_time:
             leave_clock_to_node(self)
         self.diagnostics = DiagnosticsReporter(self)
-        self.diagnostics.silent = bool(self.value('await_subscriber'))
+        self.diagnostics.silent = bool(self.awaited)
         self.check()
 
     # What derived nodes override.
@@ -385,10 +389,9 @@ class ManagedNode(LifecycleNode):
         self.get_logger().info('active')
 
     def _await_subscriber(self):
-        subscriber = self.value('await_subscriber')
-        if subscriber:
+        if self.awaited:
             publishers = (*self.publishers_counted, self.diagnostics.publisher)
-            self._await_matched(publishers, subscriber, 'await_subscriber')
+            self._await_matched(publishers, self.awaited, 'await_subscriber')
 
     def _await_participants(self):
         """Wait until those in lockstep with this node receive what they need of it."""
@@ -397,7 +400,8 @@ class ManagedNode(LifecycleNode):
 
     def _await_matched(self, publishers, subscriber, parameter):
         missed = wait_until_matched(
-            publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping)
+            publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping,
+            self.get_logger().info)
         if missed and self.stopping:
             raise StoppedEarly
         if missed:

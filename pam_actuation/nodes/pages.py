@@ -79,9 +79,10 @@ def _endpoints(interface, notes):
 def _parameters(parameters):
     if not parameters:
         return 'None of its own.'
-    lines = [row(('parameter', 'default', 'allowed', 'live', 'meaning')), '|---|---|---|---|---|']
+    lines = [row(('parameter', 'default', 'unit', 'allowed', 'live', 'meaning')),
+             '|---|---|---|---|---|---|']
     for one in parameters:
         default = f'`{one.default!r}`' if one.default != '' else ''
-        lines.append(row((f'`{one.name}`', default, escaped(one.allowed),
+        lines.append(row((f'`{one.name}`', default, one.unit, escaped(one.allowed),
                           'yes' if one.live else 'no', escaped(one.description))))
     return '\n'.join(lines)

@@ -20,6 +20,7 @@ its text and turns a wrong value, at start or live, into one sentence.
 """
 
 from dataclasses import dataclass
+import re
 
 from pam_sim.errors import did_you_mean, InputError
 from rcl_interfaces.msg import FloatingPointRange
@@ -28,6 +29,22 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.exceptions import InvalidParameterValueException
+
+
+# The end of a name to its unit, as docs/naming.md writes them.
+_UNITS = {'s': 's', 'pa': 'Pa', 'v': 'V', 'hz': 'Hz', 'm': 'm', 'm3': 'm³', 'n': 'N', 'kg': 'kg',
+          'k': 'K', 'rad': 'rad', 'periods': 'periods'}
+
+
+def unit_of(name):
+    """Return the unit at the end of a name, as ``Pa/V`` of ``ppr.gain_pa_per_v``; '' for none."""
+    above, _, below = name.rpartition('_per_')
+    if not above:
+        return _UNITS.get(below.rsplit('_', 1)[-1], '') if '_' in below else ''
+    above, below = unit_of(above), [_UNITS.get(part, '') for part in below.split('_')]
+    if not above or not all(below):
+        return ''
+    return f'{above}/{below[0]}' if len(below) == 1 else f'{above}/({"·".join(below)})'
 
 
 @dataclass(frozen=True)
@@ -46,6 +63,14 @@ class NodeParameter:
     upper: float | None = None
     choices: tuple = ()
     live: bool = False
+
+    @property
+    def unit(self):
+        """Return the unit, as its description or its name says it; '' without one."""
+        said = re.search(r'\[([^\]]+)\]', self.description)
+        if said:
+            return said[1]
+        return '' if type(self.default) is not float else unit_of(self.name)
 
     @property
     def allowed(self):

@@ -21,12 +21,15 @@ out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad inpu
 """
 
 import os
+import re
 import signal
 import socket
 import sys
 import threading
 import traceback
 
+from pam_actuation import interrupts
+from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.transport import prepare_middleware
 from pam_sim.errors import InputError
@@ -35,7 +38,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-SIGNALS = {signal.SIGINT: 'SIGINT', signal.SIGTERM: 'SIGTERM', signal.SIGHUP: 'SIGHUP'}
+SIGNALS = {number: number.name for number in interrupts.ENDING}
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
@@ -99,8 +102,21 @@ def run(node_class, args=None):
         Exit code.
 
     """
+    answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
+    if answered is not None:
+        return answered
     stopper = _Stopper()
     try:
+        return _run(node_class, args, stopper)
+    finally:
+        # What comes now, as by an impatient user, must not change the exit code any more.
+        interrupts.ignore(SIGNALS)
+
+
+def _run(node_class, args, stopper):
+    try:
+        if args is None:
+            args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
         prepare_middleware()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
@@ -109,6 +125,9 @@ def run(node_class, args=None):
     except Exception as error:
         if type(error).__name__ in ('UnknownROSArgsError', 'RCLInvalidROSArgsError'):
             return _refuse(node_class, f'these ROS arguments are not known: {error}')
+        unread = re.search("Couldn't parse ([^:]*): '(.*?)'", str(error))
+        if unread:
+            return _refuse(node_class, f'ROS cannot read the {unread[1]} {unread[2]}')
         raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)

@@ -21,6 +21,7 @@ What the launch files of the same names describe, for those who start nodes with
 
 from dataclasses import dataclass, field, replace
 
+from pam_actuation.namespaces import namespace_of
 from pam_actuation.resources import find_config
 from pam_sim.joint.parameters import SIDES
 
@@ -28,6 +29,7 @@ from pam_sim.joint.parameters import SIDES
 ORDER = ('experiment_recorder', 'plant_simulator', 'hardware_sensors', 'joint_simulator',
          'valve_watchdog', 'valve_driver', 'sofc_controller', 'pid_controller',
          'joint_controller', 'reference_generator')
+NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
 KNEES = ('left_knee', 'right_knee')
 
 
@@ -57,7 +59,8 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
     hardware : str
         ``sim``, another name in config/hardware, or a parameter file.
     controller : str
-        Controller preset or file; '' for the preset of valve and experiment.
+        Controller preset or file; '' for the preset of valve and experiment, 'none' for no
+        node: one of your own commands the pressure.
     experiment : str
         Name or file; '': none, references come from elsewhere. One in pressure or in raw
         valve signals speaks to the driver itself: there is no controller then.
@@ -72,6 +75,7 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
         In the experiment, or where the rig cannot do it.
 
     """
+    namespace = namespace_of(namespace)
     kind = {'valve_type': valve}
     described = {**kind, 'rig': rig}
     name, raw = played(experiment, rig, valve, controller)
@@ -109,7 +113,7 @@ def played(experiment, rig, valve, controller='', presets=None):
     rig, valve : str
         Model by name or file, and kind of valve.
     controller : str
-        Preset or file; '' for the preset.
+        Preset or file; '' for the preset, 'none' for none.
     presets : dict, optional
         Preset by valve; default: that of the self-organizing controller.
 
@@ -121,13 +125,13 @@ def played(experiment, rig, valve, controller='', presets=None):
     """
     name = controller or (presets or {}).get(valve)
     if not experiment:
-        return name or f'sofc_{valve}', False
+        return '' if name == NO_CONTROLLER else name or f'sofc_{valve}', False
     from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
     from pam_sim import load_rig
     wanted, model = load_experiment(experiment), load_rig(rig, valve=valve)
     wanted.check_reachable(model)
-    if not wanted.tracked:
+    if not wanted.tracked or name == NO_CONTROLLER:
         name = ''
     elif not name:
         name = preset_for(wanted, model)
@@ -136,13 +140,19 @@ def played(experiment, rig, valve, controller='', presets=None):
 
 def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', controller='',
          experiment='', seed=0, accept_other_rig=False):
-    """Return the nodes of one simulated joint; its name is the last part of the namespace."""
-    common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1]}
+    """
+    Return the nodes of one simulated joint; its name is the last part of the namespace.
+
+    ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
+    """
+    namespace = namespace_of(namespace)
+    common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
     of_joint = {**common, 'joint': joint}
-    nodes = [NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed}),
-             NodeSpec('joint_controller', namespace, {
-                 **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
-                 'controller': controller})]
+    nodes = [NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed})]
+    if controller != NO_CONTROLLER:
+        nodes.append(NodeSpec('joint_controller', namespace, {
+            **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
+            'controller': controller}))
     for side in SIDES:
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}),
@@ -153,7 +163,7 @@ def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', con
 def exo(namespace='', **options):
     """Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``."""
     return [node for k, name in enumerate(KNEES)
-            for node in knee(f'{namespace}/{name}', seed=2 * k, **options)]
+            for node in knee(f'{namespace_of(namespace)}/{name}', seed=2 * k, **options)]
 
 
 def _reference(namespace, experiment, parameters):

@@ -23,6 +23,7 @@ import tempfile
 
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
+from pam_actuation.namespaces import namespace_of, node_name_of
 from pam_sim.errors import InputError
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
@@ -170,7 +171,7 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     for parameters in nodes.values():
         parameters['autostart'] = False
         if bag is not None:
-            parameters['await_subscriber'] = f'{namespace.rstrip("/")}/{RECORDER}'
+            parameters['await_subscriber'] = node_name_of(RECORDER, namespace_of(namespace))
     return nodes
 
 

@@ -100,7 +100,7 @@ class NodeProcess:
         self.log_file = Path(log_dir) / f'{name}.log'
         command = [
             sys.executable, '-m', f'pam_actuation.nodes.{name}', '--ros-args',
-            '-r', f'__ns:={namespace}', *parameter_arguments(parameters)]
+            '-r', f'__ns:={namespace or "/"}', *parameter_arguments(parameters)]
         if parameter_file:
             command += ['--params-file', parameter_file]
         if environment.get('ROS_SECURITY_ENABLE') == 'true':

@@ -27,10 +27,11 @@ from dataclasses import dataclass, field
 import json
 import os
 from pathlib import Path
-import re
 import time
 
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
+from pam_actuation.interrupts import undisturbed
+from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
@@ -45,8 +46,8 @@ import yaml
 START_TIMEOUT_S = 60.0        # a busy machine compiles for long
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
+STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
-NAMESPACE = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 @dataclass
@@ -57,7 +58,7 @@ class Result:
     Attributes
     ----------
     bag : str
-        Folder of the recording, '' without recorder.
+        Folder of the recording, '' without recorder, or if it ended before it recorded.
     duration_s : float
         Time from the activation of the reference to the end of the experiment [s].
     failure : str
@@ -81,6 +82,11 @@ class Result:
     recorded: dict = field(default_factory=dict)
     exit_codes: dict = field(default_factory=dict)
     cpu_share: dict = field(default_factory=dict)
+
+    @property
+    def stopped(self):
+        """Tell whether the user ended it, by Ctrl-C or SIGTERM."""
+        return self.failure == STOPPED
 
     @property
     def complete(self):
@@ -110,13 +116,14 @@ class RigSession:
         except ImportError as error:
             raise InputError(ros_missing(error.name)) from None
         self.plan = plan
-        self.namespace = namespace
+        self.namespace = namespace_of(namespace)
         self.processes = {}
         self._lock = DomainLock(domain_id)
         self.domain_id = self._lock.domain_id
         self.client = None
         self._cpu = {}
         self._active = set()
+        self._may_record = False
         self._active_since = None
         self.ended_at = None
 
@@ -126,10 +133,11 @@ class RigSession:
 
     def __exit__(self, *_):
         """End all processes of this session."""
-        end_all(self.processes.values())
-        if self.client is not None:
-            self.client.close()
-        self._lock.release()
+        with undisturbed():
+            end_all(self.processes.values())
+            if self.client is not None:
+                self.client.close()
+            self._lock.release()
 
     def start(self):
         """
@@ -149,6 +157,7 @@ class RigSession:
         self.client = self._new_client(self.domain_id)
         self.change(self.processes, 'configure', START_TIMEOUT_S)
         for name in self.processes:
+            self._may_record |= name == RECORDER
             self.change([name], 'activate')
             self._active.add(name)
         self._active_since = time.monotonic()
@@ -267,6 +276,8 @@ class RigSession:
 
     def fill(self, result):
         """Enter counts, exit codes and findings into a Result."""
+        if not self._may_record or not os.path.isdir(result.bag):
+            result.bag = ''         # there is none, or only that of an earlier run
         if self.client is None:
             return
         result.published = self.client.published()
@@ -332,11 +343,9 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
         A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
 
     """
-    namespace = '/' + namespace.strip('/')
-    if not NAMESPACE.fullmatch(namespace):
-        raise InputError(
-            f'{namespace!r} is not allowed, it must be names of letters, digits and _ '
-            'joined by /', 'namespace')
+    namespace = namespace_of(namespace)
+    if not namespace:
+        raise InputError('is needed, such as /muscle', 'namespace')
     bag = None
     if with_recorder:
         if out_dir is None:
@@ -364,9 +373,10 @@ def run_guarded(session, result, progress):
     except SessionFailed as error:
         result.failure, ended = str(error), (ERROR, str(error))
     except KeyboardInterrupt:
-        result.failure, ended = 'stopped by the user', (INTERRUPTED,)
+        result.failure, ended = STOPPED, (INTERRUPTED,)
     if begin is not None:
         result.duration_s = time.monotonic() - begin
-    problems = session.finish(*ended)
-    session.fill(result)
-    result.findings += problems
+    with undisturbed():
+        problems = session.finish(*ended)
+        session.fill(result)
+        result.findings += problems

@@ -26,6 +26,7 @@ import shutil
 import tempfile
 import time
 
+from pam_actuation.interrupts import undisturbed
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.layouts import ORDER
 from pam_actuation.rigging.plan import DRIVER, RECORDER
@@ -82,13 +83,14 @@ class Supervisor:
 
     def __exit__(self, *_):
         """End all processes."""
-        drivers = [one for one in self.processes.values() if one.name == DRIVER]
-        end_all(drivers)
-        end_all(self.processes.values())
-        if self.client is not None:
-            self.client.close()
-        self._lock.release()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        with undisturbed():
+            drivers = [one for one in self.processes.values() if one.name == DRIVER]
+            end_all(drivers)
+            end_all(self.processes.values())
+            if self.client is not None:
+                self.client.close()
+            self._lock.release()
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     def start(self):
         """

@@ -88,3 +88,17 @@ def test_one_sentence_and_exit_code_2(outcomes, case):
     assert problem in errors and allowed in errors
     assert 'Traceback' not in errors
     assert len(errors.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['-r', '__ns:=le-g'], "namespace: 'le-g' is not allowed"),
+    (['-r', '__node:=bad-name'], 'cannot read the remap rule -r __node:=bad-name'),
+    (['-p', 'novalue'], 'cannot read the parameter override rule -p novalue'),
+    (['--params-file', '/no.yaml'], 'cannot read the params file --params-file /no.yaml')])
+def test_what_ros_cannot_read_is_a_sentence(arguments, words, tmp_path):
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.nodes.valve_watchdog', '--ros-args', *arguments],
+        env=node_environment(78, tmp_path), text=True, capture_output=True, timeout=60)
+    assert done.returncode == 2 and 'Traceback' not in done.stderr
+    own = [line for line in done.stderr.splitlines() if line.startswith('valve_watchdog: ')]
+    assert len(own) == 1 and words in own[0]        # beside what rcl itself logs

@@ -88,3 +88,17 @@ def test_every_node_has_its_place_in_the_order():
 def test_a_mistake_is_one_sentence(arguments, words, capsys):
     assert main(['up', *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_without_a_controller_the_rest_stays_as_it_is(tmp_path):
+    with_one = layouts.rig(experiment='short_sine', record='bag')
+    without = layouts.rig(experiment='short_sine', record='bag', controller='none')
+    assert names(without) == [
+        name for name in names(with_one) if not name.endswith('/sofc_controller')]
+    for node in without:
+        assert node.parameters.get('controller', '') == ''
+    assert [node.name for node in layouts.rig(controller='none')] == [
+        'plant_simulator', 'valve_watchdog', 'valve_driver']
+    for joints in (layouts.knee, layouts.exo):
+        assert names(joints(controller='none')) == [
+            name for name in names(joints()) if not name.endswith('/joint_controller')]

@@ -1,0 +1,163 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What Ctrl-C does to a program of this package, from its first lines to its last.
+
+Python raises KeyboardInterrupt wherever the main thread happens to be: also in an import, in a
+callback from C, at the end of the interpreter. The user then sees a page of traceback, a wrong
+error, or nothing at all. A program therefore says how far it is:
+
+* It begins: nothing is there to be lost. The process ends at once, with one line.
+* It works: KeyboardInterrupt, so that files and processes are left in order. In an import or a
+  destructor it waits for the end of that. Where a callback swallowed it, it comes once more.
+  Impatient repetitions are ignored.
+* It ends: the result is out, and nothing may change the exit code any more.
+
+This module imports next to nothing: what comes before it cannot be guarded.
+"""
+
+import atexit
+from contextlib import contextmanager
+import os
+import signal
+import sys
+import threading
+import time
+
+EXIT_INTERRUPTED = 130
+ONE_WISH_S = 1.0            # several within this time are one
+AGAIN_S = 0.005             # until the end of an import
+# Where an exception from outside leaves something half done that is told of later, or never.
+IMPORTING = '<frozen importlib._bootstrap>'
+OWNERS_OF_MEMORY = f'{os.sep}llvmlite{os.sep}'
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)     # what a node is ended by
+
+
+def leave_at_once(program, exit_code=EXIT_INTERRUPTED, numbers=(signal.SIGINT,)):
+    """End the process by any of these signals from now on, with one line and nothing else."""
+    def leave(number, frame):
+        try:
+            os.write(2, f'{program}: stopped by {signal.Signals(number).name}\n'.encode())
+        finally:
+            os._exit(exit_code)
+
+    for number in numbers:
+        signal.signal(number, leave)
+
+
+def ignore(numbers=(signal.SIGINT,)):
+    """Let these signals change nothing any more: the process is about to end by itself."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def undisturbed():
+    """Ignore further signals while something is brought to an end in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, _unheard) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def kept_from_children():
+    """
+    Keep SIGINT from the processes that are started meanwhile; what comes for this one waits.
+
+    A terminal sends Ctrl-C to all of them. Who started them ends them.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _unheard(number, frame):
+    """Stand in for SIG_IGN, which child processes would inherit."""
+
+
+class Worker:
+    """
+    Turn SIGINT into KeyboardInterrupt where Python can raise it safely; made by the main thread.
+
+    The caller's frame is where the work begins; the handlers stay until ``ignore``.
+    """
+
+    def __init__(self):
+        self._base = sys._getframe(1)
+        self._pid = os.getpid()
+        self._asked_s = -ONE_WISH_S
+        self._unraisable = sys.unraisablehook
+        sys.unraisablehook = self._not_raised
+        signal.signal(signal.SIGALRM, self._ask)
+        signal.signal(signal.SIGINT, self._ask)
+
+    def _ask(self, number, frame):
+        if os.getpid() != self._pid:        # a child on its way to another program
+            return
+        now_s = time.monotonic()
+        if now_s - self._asked_s < ONE_WISH_S:
+            return
+        if self._is_delicate(frame):
+            self._ask_again()
+            return
+        self._asked_s = now_s
+        raise KeyboardInterrupt
+
+    def _ask_again(self):
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+
+    def _is_delicate(self, frame):
+        """Tell whether an import, a destructor or the like is under way."""
+        while frame is not None and frame is not self._base:
+            code = frame.f_code
+            if (code.co_filename == IMPORTING or code.co_name == '__del__'
+                    or OWNERS_OF_MEMORY in code.co_filename):
+                return True
+            frame = frame.f_back
+        return False
+
+    def _not_raised(self, unraisable):
+        """Ask again where an interruption fell into a callback, which cannot hand it on."""
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            self._asked_s = -ONE_WISH_S
+            self._ask_again()
+        else:
+            self._unraisable(unraisable)
+
+
+def end_interrupted():
+    """
+    End the process with exit code 130, without waiting for threads that still compute.
+
+    What libraries want done at the end, such as removing temporary files, is done.
+    """
+    ignore()
+    sys.unraisablehook = lambda unraisable: None    # on what was left half done
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):       # nobody listens any more
+            pass
+    os._exit(EXIT_INTERRUPTED)

@@ -1,0 +1,70 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Namespaces and full names of nodes, however the user writes them, in the one form ROS takes.
+
+``muscle``, ``/muscle`` and ``/muscle/`` all mean ``/muscle``. Needs no ROS.
+"""
+
+import re
+
+from pam_sim.errors import InputError
+
+LONGEST = 150       # ROS allows 255 characters for the name of a service below it
+# As the parser of ROS arguments has it: no two _ in a row.
+_PART = re.compile(r'(?!.*__)[A-Za-z_][A-Za-z0-9_]*')
+
+
+def namespace_of(text, where='namespace'):
+    """
+    Return a namespace as ROS writes it: a slash before each part, '' for the root.
+
+    Raises
+    ------
+    InputError
+        ROS would refuse it.
+
+    """
+    parts = [part for part in text.split('/') if part]
+    if not all(map(_PART.fullmatch, parts)):
+        raise InputError(
+            f'{text!r} is not allowed, it must be names of letters, digits and single _ joined '
+            'by /, none of which begins with a digit', where)
+    namespace = ''.join(f'/{part}' for part in parts)
+    if len(namespace) > LONGEST:
+        raise InputError(f'has {len(namespace)} characters, allowed are {LONGEST}', where)
+    return namespace
+
+
+def launch_namespace(text):
+    """Return a namespace as launch takes it; without a slash before it, it stays relative."""
+    namespace = namespace_of(text)
+    return namespace if text.startswith('/') else namespace.removeprefix('/')
+
+
+def node_name_of(text, namespace='', where='name'):
+    """
+    Return the full name of a node; a name without a slash is one in ``namespace``.
+
+    Raises
+    ------
+    InputError
+        ROS would refuse it.
+
+    """
+    name = namespace_of(text if '/' in text else f'{namespace}/{text}', where)
+    if not name:
+        raise InputError(f'{text!r} is no name of a node', where)
+    return name

@@ -1,0 +1,37 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Work in processes of joblib that Ctrl-C does not reach: who started them ends them."""
+
+import joblib
+from joblib.externals.loky.backend import resource_tracker
+from pam_actuation.interrupts import kept_from_children
+
+
+def in_processes(jobs, calls):
+    """
+    Return a generator of the results of some calls, in their order.
+
+    Parameters
+    ----------
+    jobs : int
+        Processes; -1 for as many as there are cores.
+    calls : iterable
+        Each from ``joblib.delayed``.
+
+    """
+    # Its start lets signals through again, in the middle of those of the workers.
+    resource_tracker.ensure_running()
+    with kept_from_children():
+        return joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)

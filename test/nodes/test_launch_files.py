@@ -1,0 +1,107 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Test what the launch files describe; needs ``launch``, which comes with ROS 2 only."""
+
+from pathlib import Path
+
+import pytest
+
+launch = pytest.importorskip('launch')
+pytest.importorskip('launch_ros')
+
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription  # noqa: E402, I100
+from launch.actions import OpaqueFunction, SetLaunchConfiguration           # noqa: E402
+from launch.launch_description_sources import PythonLaunchDescriptionSource  # noqa: E402
+from launch.utilities import perform_substitutions                          # noqa: E402
+from launch_ros.actions import LifecycleNode                                # noqa: E402
+from launch_ros.utilities import evaluate_parameters                        # noqa: E402
+from pam_sim.errors import InputError                                       # noqa: E402
+
+LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
+
+
+def described(name, **given):
+    """Return full name to parameters of the nodes that a launch file starts, none started."""
+    context = launch.LaunchContext()
+    found = {}
+
+    def visit(entities):
+        for one in entities or ():
+            if isinstance(one, LifecycleNode):
+                if one.condition is None or one.condition.evaluate(context):
+                    one._perform_substitutions(context)
+                    parameters = {}
+                    for given in evaluate_parameters(context, one._Node__parameters):
+                        if isinstance(given, dict):
+                            parameters.update(given)
+                    found[one.node_name] = parameters
+            elif isinstance(one, (DeclareLaunchArgument, OpaqueFunction, SetLaunchConfiguration)):
+                visit(one.execute(context))
+
+    context.launch_configurations.update(given)
+    description = PythonLaunchDescriptionSource(str(LAUNCH / name)).get_launch_description(context)
+    visit(description.entities)
+    return found
+
+
+@pytest.mark.parametrize('namespace', ['leg', '/leg', 'leg/', '//leg/'])
+def test_a_namespace_means_the_same_in_every_form(namespace):
+    nodes = described('rig.launch.py', namespace=namespace)
+    assert {name.rpartition('/')[0] for name in nodes} == {'/leg'}
+    for name, parameters in nodes.items():      # found in the namespace of the node
+        assert parameters['await_subscriber'] == 'experiment_recorder', name
+    nodes = described('knee.launch.py', namespace=namespace)
+    assert {name.rpartition('/')[0] for name in nodes} == {
+        '/leg', '/leg/flexor', '/leg/extensor'}
+    assert {parameters['muscle'] for parameters in nodes.values()} == {'leg'}
+
+
+@pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
+def test_a_namespace_that_ros_refuses_is_one_sentence(file):
+    with pytest.raises(InputError, match="'le-g' is not allowed"):
+        described(file, namespace='le-g')
+
+
+@pytest.mark.parametrize('controller, node', [
+    ('sofc', {'/muscle/sofc_controller'}), ('pid', {'/muscle/pid_controller'}), ('none', set())])
+def test_the_controller_is_the_one_asked_for_or_none(controller, node):
+    nodes = described('rig.launch.py', controller=controller)
+    assert {name for name in nodes if 'controller' in name} == node
+    assert {*nodes} - node == {f'/muscle/{name}' for name in (
+        'experiment_recorder', 'plant_simulator', 'valve_driver', 'valve_watchdog',
+        'reference_generator')}
+    assert bool(nodes['/muscle/experiment_recorder']['controller']) == bool(node)
+    if controller != 'pid':
+        knee = described('knee.launch.py', controller=controller)
+        assert ('/knee/joint_controller' in knee) == bool(node) and len(knee) == 6 + bool(node)
+
+
+def test_a_file_for_no_controller_is_a_mistake():
+    with pytest.raises(InputError, match='controller_file: is of no use'):
+        described('rig.launch.py', controller='none', controller_file='sofc_ppr')
+
+
+def test_both_knees_hand_it_on():
+    text = (LAUNCH / 'exo.launch.py').read_text(encoding='utf-8')
+    scope = {'__file__': str(LAUNCH / 'exo.launch.py')}
+    exec(compile(text, scope['__file__'], 'exec'), scope)
+    assert scope['HANDED_ON']['controller'][0] == 'sofc'
+    included = [one for group in scope['generate_launch_description']().entities
+                for one in (getattr(group, 'get_sub_entities', list)() or [])
+                if isinstance(one, IncludeLaunchDescription)]
+    assert len(included) == 2
+    for one in included:
+        names = [name if isinstance(name, str) else perform_substitutions(
+            launch.LaunchContext(), name) for name, _ in one.launch_arguments]
+        assert 'controller' in names

@@ -1,0 +1,63 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Test that a node waits for whom it is told in any form, and says for whom."""
+
+import signal
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
+
+pytestmark = pytest.mark.ros
+
+
+def test_a_node_says_for_whom_it_waits_and_knows_it_in_every_form(tmp_path):
+    rig = LiveRig(tmp_path)
+    try:
+        rig.start('valve_watchdog', await_subscriber='recorder', await_timeout_s=3.0)
+        for below, form in (('a', '//muscle//listener/'), ('b', 'muscle/listener')):
+            rig.start('valve_watchdog', below=below, await_subscriber=form)
+        rig.start('valve_watchdog', below='c', await_subscriber='9/listener')
+        topics = {f'{below}/valve_signal': rig_type for below in 'ab'
+                  for rig_type in [_signal_type()]}
+        rig.listen(topics)
+        for below in 'ab':
+            log = rig.processes[f'{below}/valve_watchdog'].log_file
+            wait_for(lambda log=log: 'active' in log.read_text(), 15.0, f'{below} active')
+        lost, wrong = rig.processes['valve_watchdog'], rig.processes['c/valve_watchdog']
+        assert lost.wait(15.0) and lost.exit_code == 2
+        text = lost.log_file.read_text()
+        assert text.count('waiting for /muscle/recorder to receive /muscle/valve_signal, '
+                          '/diagnostics, for ') == 1
+        assert '/muscle/recorder does not receive' in text
+        assert wrong.wait(15.0) and wrong.exit_code == 2
+        text = wrong.log_file.read_text()
+        assert text.count('\n') == 1 and 'parameter await_subscriber' in text and '9' in text
+        for below in 'ab':
+            process = rig.processes[f'{below}/valve_watchdog']
+            process.send_signal(signal.SIGINT)
+            for _ in range(20):         # impatience
+                time.sleep(0.01)
+                process.send_signal(signal.SIGINT)
+            assert process.wait(5.0) and process.exit_code == 0
+    finally:
+        rig.close()
+
+
+def _signal_type():
+    from sensor_msgs.msg import JointState
+    return JointState

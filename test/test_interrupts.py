@@ -1,0 +1,106 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Test where an interruption is raised, where it waits, and where it is too late."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+ROOT = Path(__file__).resolve().parent.parent
+BEGIN = 'import os, signal, time; from pam_actuation import interrupts\n' \
+    'def ask(): os.kill(os.getpid(), signal.SIGINT)\n'
+WORK = BEGIN + """
+def main():
+    interrupts.Worker()
+    try:
+        work()
+        time.sleep(2.0)
+        print('not interrupted')
+    except KeyboardInterrupt:
+        print('interrupted')
+"""
+
+
+def run(code, folder):
+    """Return (exit code, output, errors) of a program."""
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=folder, capture_output=True, text=True, timeout=30,
+        env={**os.environ, 'PYTHONPATH': f'{folder}{os.pathsep}{ROOT}'})
+    return done.returncode, done.stdout.split('\n')[:-1], done.stderr
+
+
+def test_before_the_work_the_process_ends_at_once(tmp_path):
+    for begin, code in (("interrupts.leave_at_once('pam')", 130),
+                        ("interrupts.leave_at_once('node', 0, interrupts.ENDING)", 0)):
+        name = begin.split("'")[1]
+        assert run(BEGIN + begin + '\ntry:\n    ask()\nfinally:\n    print("late")', tmp_path) == (
+            code, [], f'{name}: stopped by SIGINT\n')
+
+
+def test_an_import_is_not_torn(tmp_path):
+    (tmp_path / 'slow.py').write_text(
+        'import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(0.1)\n'
+        'print("imported")\n')
+    code = WORK + 'def work():\n    import slow\n    print("and after it")\n    time.sleep(1.0)\n'
+    assert run(code + 'main()', tmp_path) == (
+        0, ['imported', 'and after it', 'interrupted'], '')
+
+
+def test_what_falls_into_a_callback_is_raised_again(tmp_path):
+    code = WORK + """
+import weakref
+class Something: pass
+def work():
+    it = Something()
+    reference = weakref.ref(it, lambda _: ask())        # cannot hand on an exception
+    del it
+"""
+    assert run(code + 'main()', tmp_path) == (0, ['interrupted'], '')
+
+
+def test_a_destructor_is_not_torn(tmp_path):
+    code = WORK + """
+class Owner:
+    def __del__(self):
+        ask()
+        time.sleep(0.1)
+        print('closed')
+def work():
+    it = Owner()
+    del it
+"""
+    assert run(code + 'main()', tmp_path) == (0, ['closed', 'interrupted'], '')
+
+
+def test_impatience_does_not_disturb_the_end(tmp_path):
+    code = WORK + """
+def work():
+    try:
+        ask()
+        time.sleep(1.0)
+    finally:
+        for _ in range(3):
+            ask()
+        with interrupts.undisturbed():
+            time.sleep(1.1)
+            ask()
+            time.sleep(0.01)
+        print('cleaned up')
+main()
+interrupts.ignore()
+ask()
+interrupts.end_interrupted()
+"""
+    assert run(code, tmp_path) == (130, ['cleaned up', 'interrupted'], '')
