@@ -83,17 +83,19 @@ def held():
     """
     Hold SIGINT and SIGTERM back; give a function that tells whether one came.
 
-    The block asks it between its steps and ends itself. A second signal is not held back.
+    The block asks it between its steps and ends itself. A second signal is not held back,
+    but impatient repetitions within a second are one.
     In another thread than the main one, which gets no signals, nothing is held back.
     """
-    came = threading.Event()
+    came, first_s = threading.Event(), []
     if threading.current_thread() is not threading.main_thread():
         yield came.is_set
         return
     before = {}
 
     def note(number, frame):
-        if came.is_set():
+        first_s.append(time.monotonic())
+        if first_s[-1] - first_s[0] > ONE_WISH_S:
             raise KeyboardInterrupt
         came.set()
 
