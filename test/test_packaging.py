@@ -20,9 +20,9 @@ from pathlib import Path
 import re
 import sys
 import sysconfig
-import tomllib
+import tomllib  # noqa: I201
 
-from catkin_pkg.changelog import get_changelog_from_path
+from catkin_pkg.changelog import get_changelog_from_path  # noqa: I100
 from catkin_pkg.package import parse_package
 import pam_actuation
 from pam_actuation import resources
