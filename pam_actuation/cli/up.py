@@ -68,6 +68,7 @@ def run(args):
     elif args.record:
         check_bag_target(args.record)
     nodes = _nodes(args)
+    _check_controller(args)
     _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
@@ -94,6 +95,20 @@ def run(args):
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
     return EXIT_FINDING if failure or problems else EXIT_DONE
+
+
+def _check_controller(args):
+    """Raise InputError for a controller that its node would refuse, before any node starts."""
+    if not args.controller:
+        return
+    from pam_actuation.control.config import load_controller
+    from pam_sim import load_rig
+    from pam_sim.joint import load_joint
+    if args.what == 'rig':
+        model = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
+    else:
+        model = load_joint(args.model or 'joint_dmsp_5_300_realistic', valve=args.valve)
+    load_controller(args.controller, model, accept_other_rig=args.accept_other_rig)
 
 
 def _tell_remarks(args):

@@ -17,6 +17,7 @@
 import re
 
 from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.made_for import facts_of
 from pam_actuation.experiments import load_experiment
@@ -148,3 +149,11 @@ def test_nodes_are_told(tuned, small):
                         (knee(accept_other_rig=True), 'joint_controller')):
         told = {node.name: node.parameters.get('accept_other_rig') for node in nodes}
         assert told.pop(name) is True and not any(told.values())
+
+
+def test_pam_up_refuses_before_any_node_starts(tuned, tmp_path, capsys):
+    path = tmp_path / 'large.yaml'
+    path.write_text(tuned['pid', LARGE])
+    assert main(['up', 'rig', '--controller', str(path)]) == 2
+    said = capsys.readouterr()
+    assert 'made for another rig' in said.err and said.err.count('\n') == 1 and not said.out
