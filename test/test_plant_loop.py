@@ -71,7 +71,7 @@ def test_signal_by_name_and_held():
 @pytest.mark.parametrize('valve, opening, safe', [
     ('ppr', (6.0,), (0.0,)), ('hsv', (1.0, 0.0), (0.0, 1.0))])
 def test_of_several_senders_one_that_vents_is_enough(valve, opening, safe):
-    """A safe signal acts for 0.1 s against the openings of others, not against its own writer's."""
+    """A safe signal acts for 0.1 s against openings of others, not of its own writer."""
     plant = make(valve)
     names = plant.rig.signal_names
 
