@@ -207,7 +207,8 @@ def test_benchmarks_need_no_more_than_their_extra(setup_keywords, manifest):
     page = (ROOT / 'docs' / 'dependencies.md').read_text(encoding='utf-8')
     assert all(f'| {name} |' in page for name in bench)
     own = {path.stem for path in (ROOT / 'benchmarks').glob('*.py')}
-    own |= {path.stem for path in (ROOT / 'test' / 'hidden').glob('*.py')}
+    own |= {path.stem for folder in ('hidden', 'control')
+            for path in (ROOT / 'test' / folder).glob('*.py')}
     own |= {'pam_sim', 'pam_actuation'}
     allowed = bench | requirement_names(setup_keywords['install_requires'])
     used = {DISTRIBUTIONS.get(name, name) for name in set(imported_modules('benchmarks')) - own}

@@ -80,7 +80,7 @@ def check_health(run, valve):
     health.problems += [text.rstrip('.') for text in getattr(run, 'unusable', ())]
     if health.problems:
         return health
-    health.remarks += [text for text in getattr(run, 'implausible', ())]
+    health.remarks += getattr(run, 'implausible', ())
     health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
     for needed in ('pressure', 'contraction'):
         if needed not in health.signals:

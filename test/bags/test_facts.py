@@ -65,7 +65,7 @@ def test_info_and_report_name_the_rig_of_the_preset(tmp_path):
     assert f'rig: {REALISTIC} ({NOMINAL}, 4 effects)\n' in text and 'seed: 3\n' in text
     assert bag_info(bag).to_dict()['rig'].startswith(REALISTIC)
     page = provenance([('run', load_run(bag))]).body
-    assert f'<td>Rig</td><td>{REALISTIC} ({NOMINAL}, 4 effects)</td>' in page
+    assert f'<td>Rig</td><td data-label="run">{REALISTIC} ({NOMINAL}, 4 effects)</td>' in page
 
 
 def test_of_a_foreign_bag_nothing_is_invented(tmp_path):
@@ -74,9 +74,9 @@ def test_of_a_foreign_bag_nothing_is_invented(tmp_path):
     for key in ('experiment_name', 'rig', 'valve', 'seed', 'software_version'):
         assert f'{key}: {NOT_RECORDED}\n' in text
     page = provenance([('run', load_run(bag))]).body
-    assert '<td>Valve</td><td>PPR, by its signal</td>' in page
-    assert f'<td>Random seed</td><td>{NOT_RECORDED}</td>' in page
-    assert f'<td>Rig</td><td>{NOT_RECORDED}</td>' in page
+    assert '<td>Valve</td><td data-label="run">PPR, by its signal</td>' in page
+    assert f'<td>Random seed</td><td data-label="run">{NOT_RECORDED}</td>' in page
+    assert f'<td>Rig</td><td data-label="run">{NOT_RECORDED}</td>' in page
 
 
 def test_a_controller_for_another_rig_is_told(tmp_path):

@@ -16,7 +16,7 @@
 
 from bad_call_place import changes, look, prepare
 from bad_calls import Call, in_this_process, judge, make, run
-from pam_actuation.cli.main import VERBS
+from pam_actuation.cli.overview import VERBS
 import pytest
 
 

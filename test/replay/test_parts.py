@@ -106,7 +106,7 @@ def test_the_verb_gives_the_same_bytes_twice(options, tmp_path, capsys):
     parts = json.loads(found[0][0])
     wanted = {(): {'controller', 'driver', 'plant'}, ('--chain',): {'chain'},
               ('--only', 'driver'): {'driver'}}[options]
-    assert set(parts) == wanted | {'counterfactual'}
+    assert set(parts) == wanted | {'counterfactual', 'remarks'}
 
 
 def test_another_tuning_in_the_closed_loop_changes_what_the_muscle_did(runs, capsys):
