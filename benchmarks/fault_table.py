@@ -353,7 +353,7 @@ def main():
     return run_series(Series, table, CASES, 'fault_table.jsonl', __doc__)
 
 
-def run_series(series_class, table_of, keys, out, description, times=3):
+def run_series(series_class, table_of, keys, out, description, times=3, is_good=good):
     """Play what the command line asks for, print the table; return the exit code."""
     parser = argparse.ArgumentParser(description=description.split('\n')[1])
     parser.add_argument('--times', type=int, default=times, help='how often each fault strikes')
@@ -372,7 +372,7 @@ def run_series(series_class, table_of, keys, out, description, times=3):
         outcomes = series.outcomes
     outcomes = [one for one in outcomes if one['valve'] == arguments.valve]
     print(table_of(outcomes, arguments.valve))
-    bad = [one for one in outcomes if not good(one)]
+    bad = [one for one in outcomes if not is_good(one)]
     for one in bad:
         print(f'not as it must be: {json.dumps(one)}', file=sys.stderr)
     return 1 if bad else 0

@@ -31,6 +31,8 @@ MAX_AGE_NS = 100_000_000
 MAX_AHEAD_NS = 20_000_000
 ON_THE_WAY_NS = 40_000_000  # a period of either, and what a busy machine takes
 _STANDS_NS = 200_000_000
+_INTRODUCED_NS = 5_000_000_000     # by then driver and controller have found each other
+_GAP_PA = 100_000.0
 _FILTER_S = 0.1             # of the pressure expected in the muscle
 
 
@@ -39,7 +41,8 @@ class CommandFollowing:
     Compares what the driver follows with the commands sent just before.
 
     One for each driver. A driver that never told is trusted, as long as the pressure that was
-    measured before still is: a driver that supervises it vents without.
+    measured before still is: a driver that supervises it vents without. In the first 5 s, while
+    driver and controller may not have found each other, the measured pressure must come along.
     """
 
     def __init__(self):
@@ -49,6 +52,7 @@ class CommandFollowing:
         """Begin anew, as before the first message."""
         self._followed = None       # newest message
         self._sent = deque()        # (time, command), the newest last
+        self._first_ns = None       # when the first command was sent
         self._measured = False      # whether a pressure ever was
         self._reading_pa = math.nan
         self._since_ns = 0
@@ -71,6 +75,8 @@ class CommandFollowing:
             self._sent.popleft()
         if self._sent and self._sent[-1][0] >= now_ns:
             self._sent.clear()      # the clock was set back
+        if self._first_ns is None:
+            self._first_ns = now_ns
         dt_s = (now_ns - self._sent[-1][0]) * 1e-9 if self._sent else 0.0
         self._sent.append((now_ns, command_pa))
         arrives_pa = self._followed.pressure_pa if self.told else command_pa
@@ -99,7 +105,7 @@ class CommandFollowing:
         known = math.isfinite(pressure_pa)
         self._measured = self._measured or known
         if not self.told:
-            return UNKNOWN if self._measured and not known else FOLLOWS
+            return self._untold(now_ns, pressure_pa)
         age_ns = now_ns - self._followed.stamp_ns
         if not -MAX_AHEAD_NS <= age_ns <= MAX_AGE_NS:
             return UNKNOWN
@@ -112,6 +118,16 @@ class CommandFollowing:
         if followed_pa < max(min(sent), P_ATM_PA) - TOLERANCE_PA:
             return LESS
         return MORE if followed_pa > max(max(sent), P_ATM_PA) + TOLERANCE_PA else FOLLOWS
+
+    def _untold(self, now_ns, pressure_pa):
+        if not math.isfinite(pressure_pa):
+            return UNKNOWN if self._measured else FOLLOWS
+        if self._first_ns is None or now_ns - self._first_ns > _INTRODUCED_NS:
+            return FOLLOWS
+        gap_pa = self._expected_pa - pressure_pa
+        if abs(gap_pa) <= _GAP_PA:
+            return FOLLOWS
+        return LESS if gap_pa > 0.0 else MORE
 
     def expected_pa(self, now_ns, pressure_pa):
         """

@@ -67,8 +67,9 @@ class FaultyRig:
             How long.
         reference : callable
             Time [s] -> wanted contraction [m], rate [m/s].
-        fault : {'', 'nan', 'silent', 'past', 'future', 'frozen', 'stopped'}
-            What is wrong with the readings of ``topics``; ``stopped``: with the controller.
+        fault : {'', 'nan', 'silent', 'past', 'future', 'frozen', 'stopped', 'apart'}
+            What is wrong with the readings of ``topics``; ``stopped``: with the controller;
+            ``apart``: controller and driver have not found each other yet.
         topics : tuple of str
             Which readings.
 
@@ -84,11 +85,12 @@ class FaultyRig:
                 self.control.on_reference(Reference(now_ns, *wanted))
                 command, state = self.control.tick(now_ns)
                 self.internals = dict(zip(state.names, state.values))
-                self.driver.on_command(command)
+                if fault != 'apart':
+                    self.driver.on_command(command)
                 self.reasons.add(self.control.reason)
             if self._ms % round(self.driver.period_s * 1e3) == 0:
                 self.plant.set_signal(self.driver.tick(now_ns)[0])
-                if self._tells:
+                if self._tells and fault != 'apart':
                     self.control.on_followed_pressure(self.driver.followed())
             self._ms += 1
         return self

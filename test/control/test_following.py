@@ -64,6 +64,14 @@ def test_a_driver_that_does_not_tell_is_known_by_the_pressure_it_lost():
     assert abs(rig.internals['integral_pa'] - before_pa) < 500.0
 
 
+@pytest.mark.parametrize('valve, controller', EVERY)
+def test_a_controller_that_its_driver_does_not_hear_yet_does_not_wind_up(valve, controller):
+    """Two processes need up to 3 s to find each other; a PID went to 600 kPa meanwhile."""
+    rig = FaultyRig(valve, controller).run(2.5, hold, 'apart').run(4.0, hold)
+    assert rig.excursion_m(0.0) < 2e-3
+    assert max(rig.gauge_pa) < 450e3
+
+
 @pytest.mark.parametrize('valve', CONTROLLERS)
 def test_both_sensors_frozen_in_motion_are_noticed(valve):
     """The pressure that should have moved the muscle is that of the driver, not the reading."""
