@@ -14,6 +14,8 @@
 
 """Work in processes of joblib that Ctrl-C does not reach: who started them ends them."""
 
+from multiprocessing import resource_tracker as standard_tracker
+
 import joblib
 from joblib.externals.loky.backend import resource_tracker
 from pam_actuation.interrupts import kept_from_children
@@ -31,7 +33,8 @@ def in_processes(jobs, calls):
         Each from ``joblib.delayed``.
 
     """
-    # Its start lets signals through again, in the middle of those of the workers.
-    resource_tracker.ensure_running()
+    # The start of a tracker lets signals through again, in the middle of those of the workers.
+    for tracker in (resource_tracker, standard_tracker):
+        tracker.ensure_running()
     with kept_from_children():
         return joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)

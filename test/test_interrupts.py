@@ -104,3 +104,15 @@ ask()
 interrupts.end_interrupted()
 """
     assert run(code, tmp_path) == (130, ['cleaned up', 'interrupted'], '')
+
+
+def test_processes_of_joblib_do_not_hear_ctrl_c(tmp_path):
+    """The trackers that joblib starts first let signals through to the workers again."""
+    (tmp_path / 'asks.py').write_text(
+        'import signal\n'
+        'def blocked(_):\n'
+        '    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())\n')
+    code, output, errors = run(
+        'import asks, joblib; from pam_actuation.parallel import in_processes\n'
+        'print(*in_processes(2, (joblib.delayed(asks.blocked)(k) for k in range(4))))', tmp_path)
+    assert (code, output, errors) == (0, ['True True True True'], '')
