@@ -15,11 +15,12 @@
 """``pam run``: an experiment on live nodes, recorded."""
 
 import os
+import sys
 import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
-from pam_actuation.cli.options import count, out_path
+from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
@@ -70,5 +71,7 @@ def run(args):
         'recorded': result.recorded, 'exit_codes': result.exit_codes,
         'cpu_share': result.cpu_share}, '\n'.join(lines))
     if result.stopped:
-        raise KeyboardInterrupt     # what was recorded is told; the exit code is that of Ctrl-C
+        # What was recorded is told; with --json in one document.
+        print('pam run: stopped', file=sys.stderr)
+        return EXIT_INTERRUPTED
     return EXIT_DONE if result.complete and not result.findings else EXIT_FINDING

@@ -99,9 +99,10 @@ def run(args):
 
 def _check_controller(args):
     """Raise InputError for a controller that its node would refuse, before any node starts."""
-    if not args.controller:
-        return
     from pam_actuation.control.config import load_controller
+    from pam_actuation.rigging.layouts import NO_CONTROLLER
+    if args.controller in (None, NO_CONTROLLER):
+        return
     from pam_sim import load_rig
     from pam_sim.joint import load_joint
     if args.what == 'rig':
