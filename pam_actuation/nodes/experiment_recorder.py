@@ -62,6 +62,7 @@ class ExperimentRecorder(ManagedNode):
     """
 
     NAME = 'experiment_recorder'
+    SPEAKS_AT_ONCE = False      # what it says before it records would be missing in the bag
     STUCK_AFTER_S = 30.0        # the disk may be slow
     FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (

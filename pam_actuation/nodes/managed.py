@@ -93,6 +93,7 @@ class ManagedNode(LifecycleNode):
     NAME = ''
     STUCK_AFTER_S = 2.0         # how long the way out may take
     REALTIME_RANK = 0           # added to a real-time priority: among equals nobody gives way
+    SPEAKS_AT_ONCE = True       # in /diagnostics, also before it is active
     FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
     PARAMETERS = ()
 
@@ -117,7 +118,7 @@ class ManagedNode(LifecycleNode):
         if self.FOLLOWS_CLOCK and self.uses_simulated_time:
             leave_clock_to_node(self)
         self.diagnostics = DiagnosticsReporter(self)
-        self.diagnostics.silent = bool(self.awaited)
+        self.diagnostics.silent = bool(self.awaited) or not self.SPEAKS_AT_ONCE
         self.check()
 
     # What derived nodes override.
