@@ -28,6 +28,7 @@ often each outcome came and exits with 1 otherwise.
 import argparse
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -146,6 +147,20 @@ def _left(mark, timeout_s=5.0):
         time.sleep(0.05)
 
 
+@contextmanager
+def _domain(live):
+    """Give the environment of a ROS domain that nobody else uses; {} where no node runs."""
+    if not live:
+        yield {}
+        return
+    from pam_actuation.rigging.domain import DomainLock
+    lock = DomainLock()
+    try:
+        yield {'ROS_DOMAIN_ID': str(lock.domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    finally:
+        lock.release()
+
+
 def run(count, longest_s=1.3, live=False, jobs=2, start=0):
     """
     Run ``count`` cases, ``jobs`` at a time.
@@ -159,24 +174,16 @@ def run(count, longest_s=1.3, live=False, jobs=2, start=0):
 
     """
     environment = {**os.environ, 'OPENBLAS_NUM_THREADS': '1', 'NUMBA_NUM_THREADS': '1'}
-    lock = None
-    if live:
-        from pam_actuation.rigging.domain import DomainLock
-        lock = DomainLock()
-        environment.update(
-            ROS_DOMAIN_ID=str(lock.domain_id), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
 
     def one(number):
-        with tempfile.TemporaryDirectory() as folder:
-            chosen = case(number, longest_s, live)
-            return chosen, interrupt(chosen, folder, {**environment, 'ROS_LOG_DIR': folder})
+        chosen = case(number, longest_s, live)
+        # A domain each: a recorder counts what the others of its domain did not send it.
+        with tempfile.TemporaryDirectory() as folder, _domain(live) as domain:
+            return chosen, interrupt(
+                chosen, folder, {**environment, **domain, 'ROS_LOG_DIR': folder})
 
-    try:
-        with ThreadPoolExecutor(jobs) as pool:
-            results = list(pool.map(one, range(start, start + count)))
-    finally:
-        if lock is not None:
-            lock.release()
+    with ThreadPoolExecutor(jobs) as pool:
+        results = list(pool.map(one, range(start, start + count)))
     outcomes = Counter(what for _, what in results if what in ('interrupted', 'done'))
     return outcomes, [f'{chosen}\n    {what}' for chosen, what in results
                       if what not in ('interrupted', 'done')]
