@@ -59,7 +59,7 @@ def leave_at_once(program, exit_code=EXIT_INTERRUPTED, numbers=(signal.SIGINT,))
 
 def ignore(numbers=(signal.SIGINT,)):
     """Let these signals change nothing any more: the process is about to end by itself."""
-    for number in numbers:
+    for number in (*numbers, signal.SIGALRM):       # that of a Worker, which may still ask again
         signal.signal(number, signal.SIG_IGN)
 
 

@@ -106,6 +106,26 @@ interrupts.end_interrupted()
     assert run(code, tmp_path) == (130, ['cleaned up', 'interrupted'], '')
 
 
+def test_what_was_asked_too_late_does_not_end_the_process(tmp_path):
+    """The interpreter gives SIGALRM its deadly default back while it ends."""
+    code = BEGIN + """
+class Owner:
+    def __del__(self):
+        ask()
+        print('closed')
+class Last:
+    def __del__(self, sleep=time.sleep):
+        sleep(0.1)
+last = Last()
+def main():
+    interrupts.Worker()
+    Owner()
+    interrupts.ignore()
+main()
+"""
+    assert run(code, tmp_path) == (0, ['closed'], '')
+
+
 def test_processes_of_joblib_do_not_hear_ctrl_c(tmp_path):
     """The trackers that joblib starts first let signals through to the workers again."""
     (tmp_path / 'asks.py').write_text(
