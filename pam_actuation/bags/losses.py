@@ -66,6 +66,7 @@ class PublishedCounts:
 
     def __init__(self):
         self._last = {}         # topic -> status name -> (number, send time)
+        self._first = {}        # status name -> number of its first report on /diagnostics
 
     def hear(self, payload, sent_ns):
         """
@@ -84,7 +85,19 @@ class PublishedCounts:
                 if key.startswith(PUBLISHED) and number is not None:
                     topics.add(topic := key[len(PUBLISHED):])
                     self._last.setdefault(topic, {})[status.name] = (number, sent_ns)
+                    if topic == DIAGNOSTICS:
+                        self._first.setdefault(status.name, number)
         return topics
+
+    def missed_reports(self):
+        """
+        Return how many reports on /diagnostics came before the first one of their node.
+
+        A report counts itself. None where nobody counts them.
+        """
+        if not self._first:
+            return None
+        return sum(max(number - 1, 0) for number in self._first.values())
 
     def of(self, topic):
         """Return (published, send time of the last report), (None, 0) where nobody reports."""

@@ -333,6 +333,8 @@ class RecorderCore:
         """Hold what arrived against what the nodes say they have published."""
         with self._wake:
             for name, counts in self._counts.items():
+                if name == DIAGNOSTICS:     # many nodes publish there: no sequence numbers
+                    counts.missed_at_start = self._published.missed_reports()
                 published, sent_ns = self._published.of(name)
                 by_then = counts.written if name == DIAGNOSTICS else min(
                     counts.written, self._sent[name].up_to(sent_ns))

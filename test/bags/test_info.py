@@ -167,6 +167,22 @@ def test_messages_before_the_recorder_are_told_from_losses(tmp_path):
     assert said(info, '6 messages were sent before the recorder was connected')
 
 
+def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
+    core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
+    name = '/diagnostics'
+    core.add_topic(name, codecs.TOPIC_TYPES['diagnostics'])
+    for i in range(10):
+        for node, missing in (('driver', (0, 1, 2)), ('plant', (5,))):
+            if i not in missing:
+                status = messages.Status(
+                    START_NS + i, 0, f'/muscle/{node}', 'ok', ((f'published.{name}', str(i + 1)),))
+                core.receive(name, codecs.encode('diagnostics', [status]),
+                             START_NS + i, START_NS + i + 5)
+    summary, info = core.close(), bag_info(tmp_path / 'run').topic(name)
+    for counts in (summary.counts[name], info):
+        assert (counts.lost, counts.missed_at_start) == (1, 3)
+
+
 @pytest.mark.parametrize('short, message, words', [
     ('pressure', messages.Pressure(0, 2.5e5 - 101325.0 - 1.2e5), ('mostly below', 'gauge')),
     ('contraction', messages.Contraction(0, 0.09, 0.0), ('leaves 0 to 75 mm',)),
