@@ -186,14 +186,15 @@ def largest_rise(heard, said):
     stamps, values = stamps[order], values[order]
     if len(values) < 2 * ENDS:
         return math.nan
-    smooth = np.convolve(values, np.ones(ENDS) / ENDS, 'valid')
-    times_s = (stamps[ENDS - 1:] - stamps[0]) * 1e-9
-    steps = round(WINDOW_S / np.median(np.diff(times_s)))
-    if len(smooth) <= steps:
-        return math.nan
-    rise = (smooth[steps:] - smooth[:-steps]) / (times_s[steps:] - times_s[:-steps])
-    begins_ns = stamps[ENDS - 1:][:-steps]
-    ends_ns = stamps[ENDS - 1:][steps:]
+    # Averaged with their stamps: a plant that was late leaves a gap between readings.
+    mean = np.full(ENDS, 1.0 / ENDS)
+    smooth = np.convolve(values, mean, 'valid')
+    times_s = np.convolve((stamps - stamps[0]) * 1e-9, mean, 'valid')
+    to_s = times_s[times_s >= times_s[0] + WINDOW_S]
+    before = np.interp(to_s - WINDOW_S, times_s, smooth)
+    rise = (np.interp(to_s, times_s, smooth) - before) / WINDOW_S
+    ends_ns = stamps[0] + (to_s * 1e9).astype(np.int64)
+    begins_ns = ends_ns - round(WINDOW_S * 1e9)
     largest = math.nan
     for (from_ns, vented), (to_ns, _) in zip(said, [*said[1:], (2 ** 62, True)]):
         if vented:
