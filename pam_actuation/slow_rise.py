@@ -22,7 +22,18 @@ would else be filled by a valve that catches up. It follows the command down at 
 at the rate. It ends only when the muscle was under pressure and the command was met for some
 time. Commands of atmospheric pressure do not count, however many there are, so no order of
 commands leads round it.
+
+It waits for the muscle: it is ahead of the measured pressure by what the valve lags at that
+rate and no more. Somebody else may vent, such as a watchdog or a dump valve; a valve that had
+meanwhile been commanded to the full pressure would then fill at once. A first-order valve
+rises at no more than the rate where the command is ahead by its time constant; what it has
+risen within its dead time tells where it will be after another one. A valve that is slower than
+it is said to be rises more slowly. So that an offset of a regulator does not stop it for good,
+the command goes ahead a little further as long as it has to wait.
 """
+
+from collections import deque
+import math
 
 from pam_sim.units import P_ATM_PA
 
@@ -30,6 +41,8 @@ RISE_PA_PER_S = 500_000.0
 UNTIL_FOLLOWED_S = 1.0
 UNDER_PRESSURE_PA = P_ATM_PA + 20_000.0
 LONGEST_STEP_S = 0.02       # a late tick must not make up for the time it missed
+WHILE_WAITING = 0.01        # share of the rate by which it goes further ahead of the muscle
+WAITS_LONG_S = 1.0          # and from when it does so, and that is worth a word
 
 
 class SlowRise:
@@ -42,6 +55,8 @@ class SlowRise:
         Whether the rise is limited now.
     limiting : bool
         Whether the command of the last tick was above what was allowed.
+    waited_s : float
+        How long, in all, it has waited for the measured pressure [s].
 
     Parameters
     ----------
@@ -51,13 +66,18 @@ class SlowRise:
         How long, in all, a command under pressure must have been met before it ends [s].
     active : bool
         Whether it begins limited; else only with ``begin``.
+    lag_s : float
+        Time constant of the pressure behind a command, with the age of a reading [s].
+    dead_time_s : float
+        Time before the pressure answers at all [s].
 
     """
 
     def __init__(self, rate_pa_per_s=RISE_PA_PER_S, until_followed_s=UNTIL_FOLLOWED_S,
-                 active=True):
+                 active=True, lag_s=math.inf, dead_time_s=0.0):
         self._rate_pa_per_s = rate_pa_per_s
         self._until_followed_s = until_followed_s
+        self._lag_s, self._dead_time_s = lag_s, dead_time_s
         self.begin()
         self.active = active
 
@@ -65,15 +85,18 @@ class SlowRise:
         """Begin anew at atmospheric pressure: the muscle is vented."""
         self.active = True
         self.limiting = False
+        self.waited_s = 0.0
         self._allowed_pa = P_ATM_PA
         self._followed_s = 0.0
+        self._time_s = 0.0
+        self._measured = deque()        # (time [s], pressure) within the dead time
 
     def hold(self):
         """Begin anew where something else than a pressure is commanded."""
         if self.active:
             self.begin()
 
-    def limited(self, command_pa, elapsed_s):
+    def limited(self, command_pa, elapsed_s, measured_pa=math.nan):
         """
         Return the pressure [absolute Pa] that a command may have now.
 
@@ -83,15 +106,34 @@ class SlowRise:
             Wanted absolute pressure.
         elapsed_s : float
             Time since the last tick [s].
+        measured_pa : float
+            Newest measured absolute pressure; NaN where none is known.
 
         """
         if not self.active:
             return command_pa
         elapsed_s = min(elapsed_s, LONGEST_STEP_S)
         reach_pa = self._allowed_pa + self._rate_pa_per_s * elapsed_s
+        nearest_pa = self._near_muscle(measured_pa, elapsed_s)
+        if min(command_pa, reach_pa) > nearest_pa:
+            self.waited_s += elapsed_s
+            reach_pa = nearest_pa
         self.limiting = command_pa > reach_pa
         self._allowed_pa = min(command_pa, reach_pa)
         if not self.limiting and command_pa > UNDER_PRESSURE_PA:
             self._followed_s += elapsed_s
             self.active = self._followed_s < self._until_followed_s
         return self._allowed_pa
+
+    def _near_muscle(self, measured_pa, elapsed_s):
+        """Return the highest pressure that the muscle follows at the rate, inf if not known."""
+        if not math.isfinite(measured_pa):
+            return math.inf
+        self._time_s += elapsed_s
+        self._measured.append((self._time_s, measured_pa))
+        while self._time_s - self._measured[0][0] > self._dead_time_s:
+            self._measured.popleft()
+        risen_pa = min(max(measured_pa - self._measured[0][1], 0.0),
+                       self._rate_pa_per_s * self._dead_time_s)
+        ahead_s = self._lag_s + WHILE_WAITING * max(self.waited_s - WAITS_LONG_S, 0.0)
+        return max(measured_pa, P_ATM_PA) + risen_pa + self._rate_pa_per_s * ahead_s

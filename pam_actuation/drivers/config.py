@@ -72,6 +72,7 @@ _RANGES = {
     'ppr.slew_v_per_s': (0.0, 1e6, 'limit of the input change, 0 = none'),
     'ppr.period_s': (0.001, 0.01, 'time between two signals'),
     'ppr.time_constant_s': (0.001, 10.0, 'lag of the regulator'),
+    'ppr.dead_time_s': (0.0, 1.0, 'time from voltage to pressure'),
     'hsv.period_s': (0.002, 0.01, 'PWM period'),
     'hsv.conductance_m3_per_s_pa': (1e-12, 1e-7, 'sonic conductance of a valve'),
     'hsv.critical_ratio': (0.0, 0.8, 'critical pressure ratio of a valve'),

@@ -56,6 +56,7 @@ def driver_config(rig, changes=(), where='parameter'):
     told = {
         'ppr.gain_pa_per_v': values['K_m'],
         'ppr.time_constant_s': values['T_m'],
+        'ppr.dead_time_s': dead_time_s,
         'hsv.period_s': values['pwm_period_s'],
         'hsv.conductance_m3_per_s_pa': values['C'],
         'hsv.critical_ratio': values['b'],

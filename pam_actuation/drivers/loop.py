@@ -30,6 +30,7 @@ from pam_sim.units import gauge_kpa, P_ATM_PA
 
 _NS = 1_000_000_000
 _MOST_MISSED = 20        # periods the model catches up after a late tick
+_READING_AGE_S = 0.01    # of a pressure, when it is used
 _PPR_MOVE_PA = 20_000.0  # a regulator this far from its command should move
 
 
@@ -59,8 +60,9 @@ class DriverLoop:
         self.config = config
         self.is_hsv = valve_type == 'hsv'
         self._names = VALVE_NAMES[valve_type]
-        self.safety = SafetySupervisor(config.safety, needs_pressure=self.is_hsv)
         self.period_s = config.hsv.period_s if self.is_hsv else config.ppr.period_s
+        lag_s, dead_time_s = self._lag()
+        self.safety = SafetySupervisor(config.safety, self.is_hsv, lag_s, dead_time_s)
         self.rate_hz = 1.0 / self.period_s
         self._new_law().step(P_ATM_PA, *((P_ATM_PA,) if self.is_hsv else ()))
         self.law = self._new_law()
@@ -75,6 +77,12 @@ class DriverLoop:
         self._followed_pa = P_ATM_PA
         self._rate_start = None
         self._rate_measured_hz = math.nan
+
+    def _lag(self):
+        """Return time constant and dead time [s] of the pressure behind a command that rises."""
+        if self.is_hsv:     # the share ``gain`` of the error goes in each period
+            return self.period_s / self.config.hsv.gain, self.config.hsv.dead_time_s
+        return self.config.ppr.time_constant_s + _READING_AGE_S, self.config.ppr.dead_time_s
 
     def _new_law(self):
         return HsvLaw(self.config.hsv) if self.is_hsv else PprLaw(self.config.ppr)

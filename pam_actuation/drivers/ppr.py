@@ -78,7 +78,8 @@ class PprConfig:
     ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is
     ``lowest_v``..``highest_v``; ``slew_v_per_s`` limits the change (0 = no limit);
     ``period_s`` is the time between two steps; ``time_constant_s`` is the regulator's
-    own lag, used only to judge whether a pressure reading should have moved.
+    own lag and ``dead_time_s`` its pure delay, used only to judge whether a pressure reading
+    should have moved, and how far it is behind during the slow rise.
     """
 
     gain_pa_per_v: float = 100_000.0
@@ -87,6 +88,7 @@ class PprConfig:
     slew_v_per_s: float = 0.0
     period_s: float = 0.005
     time_constant_s: float = 0.060
+    dead_time_s: float = 0.030
 
     def par(self):
         """Return the parameter array of ``ppr_step``."""

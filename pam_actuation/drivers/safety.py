@@ -28,7 +28,8 @@ import math
 import re
 
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
-from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNTIL_FOLLOWED_S
+from pam_actuation.slow_rise import (
+    RISE_PA_PER_S, SlowRise, UNTIL_FOLLOWED_S, WAITS_LONG_S)
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 WAITING = 'waiting'
@@ -100,12 +101,14 @@ def _without_figures(fault):
 class SafetySupervisor:
     """Judge commands and measurements at each tick of the driver."""
 
-    def __init__(self, limits=None, needs_pressure=True):
+    def __init__(self, limits=None, needs_pressure=True, lag_s=math.inf, dead_time_s=0.0):
         """
         Start in state waiting.
 
         ``needs_pressure``: True for the HSV, whose loop is blind without a reading;
-        a PPR may run where no pressure was ever measured (with a warning).
+        a PPR may run where no pressure was ever measured (with a warning). ``lag_s`` and
+        ``dead_time_s`` of the pressure behind a command are for the slow rise, which waits
+        for the muscle.
         """
         self.limits = limits or SafetyLimits()
         self.needs_pressure = needs_pressure
@@ -135,7 +138,8 @@ class SafetySupervisor:
         self._warnings = {}
         self._fault = ('no_command', '')
         self._standing = None
-        self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s)
+        self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
+                              lag_s=lag_s, dead_time_s=dead_time_s)
         self._now_ns = None
         self._grace_until_ns = 0
         self._grace_ns = 0
@@ -409,7 +413,7 @@ class SafetySupervisor:
     def _follow(self, now_ns):
         lim = self.limits
         target = min(max(self.command_pa, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
-        target = self._rise.limited(target, self._dt_s)
+        target = self._rise.limited(target, self._dt_s, self.pressure.pressure_pa)
         self._watch_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)
 
@@ -422,7 +426,9 @@ class SafetySupervisor:
         texts = []
         if target is not None and self._rise.limiting:
             texts.append('resuming, pressure rises at no more than '
-                         f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s')
+                         f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s' + (
+                             ' and waits for the measured pressure, which stays behind'
+                             if self._rise.waited_s > WAITS_LONG_S else ''))
         self._warnings = {key: item for key, item in self._warnings.items()
                           if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}
         texts += [text for text, _ in self._warnings.values()]
