@@ -427,7 +427,8 @@ class SafetySupervisor:
         if target is not None and self._rise.limiting:
             texts.append('resuming, pressure rises at no more than '
                          f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s' + (
-                             ' and waits for the measured pressure, which stays behind'
+                             ' and waits for the measured pressure, which stays behind (air '
+                             'supply, another node that vents, gain of the regulator?)'
                              if self._rise.waited_s > WAITS_LONG_S else ''))
         self._warnings = {key: item for key, item in self._warnings.items()
                           if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}

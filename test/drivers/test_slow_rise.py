@@ -17,8 +17,14 @@
 import itertools
 import random
 
+import numpy as np
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.safety import SafetyLimits
-from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA
+from pam_actuation.messages import Pressure, START_NS
+from pam_actuation.plant_loop import PlantLoop
+from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA, WAITS_LONG_S
+from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 import pytest
 from test_safety import Bench
@@ -112,3 +118,74 @@ def test_a_vent_of_the_watchdog_is_a_vent():
     assert decisions[0].pressure_pa <= P_ATM_PA + 0.01 * RISE_PA_PER_S
     assert rises([decision.pressure_pa for decision in decisions]) <= RISE_PA_PER_S * 1.001
     assert 'the watchdog vented' in decisions[-1].message
+
+
+def largest_rise(valve, rig_name, blocked, duration_s=2.5):
+    """
+    Return the largest rise [Pa/s] over 0.2 s and the last pressure [Pa gauge].
+
+    The driver is commanded 300 kPa from 0.3 s on. While ``blocked(time_s)`` somebody else
+    vents the muscle, of whom the driver does not know.
+    """
+    rig = load_rig(rig_name, valve=valve)
+    plant, driver = PlantLoop(rig, seed=1), DriverLoop(valve, driver_config(rig))
+    period_ms, gauge_pa = round(driver.period_s * 1e3), []
+    for ms in range(round(duration_s * 1e3)):
+        now_ns = START_NS + ms * 1_000_000
+        plant.advance_to(now_ns)
+        if ms % 4 == 0:
+            readings = plant.sample(now_ns)
+            driver.on_pressure(readings['pressure'])
+            if 'supply_pressure' in readings:
+                driver.on_supply(readings['supply_pressure'])
+            gauge_pa.append(readings['pressure'].pressure_pa - P_ATM_PA)
+        if ms % 5 == 0 and ms >= 300:
+            driver.on_command(Pressure(now_ns, P_ATM_PA + 300e3))
+        if ms % period_ms == 0:
+            signal = driver.tick(now_ns)[0]
+            plant.set_signal(driver.safe_signal(now_ns) if blocked(ms * 1e-3) else signal)
+    smooth = np.convolve(gauge_pa, np.full(5, 0.2), 'valid')
+    return (smooth[50:] - smooth[:-50]).max() / 0.2, gauge_pa[-1]
+
+
+@pytest.mark.parametrize('rig_name', ['dmsp_5_300_realistic', 'dmsp_20_300_hanging_mass'])
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('from_s, to_s, every', [
+    (0.3, 0.45, 1), (0.3, 0.7, 2), (0.6, 0.8, 1), (0.6, 1.0, 2)])
+def test_nothing_rushes_in_when_somebody_else_has_stopped_venting(
+        valve, rig_name, from_s, to_s, every):
+    """A watchdog that takes the driver for dead vents each time, or in turn with the driver."""
+    def blocked(time_s):
+        return from_s <= time_s < to_s and round(time_s * 100.0) % every == 0
+
+    rise_pa_per_s, last_gauge_pa = largest_rise(valve, rig_name, blocked)
+    assert rise_pa_per_s <= 1.05 * RISE_PA_PER_S
+    assert last_gauge_pa == pytest.approx(300e3, abs=4e3)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_muscle_that_nobody_vents_is_not_waited_for(valve):
+    rise_pa_per_s, _ = largest_rise(valve, 'dmsp_5_300_realistic', lambda time_s: False)
+    assert 0.95 * RISE_PA_PER_S < rise_pa_per_s <= 1.02 * RISE_PA_PER_S
+
+
+@pytest.mark.parametrize('gain, offset_pa', [(0.7, 0.0), (1.0, -60e3), (1.3, 20e3)])
+def test_a_regulator_with_another_gain_or_an_offset_comes_up_all_the_same(gain, offset_pa):
+    rise = SlowRise(lag_s=0.07, dead_time_s=0.03)
+    measured_pa, allowed_pa, steps = P_ATM_PA, P_ATM_PA, 0
+    while allowed_pa < P_ATM_PA + 400e3 and steps < 6000:
+        allowed_pa = rise.limited(P_ATM_PA + 400e3, 0.005, measured_pa)
+        given_pa = max(P_ATM_PA + gain * (allowed_pa - P_ATM_PA) + offset_pa, P_ATM_PA)
+        measured_pa += 0.005 / 0.065 * (given_pa - measured_pa)
+        steps += 1
+    assert steps * 0.005 < 20.0
+    assert (rise.waited_s > WAITS_LONG_S) == (gain < 1.0 or offset_pa < 0.0)
+
+
+def test_a_long_wait_for_the_muscle_is_told():
+    bench = Bench(SafetyLimits())
+    bench.safety._rise = SlowRise(lag_s=0.05)
+    bench.pressure = P_ATM_PA
+    bench.command = P_ATM_PA + 300e3
+    assert 'waits' not in bench.last(300).message
+    assert 'waits for the measured pressure, which stays behind' in bench.last(2000).message

@@ -28,7 +28,7 @@ def test_outputs_are_those_of_the_reference(case):
 def test_pinned_files_are_small():
     assert sum(path.stat().st_size for path in PINNED.iterdir()) < 1_000_000
     assert {path.stem for path in PINNED.glob('*.mcap')} == set(CASES)
-    assert all(bag_of(case).stat().st_size < 200_000 for case in CASES)
+    assert all(bag_of(case).stat().st_size < 225_000 for case in CASES)
 
 
 def reference():
