@@ -20,6 +20,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import time
 
 from pam_actuation.nodes.transport import prepare_middleware
 
@@ -164,13 +165,20 @@ class NodeProcess:
 
 
 def end_all(processes, timeout_s=5.0):
-    """End processes: SIGTERM to all, and SIGKILL to one that has not ended in time."""
+    """
+    End processes: SIGTERM to all, and SIGKILL to those that have not ended in time.
+
+    All have the same time, however many there are.
+    """
+    processes = list(processes)
+    deadline = time.monotonic() + timeout_s
     for process in processes:
         process.send_signal(signal.SIGTERM)
-    for process in processes:
-        if not process.wait(timeout_s):
-            process.send_signal(signal.SIGKILL)
-            process.wait(timeout_s)
+    late = [one for one in processes if not one.wait(max(deadline - time.monotonic(), 0.0))]
+    for process in late:
+        process.send_signal(signal.SIGKILL)
+    for process in late:
+        process.wait(timeout_s)
 
 
 def end_with_parent():
