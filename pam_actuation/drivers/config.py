@@ -52,6 +52,8 @@ def check_valve_type(valve_type, where='valve_type'):
 _RANGES = {
     'command_timeout_s': (0.01, 10.0, 'age of the newest command from which the driver vents'),
     'measurement_timeout_s': (0.01, 10.0, 'age from which a measured pressure is invalid'),
+    'first_pressure_wait_s': (
+        0.0, 60.0, 'how long a regulator is vented until its first measured pressure'),
     'supply_timeout_s': (0.01, 60.0, 'age from which a supply reading is not used'),
     'stamp_ahead_s': (0.0, 1.0, 'how far a stamp may lie in the future'),
     'max_pressure_gauge_pa': (1e3, 1e6, 'pressure limit, gauge: commands are cut to it'),

@@ -101,9 +101,10 @@ FAULT_TABLE = (
           'any fault of this table that vents, while another valve_command than venting is '
           'followed', VENT, True, 'service ~/reset, then the next command'),
     Fault('no_pressure', 'No measured pressure yet',
-          'no valid pressure since start: HSV', VENT, False, 'first valid reading, ' + _RAMP),
+          'no valid pressure since start: HSV; PPR in its first 2 s (first_pressure_wait_s)',
+          VENT, False, 'first valid reading, ' + _RAMP),
     Fault('no_pressure_ppr', 'No measured pressure at all',
-          'no valid pressure since start: PPR', IGNORE, False,
+          'no valid pressure in the first 2 s: PPR', IGNORE, False,
           'warning, over-pressure is not supervised; ends with the first valid reading'),
     Fault('pressure_timeout', 'Measured pressure lost',
           'newest valid pressure older than 0.1 s (sensor lost; or only readings that are '

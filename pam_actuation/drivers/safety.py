@@ -54,6 +54,7 @@ class SafetyLimits:
 
     command_timeout_s: float = 0.1
     measurement_timeout_s: float = 0.1
+    first_pressure_wait_s: float = 2.0
     supply_timeout_s: float = 0.5
     stamp_ahead_s: float = 0.02
     max_pressure_gauge_pa: float = 600_000.0
@@ -106,7 +107,7 @@ class SafetySupervisor:
         Start in state waiting.
 
         ``needs_pressure``: True for the HSV, whose loop is blind without a reading;
-        a PPR may run where no pressure was ever measured (with a warning). ``lag_s`` and
+        a PPR runs, after a wait and with a warning, where none is measured. ``lag_s`` and
         ``dead_time_s`` of the pressure behind a command are for the slow rise, which waits
         for the muscle.
         """
@@ -140,7 +141,7 @@ class SafetySupervisor:
         self._standing = None
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
                               lag_s=lag_s, dead_time_s=dead_time_s)
-        self._now_ns = None
+        self._now_ns = self._first_tick_ns = None
         self._grace_until_ns = 0
         self._grace_ns = 0
 
@@ -231,6 +232,7 @@ class SafetySupervisor:
         last, self._now_ns = self._now_ns, now_ns
         self._dt_s = 0.0 if last is None else max(now_ns - last, 0) / _NS
         if last is None:
+            self._first_tick_ns = now_ns
             return None
         gap_ns = now_ns - last
         pause_ns = self.limits.pause_s * _NS
@@ -336,7 +338,9 @@ class SafetySupervisor:
         lim = self.limits
         channel = self.pressure
         if not self._seen_pressure:
-            if self.needs_pressure:
+            # A sensor that has not been discovered yet is not the same as none.
+            if self.needs_pressure or (
+                    0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * _NS):
                 why = f'; the last one {channel.problem}' if channel.problem else ''
                 return 'no_pressure', 'waiting for the first measured pressure' + why
             self._warn('no_pressure_ppr',

@@ -144,10 +144,12 @@ def test_pressure_lost(bad, word):
 
 
 def test_ppr_may_run_without_a_sensor_but_not_lose_it():
-    """Never measured: warning. Measured and lost: vent."""
+    """Never measured: vented at first, then a warning. Measured and lost: vent."""
     bench = Bench(needs_pressure=False)
     bench.pressure = None
-    decision = bench.last(100)
+    decision = bench.last(1900)
+    assert decision.state == WAITING and decision.fault == 'no_pressure'
+    decision = bench.last(200)
     assert decision.state == OK and 'not supervised' in decision.message
     bench.pressure = P_ATM_PA + 300e3
     bench.run(100)
