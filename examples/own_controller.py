@@ -28,6 +28,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import JointState
 
+DEPTH = 1000      # as the publishers of the rig: behind a shorter one a stopped node may stay late
 PERIOD_S, OLDEST = 0.01, Duration(seconds=0.2)
 LOWEST_PA, HIGHEST_PA = 101_325.0, 651_325.0        # atmosphere, and 550 kPa above it
 INTEGRAL_PA_PER_M_S, PROPORTIONAL_PA_PER_M = 6e7, 1e7
@@ -41,7 +42,7 @@ class OwnController(Node):
         self.newest, self.integral_pa, self.command_pa = {}, LOWEST_PA, LOWEST_PA
         for topic in ('contraction', 'reference'):
             keep = partial(self.newest.__setitem__, topic)
-            self.create_subscription(JointState, topic, keep, 10)
+            self.create_subscription(JointState, topic, keep, DEPTH)
         self.publisher = self.create_publisher(FluidPressure, 'pressure_command', 10)
         self.create_timer(PERIOD_S, self.tick)
 

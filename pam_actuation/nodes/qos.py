@@ -29,7 +29,10 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 PUBLISHER_DEPTH = 1000    # a second of a 1 kHz topic is sent again to a receiver that was busy
-CONSUMER_DEPTH = 10       # consumers use the newest message; old ones are stale anyway
+# Consumers use the newest message, but must hold all that a publisher may send again: Fast DDS
+# delivers in order, and in a shorter history the messages after a lost one left it no place. A
+# node that had been stopped then stayed behind by the whole history of the publisher for good.
+CONSUMER_DEPTH = PUBLISHER_DEPTH
 PHYSICS_DEPTH = 1000      # physics that stood still goes through all signals since, not the last
 RECORDER_DEPTH = 5000     # five seconds of a 1 kHz topic may wait for the recorder
 

@@ -39,7 +39,7 @@ def test_many_verbs_at_work():
 @pytest.mark.slow
 @pytest.mark.ros
 def test_many_nodes_at_work():
-    outcomes, bad = run(40, longest_s=10.0, live=True, start=1000)
+    outcomes, bad = run(40, longest_s=10.0, live=True, jobs=3, start=1000)
     assert bad == []
 
 

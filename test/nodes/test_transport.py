@@ -96,6 +96,14 @@ def test_choice_of_the_user_stays():
     assert profile(**LOCAL, **{TRANSPORTS: 'SHM'}) == (NETWORK, 'SHM', 'LOCALHOST')
 
 
+def test_consumers_can_hold_all_that_is_sent_again():
+    """In a shorter history a lost message found no place, and the topic stayed seconds late."""
+    pytest.importorskip('rclpy')
+    from pam_actuation.nodes import qos
+    for consumer in (qos.CONSUMER, qos.PHYSICS, qos.RECORDER):
+        assert consumer.depth >= qos.PUBLISHER.depth
+
+
 @pytest.mark.ros
 def test_participants_open_no_shared_memory_beside_one_that_does(tmp_path):
     pytest.importorskip('rclpy')
