@@ -14,7 +14,9 @@
 
 """Work in processes of joblib that Ctrl-C does not reach: who started them ends them."""
 
+from contextlib import contextmanager
 from multiprocessing import resource_tracker as standard_tracker
+import sys
 
 import joblib
 from joblib.externals.loky.backend import resource_tracker
@@ -34,7 +36,23 @@ def in_processes(jobs, calls):
 
     """
     # The start of a tracker lets signals through again, in the middle of those of the workers.
-    for tracker in (resource_tracker, standard_tracker):
-        tracker.ensure_running()
+    with _silent_trackers():
+        for tracker in (resource_tracker, standard_tracker):
+            tracker.ensure_running()
     with kept_from_children():
         return joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)
+
+
+@contextmanager
+def _silent_trackers():
+    """
+    Let trackers that are started meanwhile give no warnings.
+
+    After Ctrl-C they and this process tidy up at the same time; who comes second finds nothing
+    and would say so, below the one line that the user is told.
+    """
+    sys.warnoptions.append('ignore:resource_tracker')       # handed on to the trackers
+    try:
+        yield
+    finally:
+        sys.warnoptions.remove('ignore:resource_tracker')

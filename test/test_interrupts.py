@@ -136,3 +136,13 @@ def test_processes_of_joblib_do_not_hear_ctrl_c(tmp_path):
         'import asks, joblib; from pam_actuation.parallel import in_processes\n'
         'print(*in_processes(2, (joblib.delayed(asks.blocked)(k) for k in range(4))))', tmp_path)
     assert (code, output, errors) == (0, ['True True True True'], '')
+
+
+def test_trackers_of_joblib_do_not_warn_of_what_is_tidied_up_already(tmp_path):
+    code, output, errors = run(
+        'import joblib\nfrom pathlib import Path\n'
+        'from joblib.externals.loky.backend import resource_tracker\n'
+        'from pam_actuation.parallel import in_processes\n'
+        'list(in_processes(2, (joblib.delayed(abs)(k) for k in range(4))))\n'
+        'resource_tracker.register("/nowhere/at/all", "folder")\n', tmp_path)
+    assert (code, output, errors) == (0, [], '')

@@ -40,7 +40,7 @@ segments:
   - sine: {center_m: 0.010, amplitude_m: 0.005, frequency_hz: 0.5, cycles: 7}
 """
 LONG = 'name: long\ndomain: pressure\nsegments:\n  - rest: {duration_s: 900.0}\n'
-PINNED = Path(__file__).resolve().parents[1] / 'replay' / 'pinned' / 'sofc_ppr.mcap'
+OLDER = Path(__file__).resolve().parents[1] / 'replay' / 'older' / 'pid_ppr.mcap'
 
 
 @pytest.fixture(scope='module')
@@ -138,8 +138,8 @@ def test_a_run_to_its_end_says_that(tmp_path):
 
 
 def test_a_bag_of_before_is_read_and_its_length_is_not_known():
-    assert ending_of(load_run(PINNED).metadata) == Ending()
-    info = bag_info(PINNED)
+    assert ending_of(load_run(OLDER).metadata) == Ending()
+    info = bag_info(OLDER)
     assert 'Length planned: not recorded.' in render_text(info)
     assert not info.ending.early and info.complete is not False
 

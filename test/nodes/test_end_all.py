@@ -15,24 +15,32 @@
 """Test how long nodes that do not end may hold up those who end them."""
 
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.rigging.processes import (                               # noqa: E402, I100
-    end_all, node_environment, NodeProcess)
+from pam_actuation.rigging.processes import end_all, NodeProcess            # noqa: E402, I100
+
+DEAF = 'import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); ' \
+    'print(flush=True); time.sleep(60)'
 
 
-def test_nodes_that_do_not_end_share_the_time_they_are_given(tmp_path):
-    """Nodes that compile hear no signal: five of them held up Ctrl-C five times as long."""
-    environment = node_environment(0, tmp_path)
-    nodes = [NodeProcess('reference_generator', '/muscle', {}, environment, tmp_path)
-             for _ in range(4)]
-    for node in nodes:
-        node.send_signal(signal.SIGSTOP)
+class DeafNode(NodeProcess):
+    """A process that hears no SIGTERM, as a node does while it compiles."""
+
+    def __init__(self):
+        self._process = subprocess.Popen(
+            [sys.executable, '-c', DEAF], stdout=subprocess.PIPE, text=True)
+        self._process.stdout.readline()
+
+
+def test_nodes_that_do_not_end_share_the_time_they_are_given():
+    nodes = [DeafNode() for _ in range(4)]
     begin = time.monotonic()
     end_all(nodes, timeout_s=1.5)
-    assert 1.5 <= time.monotonic() - begin < 4.5
-    assert all(node.exit_code < 0 for node in nodes)
+    assert 1.5 <= time.monotonic() - begin < 4.5        # one after the other: 6 s
+    assert [node.exit_code for node in nodes] == [-signal.SIGKILL] * 4
