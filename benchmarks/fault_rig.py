@@ -153,6 +153,17 @@ class FaultRig:
                 return True
         return False
 
+    def what_nodes_say(self):
+        """Return, for each node, whether its process runs and its newest status as text."""
+        now_ns = time.time_ns()
+        said = {}
+        for name, process in self.processes.items():
+            one = self.witness.last.get(name)
+            text = 'nothing' if one is None else (
+                f'{one.message} ({(now_ns - one.stamp_ns) * 1e-9:.1f} s ago)')
+            said[name] = text if process.running else f'{text}; its process has ended'
+        return said
+
     def _sound(self, since_ns):
         for name in self.processes:
             words = SOUND[name]

@@ -266,6 +266,8 @@ def play(rig, case, rng):
         'highest_gauge_pa': witness.highest_gauge_pa()}
     if with_controller:
         outcome['restarted'] = rig.wait_until_sound(RESTART_S)
+        if not outcome['restarted']:
+            outcome['said'] = rig.what_nodes_say()
     return outcome
 
 
@@ -357,8 +359,7 @@ class Series:
                 rig.command(P_ATM_PA, 0.5)
             rig.command(P_ATM_PA, 3.0)
         elif not rig.wait_until_sound(START_S):
-            said = {name: one.message for name, one in rig.witness.last.items()}
-            raise RuntimeError(f'the rig did not come up: {said}')
+            raise RuntimeError(f'the rig did not come up: {rig.what_nodes_say()}')
         rig.witness.listen(3.0)
 
 

@@ -30,6 +30,7 @@ from pathlib import Path
 import types
 
 from numba import njit
+import numpy as np
 
 compiled = njit(error_model='numpy', nogil=True, _nrt=False)
 inlined = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)
@@ -53,7 +54,8 @@ def sources(*parts):
     files : list of pathlib.Path
         Every file with a function reached from ``parts``, in order.
     constants : list of str
-        ``name = value`` of the numbers these functions take from elsewhere, in order.
+        ``name = value`` of the numbers and records these functions take from elsewhere, in
+        order.
 
     """
     files, constants, seen = set(), set(), set()
@@ -72,7 +74,7 @@ def sources(*parts):
         for name, value in {**found.globals, **found.nonlocals}.items():
             if _is_compiled(value):
                 waiting.append(value)
-            elif isinstance(value, (bool, int, float, str)):
+            elif isinstance(value, (bool, int, float, str, np.dtype)):
                 constants.add(f'{name} = {value!r}')
             elif isinstance(value, types.ModuleType) and value.__name__.startswith('pam_'):
                 files.add(Path(value.__file__))
