@@ -21,6 +21,8 @@ once, ``par.view(PARAMETERS)[0]``, and read ``par.supply_pa`` from there on. Pyt
 same with ``fields``. An inserted field moves its neighbours in memory and nowhere else.
 """
 
+import types
+
 import numpy as np
 
 
@@ -62,11 +64,33 @@ def zeros(dtype):
 
 def fields(array, dtype):
     """
-    Return an array seen as a record: ``fields(out, OUTPUT).pressure_pa`` reads and writes it.
+    Look at an array through a record; both share their memory.
 
-    What an array holds beyond the record is left out.
+    ``fields(out, OUTPUT).pressure_pa`` reads and writes a number of ``out``. What an array
+    holds beyond the record is left out.
     """
     return array[:size_of(dtype)].view(dtype)[0]
+
+
+def cells(array, dtype):
+    """
+    Return a namespace with one 0-d array for each number of a record, sharing its memory.
+
+    ``cells(out, OUTPUT).pressure_pa.item()`` reads and ``[...] =`` writes a number as fast as
+    an index does, for loops in Python; made once, beside the array. An array within the record
+    is an array, a record within it a namespace.
+    """
+    seen = types.SimpleNamespace()
+    for name in dtype.names:
+        inner, offset = dtype.fields[name][:2]
+        begin = offset // np.dtype(np.float64).itemsize
+        part = array[begin:begin + size_of(inner)]
+        if inner.names:
+            part = cells(part, inner)
+        elif not inner.shape:
+            part = part.reshape(())
+        setattr(seen, name, part)
+    return seen
 
 
 def columns(rows, dtype):

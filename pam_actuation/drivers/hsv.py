@@ -20,14 +20,13 @@ what the law knows of valves, line and muscle. The figures are data-sheet values
 rig, not measured ones: the law learns flow gain and drift while it runs.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 import math
 
-import numpy as np
-
-from pam_actuation.drivers import hsv_kernel as kernel
-from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step
+from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step, OUTPUT
+from pam_actuation.drivers.hsv_model import PARAMETERS, SENT_SIZE, STATE
 from pam_sim.errors import InputError
+from pam_sim.records import cells, fields, values_of, zeros
 from pam_sim.units import P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K
 
 _SPAN_PA = 600_000.0
@@ -91,63 +90,44 @@ class HsvConfig:
             If the dead time is longer than the law can remember.
 
         """
-        longest_s = (kernel.SENT_SIZE - 2) * self.period_s
+        longest_s = (SENT_SIZE - 2) * self.period_s
         if not 0.0 <= self.dead_time_s < longest_s:
             raise InputError(f'dead time of {self.dead_time_s} s, allowed are 0 to below '
                              f'{longest_s:.2f} s', 'dead_time_s')
-        par = np.zeros(kernel.PAR_SIZE)
-        par[kernel.P_PERIOD] = self.period_s
-        par[kernel.P_DELAY] = round(self.dead_time_s / self.period_s, 9)
-        par[kernel.P_DELAY_RANGE] = self.dead_time_range_s / self.period_s
-        par[kernel.P_LEARN_DELAY] = self.learn_dead_time
-        par[kernel.P_CONDUCTANCE] = (
-            self.conductance_m3_per_s_pa * RHO_REFERENCE
-            * math.sqrt(T_REFERENCE_K / TEMPERATURE_K))
-        par[kernel.P_CRITICAL_RATIO] = self.critical_ratio
-        par[kernel.P_SUPPLY] = self.supply_pa
-        par[kernel.P_VOLUME] = self.volume_m3
         span_pa = _SPAN_PA - self.lift_off_gauge_pa
         rise_m3 = self.volume_at_600kpa_m3 - self.volume_m3
-        par[kernel.P_VOLUME_KNEE] = self.lift_off_gauge_pa
-        par[kernel.P_VOLUME_SLOPE] = self.volume_slope_m3_per_pa
-        par[kernel.P_VOLUME_CURVE] = (
-            rise_m3 - self.volume_slope_m3_per_pa * span_pa) / span_pa ** 2
         turn = 2.0 * math.pi * self.period_s
-        par[kernel.P_SWING] = turn * self.swing_hz
-        par[kernel.P_SWING_LOWEST] = turn * self.swing_lowest_hz
         swing_span_pa = max(self.swing_lowest_gauge_pa - self.lift_off_gauge_pa, 1.0)
-        par[kernel.P_SWING_SLOPE] = turn * (
-            self.swing_lowest_hz - self.swing_hz) / swing_span_pa
-        par[kernel.P_DAMPING] = self.swing_damping
-        par[kernel.P_OPEN] = self.open_time_s / self.period_s
-        par[kernel.P_CLOSE] = self.close_time_s / self.period_s
-        par[kernel.P_PULSE_MARGIN] = self.pulse_margin_s / self.period_s
-        par[kernel.P_GAIN] = self.gain
-        par[kernel.P_BAND] = self.band_pa
-        par[kernel.P_REST] = self.rest_share
-        par[kernel.P_FINE_BAND] = self.fine_band_pa
-        par[kernel.P_LOOK_AHEAD] = self.look_ahead_periods
-        par[kernel.P_CORRECT] = self.correct
-        par[kernel.P_CORRECT_VOLUME] = self.correct_volume
-        par[kernel.P_CORRECT_RATE] = self.correct_rate
-        par[kernel.P_LEARN_DRIFT] = self.learn_drift
-        par[kernel.P_LEARN_GAIN] = self.learn_gain
-        par[kernel.P_FLOW_SCALE] = self.flow_scale_pa
-        par[kernel.P_GAIN_LIMIT] = self.gain_limit
-        par[kernel.P_DRIFT_LIMIT] = self.drift_limit_pa_per_s * self.period_s
-        par[kernel.P_SUPPLY_MARGIN] = self.supply_margin_pa
-        par[kernel.P_SLOPE] = self.slope_share
-        return par
+        given = asdict(self)
+        derived = {
+            'dead_time_periods': round(self.dead_time_s / self.period_s, 9),
+            'dead_time_range_periods': self.dead_time_range_s / self.period_s,
+            'conductance_kg_per_s_pa': (
+                self.conductance_m3_per_s_pa * RHO_REFERENCE
+                * math.sqrt(T_REFERENCE_K / TEMPERATURE_K)),
+            'volume_curve_m3_per_pa2': (
+                rise_m3 - self.volume_slope_m3_per_pa * span_pa) / span_pa ** 2,
+            'swing_rad_per_period': turn * self.swing_hz,
+            'swing_lowest_rad_per_period': turn * self.swing_lowest_hz,
+            'swing_slope_rad_per_period_pa': turn * (
+                self.swing_lowest_hz - self.swing_hz) / swing_span_pa,
+            'open_part': self.open_time_s / self.period_s,
+            'close_part': self.close_time_s / self.period_s,
+            'pulse_margin_part': self.pulse_margin_s / self.period_s,
+            'drift_limit_pa_per_period': self.drift_limit_pa_per_s * self.period_s}
+        same = {name: given[name] for name in PARAMETERS.names if name in given}
+        return values_of(PARAMETERS, {**same, **derived})
 
 
 def initial_state():
     """Return the state array of ``hsv_step`` before the first measurement."""
-    state = np.zeros(kernel.STATE_SIZE)
-    state[kernel.S_MODEL] = P_ATM_PA
-    state[kernel.S_VOLUME] = 1.0
-    state[kernel.S_FILL_GAIN] = 1.0
-    state[kernel.S_VENT_GAIN] = 1.0
-    state[kernel.S_COMMAND] = math.nan
+    state = zeros(STATE)
+    start = fields(state, STATE)
+    start.model_pa = P_ATM_PA
+    start.volume_m3 = 1.0
+    start.fill_gain = 1.0
+    start.vent_gain = 1.0
+    start.command_pa = math.nan
     return state
 
 
@@ -159,7 +139,10 @@ class HsvLaw:
         self.config = config or HsvConfig()
         self.par = self.config.par()
         self.state = initial_state()
-        self.out = np.zeros(kernel.OUT_SIZE)
+        self.out = zeros(OUTPUT)
+        self._par = cells(self.par, PARAMETERS)
+        self._state = cells(self.state, STATE)
+        self._out = cells(self.out, OUTPUT)
         # Compiled before time counts: the first vent of a live driver must not wait for it.
         spare = initial_state()
         hsv_step(spare, self.par, P_ATM_PA, P_ATM_PA, math.nan, self.out)
@@ -173,38 +156,39 @@ class HsvLaw:
         Pressures absolute [Pa]; ``p_meas_pa`` NaN = no new measurement, ``supply_pa``
         NaN = nominal; ``age_s`` is the age of the measurement.
         """
-        self.state[kernel.S_AGE] = age_s
+        self._state.age_s[...] = age_s
         hsv_step(self.state, self.par, p_cmd_pa, p_meas_pa, supply_pa, self.out)
-        return self.out[kernel.O_FILL], self.out[kernel.O_VENT]
+        return self._out.fill_duty.item(), self._out.vent_duty.item()
 
     def hold(self, fill_duty, vent_duty, p_meas_pa=math.nan, supply_pa=math.nan, age_s=0.0):
         """Note a period in which these duties were sent whatever the law says."""
-        self.state[kernel.S_AGE] = age_s
+        self._state.age_s[...] = age_s
         hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
-        self.out[kernel.O_SATURATED] = 0.0
+        self._out.saturated[...] = 0.0
 
     def lasted(self, periods):
         """Tell how long [PWM periods] the newest opening was held before the next tick came."""
-        self.state[kernel.S_SENT] *= periods
-        self.state[kernel.S_THROUGH] *= periods
+        self._state.sent[0] *= periods
+        self._state.through_pa[0] *= periods
 
     @property
     def saturated(self):
         """Return -1, 0 or +1: vent fully open, free, fill fully open."""
-        return int(self.out[kernel.O_SATURATED])
+        return int(self._out.saturated.item())
 
     @property
     def predicted_pa(self):
         """Return the pressure [Pa] predicted for when the newest opening begins to act."""
-        return self.out[kernel.O_PREDICTED]
+        return self._out.predicted_pa.item()
 
     @property
     def dead_time_s(self):
         """Return the dead time [s] as learned so far."""
-        periods = self.par[kernel.P_DELAY] + self.state[kernel.S_DELAY_SHIFT]
+        periods = (self._par.dead_time_periods.item()
+                   + self._state.dead_time_shift_periods.item())
         return max(periods, 0.0) * self.config.period_s
 
     @property
     def flow_pa(self):
         """Return the pressure change [Pa] the valves made in the last period (model)."""
-        return self.state[kernel.S_FLOW]
+        return self._state.flow_pa.item()

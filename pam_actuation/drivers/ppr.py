@@ -19,24 +19,48 @@ The regulator closes its own pressure loop (static gain ``K_m`` of 100 kPa/V in 
 nominal rig), so the law is its static inverse, clipped to the input range and
 optionally limited in slew. ``ppr_step`` is the compiled form; it shares its
 signature with ``hsv_step`` so that a closed-loop rollout can hold either.
-
-Array layout: ``par`` (``PPR_PAR_SIZE``) volts per pascal gauge, lowest volts,
-highest volts, largest change per step [V] (infinite = free); ``state``
-(``PPR_STATE_SIZE``) last volts, 1 once a step was made; ``out``
-(``PPR_OUT_SIZE``) volts, saturation (-1 low, 0, +1 high), 1 if the slew limit acted.
 """
 
 from dataclasses import dataclass
 import math
 
 import numba
-import numpy as np
-
+from pam_sim.records import cells, record, values_of, zeros
 from pam_sim.units import P_ATM_PA
 
-PPR_PAR_SIZE = 4
-PPR_STATE_SIZE = 2
-PPR_OUT_SIZE = 3
+PARAMETERS = record(
+    'v_per_pa',             # volts per pascal gauge
+    'lowest_v',
+    'highest_v',
+    'largest_change_v',     # in a step, infinite = free
+)
+STATE = record(
+    'sent_v',
+    'known',                # 1 once a step was made
+)
+OUTPUT = record(
+    'signal_v',
+    'saturated',            # -1 at the lowest volts, 0, +1 at the highest
+    'slew_limited',         # 1 if the slew limit acted
+)
+
+
+@numba.njit
+def _step(state, par, p_cmd_pa, out):
+    wanted = (p_cmd_pa - P_ATM_PA) * par.v_per_pa
+    volts = min(max(wanted, par.lowest_v), par.highest_v)
+    out.saturated = 0.0
+    if wanted > par.highest_v:
+        out.saturated = 1.0
+    elif wanted < par.lowest_v:
+        out.saturated = -1.0
+    out.slew_limited = 0.0
+    if state.known > 0.5 and abs(volts - state.sent_v) > par.largest_change_v:
+        volts = state.sent_v + math.copysign(par.largest_change_v, volts - state.sent_v)
+        out.slew_limited = 1.0
+    state.sent_v = volts
+    state.known = 1.0
+    out.signal_v = volts
 
 
 @numba.njit(cache=True)
@@ -47,27 +71,14 @@ def ppr_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
     Parameters
     ----------
     state, par, out : float64 arrays
-        As laid out in the module docstring; ``state`` and ``out`` are written.
+        ``STATE``, ``PARAMETERS`` and ``OUTPUT``; ``state`` and ``out`` are written.
     p_cmd_pa : float
         Wanted absolute pressure [Pa].
     p_meas_pa, supply_pa : float
         Not used: the regulator measures for itself. Present for the common signature.
 
     """
-    wanted = (p_cmd_pa - P_ATM_PA) * par[0]
-    volts = min(max(wanted, par[1]), par[2])
-    out[1] = 0.0
-    if wanted > par[2]:
-        out[1] = 1.0
-    elif wanted < par[1]:
-        out[1] = -1.0
-    out[2] = 0.0
-    if state[1] > 0.5 and abs(volts - state[0]) > par[3]:
-        volts = state[0] + math.copysign(par[3], volts - state[0])
-        out[2] = 1.0
-    state[0] = volts
-    state[1] = 1.0
-    out[0] = volts
+    _step(state.view(STATE)[0], par.view(PARAMETERS)[0], p_cmd_pa, out.view(OUTPUT)[0])
 
 
 @dataclass(frozen=True)
@@ -93,7 +104,9 @@ class PprConfig:
     def par(self):
         """Return the parameter array of ``ppr_step``."""
         slew = self.slew_v_per_s * self.period_s if self.slew_v_per_s > 0.0 else math.inf
-        return np.array([1.0 / self.gain_pa_per_v, self.lowest_v, self.highest_v, slew])
+        return values_of(PARAMETERS, {
+            'v_per_pa': 1.0 / self.gain_pa_per_v, 'lowest_v': self.lowest_v,
+            'highest_v': self.highest_v, 'largest_change_v': slew})
 
 
 class PprLaw:
@@ -103,8 +116,11 @@ class PprLaw:
         """Start at an unknown voltage, so that the first step is free of the slew limit."""
         self.config = config or PprConfig()
         self.par = self.config.par()
-        self.state = np.zeros(PPR_STATE_SIZE)
-        self.out = np.zeros(PPR_OUT_SIZE)
+        self.state = zeros(STATE)
+        self.out = zeros(OUTPUT)
+        self._par = cells(self.par, PARAMETERS)
+        self._state = cells(self.state, STATE)
+        self._out = cells(self.out, OUTPUT)
 
     def step(self, p_cmd_pa, dt_s=None):
         """
@@ -113,17 +129,18 @@ class PprLaw:
         ``dt_s`` is the time since the last step where it is not the configured period.
         """
         if dt_s is not None and self.config.slew_v_per_s > 0.0:
-            self.par[3] = self.config.slew_v_per_s * dt_s
+            self._par.largest_change_v[...] = self.config.slew_v_per_s * dt_s
         ppr_step(self.state, self.par, p_cmd_pa, math.nan, math.nan, self.out)
-        return self.out[0]
+        return self._out.signal_v.item()
 
     def force(self, volts):
         """Note that ``volts`` were sent whatever the law says (venting)."""
-        self.state[0] = volts
-        self.state[1] = 1.0
-        self.out[:] = (volts, 0.0, 0.0)
+        self._state.sent_v[...] = volts
+        self._state.known[...] = 1.0
+        self.out[:] = 0.0
+        self._out.signal_v[...] = volts
 
     @property
     def saturated(self):
         """Return -1, 0 or +1: at the lower limit, free, at the upper limit."""
-        return int(self.out[1])
+        return int(self._out.saturated.item())

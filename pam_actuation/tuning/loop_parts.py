@@ -16,7 +16,8 @@
 
 import numpy as np
 from pam_actuation.control import inputs as place
-from pam_actuation.drivers.hsv_kernel import hsv_step, S_AGE
+from pam_actuation.drivers import hsv_kernel, hsv_model, ppr
+from pam_actuation.drivers.hsv_kernel import hsv_step
 from pam_actuation.drivers.ppr import ppr_step
 from pam_sim.compiled import compiled
 
@@ -75,8 +76,9 @@ def drive(driver, hsv, command_pa, measured_pa, supply_pa=np.nan):
     """
     state, par, out = driver
     if hsv:
-        state[S_AGE] = 0.0
+        state.view(hsv_model.STATE)[0].age_s = 0.0
         hsv_step(state, par, command_pa, measured_pa, supply_pa, out)
-        return out[0], out[1]
+        duties = out.view(hsv_kernel.OUTPUT)[0]
+        return duties.fill_duty, duties.vent_duty
     ppr_step(state, par, command_pa, measured_pa, np.nan, out)
-    return out[0], 0.0
+    return out.view(ppr.OUTPUT)[0].signal_v, 0.0

@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.hsv import initial_state
 from pam_sim.errors import InputError
+from pam_sim.records import zeros
 
 PHYSICS_S = 0.001
 _MAX_LEAD_S = 0.5
@@ -92,5 +93,5 @@ class DriverLaw:
     def fresh(self):
         """Return new state, par, out."""
         if self.hsv:
-            return initial_state(), self._hsv_config.par(), np.zeros(hsv_kernel.OUT_SIZE)
-        return np.zeros(ppr.PPR_STATE_SIZE), self._ppr_config.par(), np.zeros(ppr.PPR_OUT_SIZE)
+            return initial_state(), self._hsv_config.par(), zeros(hsv_kernel.OUTPUT)
+        return zeros(ppr.STATE), self._ppr_config.par(), zeros(ppr.OUTPUT)

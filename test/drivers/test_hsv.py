@@ -23,11 +23,13 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvConfig, HsvLaw, initial_state
 import pam_sim
 from pam_sim.errors import InputError
+from pam_sim.records import size_of
 from pam_sim.rollout.kernel import step as plant_step
 from pam_sim.units import P_ATM_PA
 import pytest
 
 NOISE_PA = 300.0
+_LAW_OUT_SIZE = size_of(kernel.OUTPUT)
 
 
 @pytest.fixture(scope='module')
@@ -230,12 +232,12 @@ def test_missing_measurements(rig):
 def _closed_loop(state, par, law_state, law_par, periods, command_pa, pressures):
     inp = np.zeros(4)
     out = np.zeros(13)
-    law_out = np.zeros(kernel.OUT_SIZE)
+    law_out = np.zeros(_LAW_OUT_SIZE)
     pressure = 101325.0
     for k in range(periods):
         kernel.hsv_step(law_state, law_par, command_pa, pressure, np.nan, law_out)
-        inp[0] = law_out[0]
-        inp[1] = law_out[1]
+        inp[0] = law_out.view(kernel.OUTPUT)[0].fill_duty
+        inp[1] = law_out.view(kernel.OUTPUT)[0].vent_duty
         for _ in range(10):
             plant_step(state, par, inp, out)
         pressure = out[1]

@@ -17,7 +17,8 @@
 import math
 
 import numpy as np
-from pam_actuation.drivers.ppr import PPR_OUT_SIZE, PPR_STATE_SIZE, ppr_step, PprConfig, PprLaw
+from pam_actuation.drivers.ppr import OUTPUT, ppr_step, PprConfig, PprLaw, STATE
+from pam_sim.records import fields, zeros
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -63,8 +64,8 @@ def test_forced_signal_is_where_the_slew_limit_starts():
 def test_compiled_step_is_the_law():
     """The compiled function gives the object's numbers to the bit."""
     config = PprConfig(slew_v_per_s=100.0)
-    law, state, out = PprLaw(config), np.zeros(PPR_STATE_SIZE), np.zeros(PPR_OUT_SIZE)
+    law, state, out = PprLaw(config), zeros(STATE), zeros(OUTPUT)
     for k in range(50):
         command = P_ATM_PA + 3e5 * math.sin(0.3 * k)
         ppr_step(state, config.par(), command, math.nan, math.nan, out)
-        assert law.step(command) == out[0]
+        assert law.step(command) == fields(out, OUTPUT).signal_v

@@ -1,0 +1,277 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Model of muscle and valves behind the HSV pressure loop: advance, observe, predict.
+
+An isothermal chamber, ISO 6358 valves and a volume that rises with pressure, run on the
+openings that have reached the muscle and corrected by the measured pressure. What it misses
+is learned slowly: a gain of either flow, a drift (leak, moving volume), the dead time, and
+what a pair of pulses fills too much.
+
+Source: ISO 6358 (flow).
+"""
+
+import math
+
+from pam_sim.compiled import compiled
+from pam_sim.records import record
+from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
+from pam_sim.valve.flow import mass_flow_kg_per_s
+
+SENT_SIZE = 32                        # periods a command may be under way
+_DELAY_MEAN = 0.3       # of the running mean of what a wrong dead time does, per period
+_LEARN_PAIR = 0.06      # of a pair's error taken over, per period
+_PAIR_LIMIT = 0.5
+
+# A period is one of the PWM, a part is a part of a period.
+PARAMETERS = record(
+    'period_s',
+    'dead_time_periods',              # as told
+    'dead_time_range_periods',        # the learned dead time stays within +- this of it
+    # Valves and supply.
+    'conductance_kg_per_s_pa',        # C rho0 sqrt(T0/T)
+    'critical_ratio',
+    'supply_pa',                      # nominal, absolute
+    'supply_margin_pa',               # the target stays this far below the supply
+    'open_part',                      # opening time
+    'close_part',                     # closing time
+    'pulse_margin_part',              # shortest pulse beyond the opening time
+    # Volume of the muscle, dead volume included.
+    'volume_m3',                      # at atmospheric pressure
+    'volume_slope_m3_per_pa',         # dV/dp where the load lifts off
+    'volume_curve_m3_per_pa2',        # half of d2V/dp2
+    'lift_off_gauge_pa',              # gauge pressure where the load lifts off
+    # Load on the muscle.
+    'swing_rad_per_period',           # natural frequency at lift-off
+    'swing_slope_rad_per_period_pa',  # its change with pressure
+    'swing_lowest_rad_per_period',    # its lowest value
+    'swing_damping',                  # damping ratio
+    # Choice of the pulse.
+    'gain',                           # share of the predicted error removed per period
+    'slope_share',                    # share of the command's slope fed forward
+    'look_ahead_periods',             # the error is looked ahead so far without the valves
+    'band_pa',                        # set-point band: the valves start beyond this error
+    'fine_band_pa',                   # they rest within this one, 0 = no pairs of pulses
+    'rest_share',                     # errors below this share of the shortest pulse rest
+    # Observer, per period: corrections and learning.
+    'correct',                        # of the pressure
+    'correct_volume',                 # of the volume, in pressure
+    'correct_rate',                   # of the volume's rate, in pressure
+    'learn_drift',
+    'learn_gain',                     # of the flows
+    'learn_dead_time',
+    'flow_scale_pa',                  # change per period from which errors are gain errors
+    'gain_limit',                     # flow gains stay within 1/limit..limit
+    'drift_limit_pa_per_period',      # drift stays within +- this
+)
+STATE = record(
+    'started',                        # 1 after the first measurement
+    'age_s',                          # of the measurement, set by the caller
+    'command_pa',                     # former command, NaN = none
+    'command_change_pa',              # its former change in a period
+    'at_work',                        # 1 from an error beyond the band to one within the fine
+    # Model of the air and the load.
+    'model_pa',                       # pressure now
+    'flow_pa',                        # pressure change by the valves in the last period
+    'volume_m3',
+    'volume_change_m3',               # in a period
+    # Learned.
+    'drift_pa_per_period',
+    'fill_gain',                      # of the flows
+    'vent_gain',
+    'dead_time_shift_periods',        # dead time less the one told of
+    'dead_time_effect_pa',            # what a period less of it would have added to the reading
+    'dead_time_effect_mean_pa',       # its running mean
+    'pair_gain',                      # what a pair fills too much, share of its flow
+    # Of the last periods, newest first.
+    ('sent', SENT_SIZE),              # openings under way, fill > 0, vent < 0
+    ('through_pa', SENT_SIZE),        # air through both valves
+)
+
+
+@compiled
+def full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
+    """Return the pressure change [Pa] in one period with one valve fully open."""
+    if filling:
+        flow = mass_flow_kg_per_s(
+            supply_pa, p_pa, par.conductance_kg_per_s_pa, par.critical_ratio)
+        flow *= state.fill_gain
+    else:
+        flow = -mass_flow_kg_per_s(
+            p_pa, P_ATM_PA, par.conductance_kg_per_s_pa, par.critical_ratio)
+        flow *= state.vent_gain
+    return GAS_CONSTANT_AIR * TEMPERATURE_K * flow * par.period_s / volume_m3
+
+
+@compiled
+def _volume_pull(par, p_pa, volume_m3, rate_m3):
+    """
+    Return the volume's acceleration [m^3 per period^2].
+
+    The load swings about the volume that belongs to the pressure.
+    """
+    above = max(p_pa - P_ATM_PA - par.lift_off_gauge_pa, 0.0)
+    rest = par.volume_m3 + above * (
+        par.volume_slope_m3_per_pa + above * par.volume_curve_m3_per_pa2)
+    omega = max(par.swing_rad_per_period + above * par.swing_slope_rad_per_period_pa,
+                par.swing_lowest_rad_per_period)
+    return omega * (omega * (rest - volume_m3) - 2.0 * par.swing_damping * rate_m3)
+
+
+@compiled
+def advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
+    """
+    Bring the model forward by a part of a period with a constant opening.
+
+    Returns pressure [Pa], volume [m^3], its rate [m^3 per period] and the pressure
+    change made by the valves [Pa].
+    """
+    flow_pa = 0.0
+    substep = 0.5 * periods
+    if substep <= 0.0:
+        return p_pa, volume_m3, rate_m3, flow_pa
+    for _ in range(2):
+        rate_m3 += substep * _volume_pull(par, p_pa, volume_m3, rate_m3)
+        volume_m3 += substep * rate_m3
+        if volume_m3 < par.volume_m3:      # the load rests on its lower stop
+            volume_m3 = par.volume_m3
+            rate_m3 = max(rate_m3, 0.0)
+        change = 0.0
+        if opening != 0.0:
+            filling = opening > 0.0
+            size = abs(opening) * substep
+            half = p_pa + 0.5 * size * full_rate(state, par, p_pa, volume_m3, supply_pa, filling)
+            half = min(max(half, P_ATM_PA), max(supply_pa, p_pa))
+            change = size * full_rate(state, par, half, volume_m3, supply_pa, filling)
+        flow_pa += change
+        after = p_pa + change + substep * (state.drift_pa_per_period - p_pa * rate_m3 / volume_m3)
+        p_pa = max(after, P_ATM_PA) if after < p_pa else after
+    return p_pa, volume_m3, rate_m3, flow_pa
+
+
+@compiled
+def _delay(state, par):
+    """Return the dead time as whole periods and the part of one that is left."""
+    delay = min(max(par.dead_time_periods + state.dead_time_shift_periods, 0.0), SENT_SIZE - 2.0)
+    whole = min(int(delay), SENT_SIZE - 3)
+    return whole, delay - whole
+
+
+@compiled
+def _learn_delay(state, par, error):
+    """
+    Move the dead time where a change of the flow shows earlier or later than expected.
+
+    With the dead time a period too long a reading is off by the latest changes of the flow,
+    as far as the observer has not made up for them: a gradient step, normalised. Only the
+    quick part of them tells: the slow one goes with the motion of the load, whose volume the
+    model knows less well.
+    """
+    state.dead_time_effect_mean_pa += _DELAY_MEAN * (
+        state.dead_time_effect_pa - state.dead_time_effect_mean_pa)
+    effect = state.dead_time_effect_pa - state.dead_time_effect_mean_pa
+    scale = par.flow_scale_pa
+    shift = state.dead_time_shift_periods - (
+        par.learn_dead_time * error * effect / (effect * effect + scale * scale))
+    state.dead_time_shift_periods = min(
+        max(shift, -par.dead_time_range_periods), par.dead_time_range_periods)
+    state.dead_time_effect_pa *= 1.0 - par.correct
+
+
+@compiled
+def _bounded_gain(par, gain):
+    """Return the gain of a flow within its limits."""
+    return min(max(gain, 1.0 / par.gain_limit), par.gain_limit)
+
+
+@compiled
+def observe(state, par, p_meas_pa, supply_pa):
+    """
+    Bring the model one period further and correct it by a measurement.
+
+    ``p_meas_pa`` NaN = no measurement this period. Start: the first measurement is the
+    model pressure.
+    """
+    if state.started < 0.5:
+        if not math.isfinite(p_meas_pa):
+            return
+        state.model_pa = p_meas_pa
+        above = max(p_meas_pa - P_ATM_PA - par.lift_off_gauge_pa, 0.0)
+        state.volume_m3 = par.volume_m3 + above * (
+            par.volume_slope_m3_per_pa + above * par.volume_curve_m3_per_pa2)
+        state.volume_change_m3 = 0.0
+        state.started = 1.0
+        return
+    whole, part = _delay(state, par)
+    before = state.model_pa
+    early = state.sent[whole + 1]
+    late = state.sent[whole]
+    p_pa, vol, vrate, flow_early = advance(
+        state, par, before, state.volume_m3, state.volume_change_m3, early, part, supply_pa)
+    after, vol, vrate, flow_late = advance(
+        state, par, p_pa, vol, vrate, late, 1.0 - part, supply_pa)
+    flow = flow_early + flow_late
+    through = (part * state.through_pa[whole + 1] + (1.0 - part) * state.through_pa[whole])
+    state.dead_time_effect_pa += flow - state.flow_pa
+    state.flow_pa = flow
+    state.model_pa = after
+    state.volume_m3 = vol
+    state.volume_change_m3 = vrate
+    if not math.isfinite(p_meas_pa):
+        return
+    rate = (after - before) / par.period_s
+    error = p_meas_pa - (after - rate * state.age_s)
+    state.model_pa = after + par.correct * error
+    _learn_delay(state, par, error)
+    if vol > par.volume_m3:
+        # A reading above the model: the volume grows less than it thinks.
+        per_pa = vol / after
+        state.volume_m3 = max(vol + par.correct_volume * error * per_pa, par.volume_m3)
+        state.volume_change_m3 = vrate - par.correct_rate * error * per_pa
+    # A large flow points to a wrong flow gain, a pair of pulses to a wrong difference of two,
+    # anything else to a drift.
+    power = through * through + par.flow_scale_pa ** 2
+    pair = state.pair_gain + _LEARN_PAIR * error * through / power
+    state.pair_gain = min(max(pair, -_PAIR_LIMIT), _PAIR_LIMIT)
+    share = 0.0
+    if abs(flow) > par.flow_scale_pa:
+        share = 1.0 - (par.flow_scale_pa / flow) ** 2
+        factor = 1.0 + par.learn_gain * share * error / flow
+        if flow > 0.0:
+            state.fill_gain = _bounded_gain(par, state.fill_gain * factor)
+        else:
+            state.vent_gain = _bounded_gain(par, state.vent_gain * factor)
+    rest = (1.0 - share) * (1.0 - through * through / power)
+    drift = state.drift_pa_per_period + par.learn_drift * rest * error
+    state.drift_pa_per_period = min(
+        max(drift, -par.drift_limit_pa_per_period), par.drift_limit_pa_per_period)
+
+
+@compiled
+def predict(state, par, supply_pa):
+    """
+    Run the model over all openings under way.
+
+    Returns pressure [Pa], volume [m^3] and its rate [m^3 per period] when the next
+    opening begins to act.
+    """
+    whole, part = _delay(state, par)
+    p_pa, vol, vrate, _ = advance(
+        state, par, state.model_pa, state.volume_m3, state.volume_change_m3,
+        state.sent[whole], part, supply_pa)
+    for i in range(whole - 1, -1, -1):
+        p_pa, vol, vrate, _ = advance(
+            state, par, p_pa, vol, vrate, state.sent[i], 1.0, supply_pa)
+    return p_pa, vol, vrate
