@@ -46,7 +46,7 @@ from rclpy.signals import SignalHandlerOptions
 
 FULL = {'ppr': (6.0,), 'hsv': (1.0, 0.0)}
 STRANGER, SECOND, STARTER = 'stranger', 'second_node', 'starter'
-SENT = {DRIVER: ('valve_signal', '/diagnostics'),
+SENT = {DRIVER: ('valve_signal', 'followed_pressure', '/diagnostics'),
         CONTROLLER: ('pressure_command', 'controller_state', '/diagnostics')}
 RATE_HZ = {'valve_signal': 500.0, 'pressure': 250.0, 'contraction': 250.0}
 MEASURED_FROM = {'pressure': 'true/pressure', 'contraction': 'true/contraction'}
