@@ -20,19 +20,13 @@ import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.muscle.muscle import get_muscle, Muscle, MUSCLE_PARAMETERS
+from pam_sim.muscle.muscle import get_muscle, Muscle
 from pam_sim.parameters import check_parameters
+from pam_sim.rig_parameters import rig_parameters, VALVES
+from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from pam_sim.valve import hsv, ppr
-
-VALVES = ('ppr', 'hsv')
-DEFAULT_TOLERANCE = 0.02
-
-
-def rig_parameters(load):
-    """Return the Parameters a rig with this load has, in the order of model files."""
-    return (*MUSCLE_PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -320,7 +314,6 @@ class Rig:
     # -- text ------------------------------------------------------------------------------
     def to_yaml(self):
         """Return a model file that :func:`pam_sim.load_rig` turns into an equal rig."""
-        from pam_sim.model_file import rig_to_yaml
         return rig_to_yaml(self)
 
     def volume_m3(self, contraction_m):

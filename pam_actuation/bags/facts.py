@@ -17,7 +17,7 @@
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
-from pam_sim.model_file import rig_title
+from pam_sim.rig_text import rig_title
 
 NOT_RECORDED = 'not recorded'
 

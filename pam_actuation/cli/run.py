@@ -40,7 +40,7 @@ def run(args):
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
-    from pam_sim.model_file import rig_title
+    from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join(

@@ -36,7 +36,7 @@ def run(args):
     """Simulate and say what was recorded."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
-    from pam_sim.model_file import rig_title
+    from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')

@@ -22,7 +22,7 @@ from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.tuning import tuning_section
 from pam_actuation.tuning.problem import rebuild
 from pam_sim.files import write_text
-from pam_sim.model_file import rig_title
+from pam_sim.rig_text import rig_title
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Model files and presets of joints: YAML in, JointRig out, and back."""
+"""Model files and presets of joints: YAML in, JointRig out."""
 
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.rig import JointRig
-from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+from pam_sim.located_yaml import Located
 from pam_sim.model_file import load_rig
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
@@ -121,15 +121,3 @@ def _side(data, side, base):
         return load_rig(value)
     except InputError as error:
         raise data.error(error.problem, side) from error
-
-
-def joint_to_yaml(joint):
-    """Return the text of a model file that gives an equal joint."""
-    data = {'name': joint.name, 'load': NAME}
-    for side in SIDES:
-        data[side] = load_yaml(getattr(joint, side).to_yaml()).plain()
-    changed = {p.name: joint.parameters[p.name] for p in PARAMETERS
-               if joint.parameters[p.name] != p.nominal}
-    if changed:
-        data['parameters'] = changed
-    return dump_yaml(data)

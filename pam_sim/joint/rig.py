@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
+from pam_sim.joint.text import joint_to_yaml
 from pam_sim.parameters import check_parameters
 
 
@@ -207,5 +208,4 @@ class JointRig:
     # -- text ------------------------------------------------------------------------------
     def to_yaml(self):
         """Return a model file that :func:`pam_sim.joint.load_joint` turns into an equal joint."""
-        from pam_sim.joint.model_file import joint_to_yaml
         return joint_to_yaml(self)

@@ -25,7 +25,7 @@ from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.rigging.layouts import rig as rig_layout
 from pam_sim import load_rig
 from pam_sim.joint import load_joint
-from pam_sim.model_file import rig_title
+from pam_sim.rig_text import rig_title
 import pytest
 from sample_bag import write_bag
 

@@ -1,0 +1,66 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A rig as text: the model file that gives an equal rig, and its title for people."""
+
+from dataclasses import replace
+
+from pam_sim.located_yaml import dump_yaml
+from pam_sim.muscle.muscle import get_muscle
+from pam_sim.rig_parameters import rig_parameters
+from pam_sim.sensors import SENSOR_PARAMETERS
+
+_MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
+
+
+def _base(rig):
+    """Return the lines that choose muscle, law and load."""
+    nominal = get_muscle(_MUSCLE)
+    if rig.muscle == nominal:
+        return {'rig': f'{_MUSCLE}_{rig.load}'}
+    if rig.muscle == replace(nominal, law=rig.muscle.law):
+        return {'rig': f'{_MUSCLE}_{rig.load}', 'law': rig.muscle.law.plain()}
+    return {'muscle': rig.muscle.plain(), 'load': rig.load}
+
+
+def rig_title(rig):
+    """Return the name of a rig for people, with the preset or muscle it is made from."""
+    base = f'{rig.muscle.name}_{rig.load}'
+    made_of = [] if rig.name == base else [base]
+    if rig.effects:
+        made_of.append(f'{len(rig.effects)} effects' if len(rig.effects) > 1 else '1 effect')
+    return f'{rig.name} ({", ".join(made_of)})' if made_of else rig.name
+
+
+def rig_to_yaml(rig):
+    """Return the text of a model file that gives an equal rig."""
+    known = rig_parameters(rig.load)
+    data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}
+    changed = {p.name: rig.parameters[p.name] for p in known
+               if rig.parameters[p.name] != p.nominal}
+    tolerance = {p.name: rig.tolerance[p.name] for p in known
+                 if rig.tolerance[p.name] != p.tolerance}
+    sensors = {p.name: rig.sensors[p.name] for p in SENSOR_PARAMETERS
+               if rig.sensors[p.name] != p.nominal}
+    effects = []
+    for item in rig.effects:
+        entry = {'name': item.name, 'parameters': dict(item.parameters)}
+        if item.source:
+            entry['source'] = item.source
+        effects.append(entry)
+    for key, value in (('parameters', changed), ('tolerance', tolerance), ('effects', effects),
+                       ('sensors', sensors)):
+        if value:
+            data[key] = value
+    return dump_yaml(data)
