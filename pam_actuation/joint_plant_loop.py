@@ -18,6 +18,7 @@ The simulated joint on a clock: valve signals of two muscles in, measurements ou
 The counterpart of ``plant_loop`` for a flexor and an extensor that turn one limb.
 """
 
+from functools import partial
 import math
 
 import numpy as np
@@ -53,6 +54,10 @@ class JointPlantLoop(PlantClock):
         self.sensors = {side: SensorChain(rig.sensors, seed + k)
                         for k, (side, rig) in enumerate(zip(SIDES, rigs))}
         self._noise = np.random.default_rng((seed, len(SIDES)))
+
+    def takes(self):
+        """Return what takes each topic, by name relative to the joint."""
+        return {f'{side}/valve_signal': partial(self.set_signal, side) for side in SIDES}
 
     def set_signal(self, side, message, writer=None):
         """Take a valve signal of one muscle."""

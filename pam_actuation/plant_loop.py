@@ -234,6 +234,10 @@ class PlantLoop(PlantClock):
         """Return the number of efforts that were not usable."""
         return self._held.ignored
 
+    def takes(self):
+        """Return what takes each topic, by short name."""
+        return {'external_force': self.set_external_force, 'valve_signal': self.set_signal}
+
     def set_signal(self, message: ValveSignal, writer=None):
         """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
         self._held.take(message, writer, self.now_ns or 0)

@@ -29,6 +29,7 @@ muscles are vented until there is a torque or an angle again. Every change is bu
 law starts from what the other one commanded last.
 """
 
+from functools import partial
 import math
 
 from pam_actuation.control import reference_buffer, tick as codes
@@ -131,6 +132,17 @@ class JointControllerLoop:
         self.follows_torque = False
         self._trajectory = self._angle = None
         self._pressures, self._forces = [None, None], [None, None]
+
+    def takes(self):
+        """Return what takes each topic, by name relative to the joint."""
+        takes = {'joint_state': self.on_joint_state, 'joint_reference': self.on_joint_reference,
+                 'joint_trajectory': self.on_joint_trajectory,
+                 'co_contraction': self.on_co_contraction}
+        for k, side in enumerate(SIDES):
+            takes[f'{side}/pressure'] = partial(self.on_pressure, k)
+            takes[f'{side}/force'] = partial(self.on_force, k)
+            takes[f'{side}/followed_pressure'] = partial(self.on_followed_pressure, k)
+        return takes
 
     def on_joint_state(self, message):
         """Take a ``JointAngle``."""

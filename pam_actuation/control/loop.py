@@ -175,6 +175,13 @@ class ControllerLoop:
         """Return the number of ticks run."""
         return self._core.ticks
 
+    def takes(self):
+        """Return what takes each topic, by short name."""
+        return {'contraction': self.on_contraction, 'pressure': self.on_pressure,
+                'followed_pressure': self.on_followed_pressure, 'force': self.on_force,
+                'reference': self.on_reference,
+                'reference_trajectory': self.on_reference_trajectory}
+
     def on_contraction(self, message):
         """Take a ``Contraction``."""
         self._contraction = message

@@ -87,6 +87,11 @@ class DriverLoop:
     def _new_law(self):
         return HsvLaw(self.config.hsv) if self.is_hsv else PprLaw(self.config.ppr)
 
+    def takes(self):
+        """Return what takes each topic, by short name."""
+        return {'pressure': self.on_pressure, 'supply_pressure': self.on_supply,
+                'pressure_command': self.on_command, 'valve_command': self.on_valve_command}
+
     def on_command(self, message: Pressure, sequence=None):
         """Take a pressure_command; ``sequence`` is the publisher's message number, if known."""
         self.safety.on_command(message.stamp_ns, message.pressure_pa, sequence)

@@ -21,6 +21,8 @@ The loops are the ones the nodes call, joined by messages that take no time.
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.joint_plant_loop import JointPlantLoop
+from pam_actuation.loops.bus import Bus, every
+from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
 from pam_actuation.messages import START_NS
 from pam_sim.joint.parameters import SIDES
 
@@ -47,11 +49,34 @@ class JointLoops:
         self.drivers = [DriverLoop(rig.valve, driver_config(rig))
                         for rig in (joint.flexor, joint.extensor)]
         self.period_ns = round(_NS / control.rate_hz)
-        self._driver_due_ns = [START_NS] * len(SIDES)
         self.now_ns = START_NS
         self.state = None           # the newest ``ControllerState``
         self.ticks = 0
+        self._commands = None
+        self._instead = {}
         self.plant.advance_to(self.now_ns)
+        self._bus = bus = Bus()
+        first_ns = START_NS + self.period_ns
+        bus.add(attach_plant(bus, self.plant), every(control.rate_hz, first_ns))
+        bus.add(self._tick_control, every(control.rate_hz, first_ns))
+        for side, driver in zip(SIDES, self.drivers):
+            attach(bus, driver, f'{side}/')
+            bus.add(driver_tick(bus, driver, f'{side}/'), every(driver.rate_hz, first_ns))
+        for topic, take in control.takes().items():
+            bus.connect(topic, self._unless_replaced(topic, take))
+
+    def _unless_replaced(self, topic, take):
+        """Return what hands on a message, or what stands in its place in this tick."""
+        def taken(message):
+            both = self._instead.get(topic.rpartition('/')[2], message)
+            take(self._instead.get(topic, both))
+        return taken
+
+    def _tick_control(self, now_ns):
+        self._commands, self.state = self.control.tick(now_ns)
+        self.ticks += 1
+        for side, command in zip(SIDES, self._commands):
+            self._bus.send(f'{side}/pressure_command', command, now_ns)
 
     def tick(self, **instead):
         """
@@ -61,27 +86,10 @@ class JointLoops:
         is missing; ``joint_state``, ``pressure`` and ``force`` (of both muscles), or those
         of one, such as ``flexor/pressure``.
         """
+        self._instead = instead
         self.now_ns += self.period_ns
-        self.plant.advance_to(self.now_ns)
-        measured = self.plant.sample(self.now_ns)
-        control = self.control
-        control.on_joint_state(instead.get('joint_state', measured['joint_state']))
-        for k, side in enumerate(SIDES):
-            for topic, take in (('pressure', control.on_pressure), ('force', control.on_force)):
-                one = f'{side}/{topic}'
-                take(k, instead.get(one, instead.get(topic, measured[one])))
-        commands, self.state = control.tick(self.now_ns)
-        self.ticks += 1
-        for k, (side, driver) in enumerate(zip(SIDES, self.drivers)):
-            driver.on_pressure(measured[f'{side}/pressure'])
-            if driver.is_hsv:
-                driver.on_supply(measured[f'{side}/supply_pressure'])
-            driver.on_command(commands[k], self.ticks)
-            if self.now_ns >= self._driver_due_ns[k]:
-                self._driver_due_ns[k] = self.now_ns + round(driver.period_s * _NS)
-                self.plant.signals[side].take(driver.tick(self.now_ns)[0])
-                control.on_followed_pressure(k, driver.followed())
-        return commands
+        self._bus.run_until(self.now_ns)
+        return self._commands
 
     def internal(self, name):
         """Return a number of the newest ``controller_state``."""

@@ -20,8 +20,7 @@ rig does, less transport. Same input, same bits: all randomness comes from the
 seed, all stamps from the virtual clock.
 """
 
-from collections import Counter, deque
-import heapq
+from collections import Counter
 import os
 
 from pam_actuation import interrupts
@@ -34,6 +33,9 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
+from pam_actuation.loops.bus import Bus, every
+from pam_actuation.loops.wiring import (
+    attach, attach_plant, controller_tick, driver_tick, reference_tick)
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.plant_loop import PlantLoop
 from pam_sim.files import cannot_write
@@ -69,114 +71,52 @@ class _Recorder:
 
 
 class _Loops:
-    """The loops of the live nodes, joined by messages that take ``transport_ns``."""
+    """The loops of the live nodes on a bus, and how far they came."""
 
-    def __init__(self, experiment, rig, controller, seed, learning, recorder, transport_ns):
-        self.learning, self.recorder, self.transport_ns = learning, recorder, transport_ns
-        self.plant = PlantLoop(rig, seed=seed)
-        self.reference = ReferenceLoop(experiment, valve=rig.valve)
-        self.driver = DriverLoop(rig.valve, driver_config(rig))
-        # At equal times: measure, then want, then decide, then act.
-        self.loops = [('plant', PUBLISH_RATE_HZ, self.tick_plant),
-                      ('reference', self.reference.rate_hz, self.tick_reference)]
-        self.lead_ns = 0
-        takers = [('pressure', self.driver.on_pressure),
-                  ('supply_pressure', self.driver.on_supply),
-                  ('pressure_command', self.driver.on_command),
-                  ('valve_command', self.driver.on_valve_command),
-                  ('external_force', self._from_its_stamp(self.plant.set_external_force)),
-                  ('valve_signal', self._from_its_stamp(self.plant.set_signal))]
-        if experiment.tracked:
-            self.control = ControllerLoop(controller)
-            self.loops.append(('controller', controller.rate_hz, self.tick_controller))
-            self.lead_ns = LEAD_NS
-            takers += [(topic, getattr(self.control, f'on_{topic}')) for topic in TOPIC_TYPES
-                       if hasattr(self.control, f'on_{topic}')]
-        self.loops.append(('driver', self.driver.rate_hz, self.tick_driver))
-        self._takers = {topic: [] for topic in TOPIC_TYPES}
-        for topic, take in takers:
-            self._takers[topic].append(take)
-        self._on_the_way = deque()
-        self.reached_ns = 0
+    def __init__(self, experiment, rig, controller, seed, learning, recorder, transport_ns, ticks):
+        self._recorder = recorder
         self._status_ns = -STATUS_EVERY_NS
+        self.bus = bus = Bus(transport_ns, recorder.write)
+        self.reached_ns = 0
+        plant, reference = PlantLoop(rig, seed=seed), ReferenceLoop(experiment, valve=rig.valve)
+        driver = DriverLoop(rig.valve, driver_config(rig))
+        lead_ns = LEAD_NS if experiment.tracked else 0
 
-    def send(self, topic, message, now):
-        """Record a message and put it on its way to all who take it."""
-        self.recorder.write(topic, message, now)
-        for take in self._takers[topic]:
-            self._on_the_way.append((now + self.transport_ns, take, message))
+        def add(name, tick, rate_hz, lead_ns=lead_ns):
+            times = ticks.get(name)
+            bus.add(tick, every(rate_hz, lead_ns=lead_ns) if times is None
+                    else (START_NS + int(after_ns) for after_ns in times))
 
-    def deliver(self, now):
-        """Hand over what has arrived."""
-        while self._on_the_way and self._on_the_way[0][0] <= now:
-            _, take, message = self._on_the_way.popleft()
-            take(message)
+        # At equal times: measure, then want, then decide, then act.
+        attach(bus, driver)
+        add('plant', attach_plant(bus, plant), PUBLISH_RATE_HZ)
+        add('reference', reference_tick(bus, reference), reference.rate_hz, 0)
+        if experiment.tracked:
+            control = ControllerLoop(controller)
+            attach(bus, control)
+            add('controller', controller_tick(bus, control, learning), controller.rate_hz)
+        add('driver', driver_tick(bus, driver, told=self._told), driver.rate_hz)
 
-    def _from_its_stamp(self, apply):
-        """Return what lets a message act from its stamp on, where physics has not passed it."""
-        def take(message):
-            self.plant.advance_to(message.stamp_ns)
-            apply(message)
-        return take
+    def _told(self, now_ns, status):
+        """Record the status of the driver from time to time."""
+        if now_ns - self._status_ns >= STATUS_EVERY_NS:
+            self._status_ns = now_ns
+            self._recorder.write('diagnostics', status, now_ns)
 
-    def tick_plant(self, now):
-        """Run physics to the present and measure."""
-        self.plant.advance_to(now)
-        for topic, message in self.plant.sample(now).items():
-            self.send(topic, message, now)
-
-    def tick_reference(self, now):
-        """Ask for what the experiment wants now."""
-        for topic, message in self.reference.tick(now).items():
-            self.send(topic, message, now)
-
-    def tick_controller(self, now):
-        """Turn the reference into a pressure command."""
-        command, state = self.control.tick(now, self.learning)
-        self.send('pressure_command', command, now)
-        self.send('controller_state', state, now)
-
-    def tick_driver(self, now):
-        """Turn the command into a valve signal, supervised."""
-        signal, status = self.driver.tick(now)
-        self.send('valve_signal', signal, now)
-        followed = self.driver.followed()
-        if followed is not None:
-            self.send('followed_pressure', followed, now)
-        if now - self._status_ns >= STATUS_EVERY_NS:
-            self._status_ns = now
-            self.recorder.write('diagnostics', status, now)
-
-    def run(self, ticks, end, progress, stopped):
+    def run(self, end_ns, progress, stopped):
         """
         Call every loop when it is due, in order of time, until the experiment is over.
 
         Between two ticks ``stopped`` is asked; KeyboardInterrupt once it says so.
         """
         reported = 0
-        for now, k in heapq.merge(*(
-                _due(k, ticks.get(name), rate_hz, 0 if name == 'reference' else self.lead_ns, end)
-                for k, (name, rate_hz, _) in enumerate(self.loops))):
+        while self.bus.next_ns is not None and self.bus.next_ns <= end_ns:
             if stopped():
                 raise KeyboardInterrupt
-            self.deliver(now)
-            self.loops[k][2](now)
-            self.reached_ns = now - START_NS
-            if progress and (now - START_NS) // 1_000_000_000 > reported:
-                reported = (now - START_NS) // 1_000_000_000
+            self.reached_ns = self.bus.step() - START_NS
+            if progress and self.reached_ns // 1_000_000_000 > reported:
+                reported = self.reached_ns // 1_000_000_000
                 progress(reported)
-
-
-def _due(order, ticks_ns, rate_hz, lead_ns, end_ns):
-    """Yield (time, order) of the ticks of one loop; at equal times the lower order is first."""
-    if ticks_ns is None:
-        period_ns = round(1e9 / rate_hz)
-        ticks_ns = range(-(lead_ns // period_ns) * period_ns, end_ns - START_NS + 1, period_ns)
-    for after_ns in ticks_ns:
-        now_ns = START_NS + int(after_ns)
-        if now_ns > end_ns:
-            return
-        yield now_ns, order
 
 
 def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
@@ -237,8 +177,9 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
         with interrupts.held() as stopped:
             writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
             recorder = _Recorder(writer, namespace)
-            loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns)
-            ending = _recorded(loops, experiment, ticks or {}, progress, stopped)
+            loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
+                           ticks or {})
+            ending = _recorded(loops, recorder, experiment, progress, stopped)
             if not ending.reached_s:
                 raise KeyboardInterrupt
             writer.add_to_experiment(ending.texts())
@@ -260,15 +201,15 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
             'counts': dict(recorder.counts)}
 
 
-def _recorded(loops, experiment, ticks, progress, stopped):
+def _recorded(loops, recorder, experiment, progress, stopped):
     """Run the loops to the end or to an interrupt; return the Ending."""
     end = START_NS + round(experiment.duration_s * 1e9)
     ended, said = COMPLETE, 'finished'
     try:
-        loops.run(ticks, end, progress, stopped)
+        loops.run(end, progress, stopped)
         reached_s = experiment.duration_s
     except KeyboardInterrupt:
         ended, said, reached_s = INTERRUPTED, 'interrupted', max(loops.reached_ns, 0) * 1e-9
         end = START_NS + max(loops.reached_ns, 0)
-    loops.recorder.finish(end, said)
+    recorder.finish(end, said)
     return Ending(experiment.duration_s, reached_s, ended)

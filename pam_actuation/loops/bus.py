@@ -1,0 +1,119 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Loops on one virtual clock, joined by messages.
+
+A live node takes messages when they arrive and ticks when its timer is due. Here a heap of
+due ticks is the timer and a queue is the middleware: a message arrives ``transport_ns`` after
+it was sent, and every tick first hands over what has arrived. Loops that are due at the same
+time tick in the order in which they were added.
+"""
+
+from collections import deque
+import heapq
+
+from pam_actuation.messages import START_NS
+
+
+class Bus:
+    """
+    Messages between loops, and the clock that calls these.
+
+    Parameters
+    ----------
+    transport_ns : int
+        Time from the tick that sends a message to its arrival.
+    on_sent : callable, optional
+        ``on_sent(topic, message, now_ns)`` of every message, as a recorder hears it.
+
+    """
+
+    def __init__(self, transport_ns=0, on_sent=None):
+        self._transport_ns = transport_ns
+        self._on_sent = on_sent
+        self._takers = {}
+        self._on_the_way = deque()
+        self._ticks = []            # of each loop: what is called
+        self._times = []            # and when, an iterator
+        self._due = []              # heap of (time, loop)
+
+    def connect(self, topic, take):
+        """Have ``take(message)`` called with every message of a topic."""
+        self._takers.setdefault(topic, []).append(take)
+
+    def send(self, topic, message, now_ns):
+        """Put a message on its way to all who take the topic."""
+        if self._on_sent is not None:
+            self._on_sent(topic, message, now_ns)
+        for take in self._takers.get(topic, ()):
+            self._on_the_way.append((now_ns + self._transport_ns, take, message))
+
+    def deliver(self, now_ns):
+        """Hand over what has arrived."""
+        while self._on_the_way and self._on_the_way[0][0] <= now_ns:
+            _, take, message = self._on_the_way.popleft()
+            take(message)
+
+    def add(self, tick, times_ns):
+        """
+        Add a loop.
+
+        Parameters
+        ----------
+        tick : callable
+            ``tick(now_ns)``.
+        times_ns : iterable of int
+            When it is called, in order; may be endless.
+
+        """
+        self._ticks.append(tick)
+        self._times.append(iter(times_ns))
+        self._schedule(len(self._ticks) - 1)
+
+    def _schedule(self, loop):
+        time_ns = next(self._times[loop], None)
+        if time_ns is not None:
+            heapq.heappush(self._due, (time_ns, loop))
+
+    @property
+    def next_ns(self):
+        """Time of the next tick [ns], None after the last one."""
+        return self._due[0][0] if self._due else None
+
+    def step(self):
+        """Hand over what has arrived at the time of the next tick, and tick; return the time."""
+        now_ns, loop = heapq.heappop(self._due)
+        self.deliver(now_ns)
+        self._ticks[loop](now_ns)
+        self._schedule(loop)
+        return now_ns
+
+    def run_until(self, end_ns):
+        """Run all ticks up to a time, it included."""
+        while self._due and self._due[0][0] <= end_ns:
+            self.step()
+
+
+def every(rate_hz, first_ns=START_NS, lead_ns=0):
+    """
+    Yield the times [ns] of a timer, without an end.
+
+    ``lead_ns``: it begins so much before ``first_ns``, rounded to whole periods.
+    """
+    period_ns = round(1e9 / rate_hz)
+    now_ns = first_ns - lead_ns // period_ns * period_ns
+    while True:
+        yield now_ns
+        now_ns += period_ns
