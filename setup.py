@@ -111,9 +111,9 @@ setup(
     name=PACKAGE,
     version=VERSION,
     packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
-    package_data={'pam_sim': [
-        'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml', 'muscle/lookup_tables/*',
-        'joint/presets/*.yaml']},
+    package_data={'pam_actuation': ['py.typed'], 'pam_sim': [
+        'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
+        'muscle/lookup_tables/*', 'joint/presets/*.yaml']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
