@@ -71,6 +71,8 @@ TEST_REQUIRES = [
     'flake8-import-order>=0.18.2',
     'flake8-quotes>=3.4',
     'pydocstyle>=6.3',
+    'mypy>=1.15',
+    'types-PyYAML>=6.0',
     'distributed>=2022.12',
     'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
 ]

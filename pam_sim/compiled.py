@@ -24,24 +24,53 @@ the functions of other files takes their ``source_key`` as a constant: a changed
 source, another number, compiled anew.
 """
 
+from collections.abc import Callable
 import hashlib
 import inspect
 from pathlib import Path
 import types
+from typing import Any, ParamSpec, Protocol, TypeGuard, TypeVar
 
 from numba import njit
 import numpy as np
 
-compiled = njit(error_model='numpy', nogil=True, _nrt=False)
-inlined = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)
+P = ParamSpec('P')
+R = TypeVar('R')
+R_co = TypeVar('R_co', covariant=True)
 
 
-def interpreted(function):
+class Compiled(Protocol[P, R_co]):
+    """A compiled function: called like the Python function it is made from, ``py_func``."""
+
+    @property
+    def py_func(self) -> Callable[P, R_co]:
+        """Return the function in Python."""
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co:
+        """Call the machine code."""
+
+
+class Compiler(Protocol):
+    """A decorator that compiles and leaves the signature as it is."""
+
+    def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
+        """Compile a function."""
+
+
+compiled: Compiler = njit(error_model='numpy', nogil=True, _nrt=False)
+inlined: Compiler = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)
+# Entry points, their machine code stored on disk; the second one may make arrays.
+entry_point: Compiler = njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
+allocating_entry_point: Compiler = njit(cache=True, error_model='numpy', nogil=True)
+
+
+def interpreted(function: Callable[P, R]) -> Callable[P, R]:
     """Return the Python function behind a compiled one: for a single call, not worth compiling."""
-    return getattr(function, 'py_func', function)
+    python: Callable[P, R] = getattr(function, 'py_func', function)
+    return python
 
 
-def sources(*parts):
+def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], list[str]]:
     """
     Return what compiled code is built from.
 
@@ -58,7 +87,9 @@ def sources(*parts):
         order.
 
     """
-    files, constants, seen = set(), set(), set()
+    files: set[Path] = set()
+    constants: set[str] = set()
+    seen: set[int] = set()
     waiting = list(parts)
     while waiting:
         part = waiting.pop()
@@ -66,24 +97,24 @@ def sources(*parts):
             continue
         seen.add(id(part))
         if isinstance(part, types.ModuleType):
-            files.add(Path(part.__file__))
+            files.add(_file_of(part))
             waiting += filter(_is_compiled, vars(part).values())
             continue
         found = inspect.getclosurevars(part.py_func)
-        files.add(Path(inspect.getsourcefile(part.py_func)))
+        files.add(_file_of(part.py_func))
         for name, value in {**found.globals, **found.nonlocals}.items():
             if _is_compiled(value):
                 waiting.append(value)
             elif isinstance(value, (bool, int, float, str, np.dtype)):
                 constants.add(f'{name} = {value!r}')
             elif isinstance(value, types.ModuleType) and value.__name__.startswith('pam_'):
-                files.add(Path(value.__file__))
+                files.add(_file_of(value))
                 used = (getattr(value, name, None) for name in part.py_func.__code__.co_names)
                 waiting += filter(_is_compiled, used)
     return sorted(files), sorted(constants)
 
 
-def source_key(*parts):
+def source_key(*parts: Compiled[..., Any] | types.ModuleType) -> int:
     """Return a number made of all that ``sources`` finds, for code stored on disk."""
     files, constants = sources(*parts)
     digest = hashlib.sha256(Path(__file__).read_bytes())
@@ -93,5 +124,12 @@ def source_key(*parts):
     return int(digest.hexdigest()[:12], 16)
 
 
-def _is_compiled(value):
+def _file_of(part: types.ModuleType | Callable[..., Any]) -> Path:
+    file = inspect.getsourcefile(part)
+    if file is None:
+        raise TypeError(f'{part} has no source')
+    return Path(file)
+
+
+def _is_compiled(value: object) -> TypeGuard[Compiled[..., Any]]:
     return hasattr(value, 'py_func')

@@ -228,8 +228,8 @@ def test_only_nodes_import_ros():
 
 
 def test_pyproject_leaves_everything_to_setup_py():
-    text = (ROOT / 'pyproject.toml').read_text(encoding='utf-8')
-    assert set(tomllib.loads(text)) == {'build-system'}
+    said = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
+    assert set(said) == {'build-system', 'tool'} and set(said['tool']) == {'mypy'}
 
 
 @pytest.mark.parametrize('topic', TOPIC_TYPES)

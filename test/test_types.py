@@ -1,0 +1,85 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Types: what mypy says of both packages, and that nothing is left without annotations."""
+
+import ast
+import importlib
+from pathlib import Path
+import subprocess
+import sys
+import tomllib  # noqa: I201
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CONFIG = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['tool']['mypy']
+# The modules whose errors are not shown yet, and how many these may be: never more.
+TO_DO = {
+    name for override in CONFIG['overrides'] if override.get('ignore_errors')
+    for name in override['module']}
+MOST_TO_DO = 408
+
+
+def modules():
+    """Return {name: file} of all modules of both packages."""
+    files = (path for top in CONFIG['packages'] for path in sorted((ROOT / top).rglob('*.py')))
+    return {'.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
+            for path in files}
+
+
+def bare_parts(path):
+    """Return the functions of a file with parameters or results that are not annotated."""
+    bare = []
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    methods = {id(function) for parent in ast.walk(tree) if isinstance(parent, ast.ClassDef)
+               for function in parent.body if isinstance(function, ast.FunctionDef)
+               and not any(getattr(d, 'id', '') == 'staticmethod'
+                           for d in function.decorator_list)}
+    for function in ast.walk(tree):
+        if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            continue
+        said = function.args
+        named = [*said.posonlyargs, *said.args][id(function) in methods:]
+        taken = [*named, *said.kwonlyargs, *filter(None, (said.vararg, said.kwarg))]
+        if function.returns is None or any(one.annotation is None for one in taken):
+            bare.append(f'{path.name}:{function.lineno} {function.name}')
+    return bare
+
+
+def test_mypy_finds_nothing():
+    """Both packages, strictly; the cache of a run before makes it seconds."""
+    pytest.importorskip('mypy')
+    if tuple(map(int, np.__version__.split('.')[:2])) < (2, 2):
+        pytest.skip('the annotations of numpy before 2.2 say less')
+    done = subprocess.run([sys.executable, '-m', 'mypy'], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
+
+
+def test_the_modules_left_to_annotate_get_fewer():
+    assert sorted(TO_DO - set(modules())) == []
+    assert len(TO_DO) <= MOST_TO_DO
+
+
+@pytest.mark.parametrize('package', CONFIG['packages'])
+def test_every_function_is_annotated(package):
+    found = {name: bare for name, path in modules().items()
+             if name.split('.')[0] == package and name not in TO_DO and (bare := bare_parts(path))}
+    assert found == {}
+
+
+@pytest.mark.parametrize('package', CONFIG['packages'])
+def test_the_annotations_are_for_users_of_the_package_too(package):
+    assert (Path(importlib.import_module(package).__file__).parent / 'py.typed').is_file()
