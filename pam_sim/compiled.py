@@ -132,4 +132,4 @@ def _file_of(part: types.ModuleType | Callable[..., Any]) -> Path:
 
 
 def _is_compiled(value: object) -> TypeGuard[Compiled[..., Any]]:
-    return hasattr(value, 'py_func')
+    return hasattr(value, 'py_func') and not isinstance(value, type)
