@@ -15,7 +15,7 @@
 """
 Hold every muscle law against the measured maps of a DMSP-10-250 and a DMSP-20-300.
 
-Run ``python benchmarks/force_maps.py``; it prints the tables of docs/muscle_laws.md.
+Run ``python benchmarks/force_maps.py``; it prints the tables of docs/reference/muscle_laws.md.
 """
 
 from pam_sim.muscle.fit import fit_table, judge

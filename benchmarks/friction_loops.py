@@ -15,7 +15,7 @@
 """
 Compare the loops of the hysteresis and friction formulations at their nominal numbers.
 
-Run ``python benchmarks/friction_loops.py``; it prints the tables of docs/friction.md.
+Run ``python benchmarks/friction_loops.py``; it prints the tables of docs/reference/friction.md.
 """
 
 import numpy as np

@@ -15,8 +15,8 @@
 """
 Measure the rollout: per rig, on one core and on all, against MuJoCo, and the first call.
 
-Run ``python benchmarks/rollout_speed.py``; it prints the tables of docs/speed.md. The best of
-several runs counts: other work on the machine can only make a run slower. Install the
+Run ``python benchmarks/rollout_speed.py``; it prints the tables of docs/results/speed.md.
+The best of several runs counts: other work on the machine can only make a run slower. Install the
 ``bench`` extra for the comparison with MuJoCo.
 """
 

@@ -73,7 +73,7 @@ def node_page(name: str) -> Path:
         It is not installed.
 
     """
-    path = share_dir() / 'docs' / 'nodes' / f'{name}.md'
+    path = share_dir() / 'docs' / 'reference' / 'nodes' / f'{name}.md'
     if not path.is_file():
         raise InputError('the page of this node is not installed; install the package again',
                          str(path))

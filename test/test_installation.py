@@ -34,7 +34,7 @@ FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller', 'va
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',
-    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/nodes')
+    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/reference/nodes')
 
 # Raises on any import of ROS, as on a machine without it.
 NO_ROS = """
@@ -194,7 +194,7 @@ def test_a_wheel_holds_packages_shared_files_and_executables(tmp_path):
     data = f'{wheel.name.rsplit("-", 3)[0]}.data/data/share/pam_actuation'
     for name in ('package.xml', 'config/experiments/sine_quarter_hz.yaml',
                  'config/controllers/sofc_ppr.yaml', 'launch/rig.launch.py', 'msg_docs/README.md',
-                 'docs/nodes/valve_driver.md'):
+                 'docs/reference/nodes/valve_driver.md'):
         assert f'{data}/{name}' in names
     for preset in (ROOT / 'pam_sim' / 'presets').glob('*.yaml'):
         assert f'pam_sim/presets/{preset.name}' in names

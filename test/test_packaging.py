@@ -42,7 +42,7 @@ EXECUTABLES = (
 # Import name -> name in setup.py, where they differ.
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
                  'skfuzzy': 'scikit-fuzzy'}
-# Import name -> rosdep key in package.xml; plotly has none (docs/installation.md).
+# Import name -> rosdep key in package.xml; plotly has none (docs/guides/installation.md).
 ROSDEP_KEYS = {
     'argcomplete': 'python3-argcomplete',
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
@@ -157,7 +157,7 @@ def test_shared_files_are_installed(setup_keywords):
     installed = {
         f'{target}/{Path(file).name}'
         for target, files in setup_keywords['data_files'] for file in files}
-    for folder in ('config', 'launch', 'msg_docs', 'docs/nodes'):
+    for folder in ('config', 'launch', 'msg_docs', 'docs/reference/nodes'):
         for path in (ROOT / folder).rglob('*'):
             if path.is_file() and '__pycache__' not in path.parts:
                 assert f'share/pam_actuation/{path.relative_to(ROOT).as_posix()}' in installed
@@ -315,7 +315,7 @@ def test_this_python_is_supported(setup_keywords):
 
 
 def test_the_printed_fault_table_is_the_one_the_driver_uses():
-    text = (ROOT / 'docs' / 'safety.md').read_text(encoding='utf-8')
+    text = (ROOT / 'docs' / 'explanation' / 'safety.md').read_text(encoding='utf-8')
     printed = re.search(
         r'<!-- fault table: begin -->\n(.*)<!-- fault table: end -->', text, re.S)[1]
     assert printed == fault_table_markdown(), 'copy what fault_table_markdown() returns'

@@ -64,7 +64,7 @@ def run(args):
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     if args.policy is not None:
-        check_file(args.policy, args.overwrite, ours='Made from the code, as docs/security.md')
+        check_file(args.policy, args.overwrite, ours='Made from the code, as docs/')
     elif args.record:
         check_bag_target(args.record)
     nodes = _nodes(args)

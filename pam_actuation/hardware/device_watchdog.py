@@ -20,7 +20,8 @@ therefore starts this module as a process of its own, tells it once what venting
 attributes to write, and with every signal whether the muscle may be under pressure. The process
 knows nothing else, needs neither ROS nor a network, and ends when the driver has ended.
 
-What it can not cover is a computer that stands still or loses its power: see docs/safety.md.
+What it can not cover is a computer that stands still or loses its power: see
+docs/explanation/safety.md.
 """
 
 import json

@@ -18,9 +18,10 @@ from pam_actuation.models.cells import facts, groups, tables
 
 _INTRODUCTION = """# Models
 
-Every muscle law, valve, load, effect and sensor setting the simulator knows. This page is made
-from the code by `pam models --markdown docs/models.md`; do not edit it. A file of yours in a
-folder named by `PAM_EFFECTS_PATH` or `PAM_MUSCLE_LAWS_PATH` is listed by `pam models` too.
+Every muscle law, valve, load, effect and sensor setting that the simulator knows. This page is
+made from the code by `pam models --markdown docs/reference/models.md`; do not edit it. Files of
+yours in a folder named by `PAM_EFFECTS_PATH` or `PAM_MUSCLE_LAWS_PATH` are listed by
+`pam models` too.
 
 Symbols: p absolute and p_g gauge pressure in the muscle, x contraction, eps = x / L0, v = dx/dt,
 F muscle tension, F_cell load cell, u voltage of the regulator, d_f and d_v fill and vent duty,

@@ -16,7 +16,7 @@
 The command line of a node: ``--help``, and nothing else besides the arguments of ROS.
 
 Answered before anything is imported that takes time or needs ROS, and without joining the graph.
-The help is the node's page of ``docs/nodes``, which is made from the code.
+The help is the node's page of ``docs/reference/nodes``, which is made from the code.
 """
 
 import os

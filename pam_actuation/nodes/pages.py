@@ -21,7 +21,7 @@ from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import parameter_arguments
 
 _EXPLAINED = 'states, timing and what is common to all nodes: [Nodes](../nodes.md)'
-_MADE = 'Made from the code by `pam nodes --markdown docs/nodes`; do not edit.'
+_MADE = 'Made from the code by `pam nodes --markdown docs/reference/nodes`; do not edit.'
 # Where the nodes of the examples come from, which the tests start.
 _EXAMPLES = (
     *layouts.rig(experiment='sine_quarter_hz'), *layouts.knee(),

@@ -32,7 +32,7 @@ from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.exceptions import InvalidParameterValueException
 
 
-# The end of a name to its unit, as docs/naming.md writes them.
+# The end of a name to its unit, as docs/reference/naming.md writes them.
 _UNITS = {'s': 's', 'pa': 'Pa', 'v': 'V', 'hz': 'Hz', 'm': 'm', 'm3': 'm³', 'n': 'N', 'kg': 'kg',
           'k': 'K', 'rad': 'rad', 'periods': 'periods'}
 

@@ -47,7 +47,7 @@ def policy(nodes):
     """
     root = ElementTree.Element('policy', version='0.2.0')
     root.append(ElementTree.Comment(
-        ' Made from the code, as docs/security.md says; do not edit. '))
+        ' Made from the code, as docs/guides/security.md says; do not edit. '))
     enclaves = ElementTree.SubElement(root, 'enclaves')
     offered = []
     with Inspector() as inspector:

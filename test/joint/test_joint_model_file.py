@@ -122,7 +122,7 @@ def test_mistakes_in_a_call():
 
 
 def test_the_page_and_the_presets_say_every_number():
-    page = (Path(__file__).parents[2] / 'docs' / 'joint.md').read_text(encoding='utf-8')
+    page = (Path(__file__).parents[2] / 'docs/reference/joint.md').read_text(encoding='utf-8')
     assert [p.name for p in PARAMETERS if f'`{p.name}`' not in page] == []
     assert [name for name in joint_preset_names() if f'`{name}`' not in page] == []
     assert pam_sim.load_joint('joint_dmsp_5_300').load == 'antagonistic_joint'

@@ -32,8 +32,8 @@ PLUG_INS = ('PAM_EFFECTS_PATH', 'PAM_MUSCLE_LAWS_PATH')
 
 @pytest.mark.skipif(any(os.environ.get(name) for name in PLUG_INS), reason='plug-ins are set')
 def test_the_committed_page_is_what_the_registries_say():
-    committed = (ROOT / 'docs' / 'models.md').read_text(encoding='utf-8')
-    assert committed == markdown.page(ENTRIES), 'run: pam models --markdown docs/models.md'
+    committed = (ROOT / 'docs' / 'reference' / 'models.md').read_text(encoding='utf-8')
+    assert committed == markdown.page(ENTRIES), 'pam models --markdown docs/reference/models.md'
 
 
 def test_overview_names_everything_within_the_terminal(monkeypatch):

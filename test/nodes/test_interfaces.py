@@ -43,13 +43,13 @@ def made():
 def test_every_executable_has_its_page(made):
     scripts = re.findall(r'(\w+) = pam_actuation\.nodes', (ROOT / 'setup.py').read_text())
     assert {f'{name}.md' for name in scripts} == set(made)
-    assert {path.name for path in (ROOT / 'docs' / 'nodes').iterdir()} == set(made)
+    assert {path.name for path in (ROOT / 'docs' / 'reference' / 'nodes').iterdir()} == set(made)
 
 
 @pytest.mark.parametrize('name', VARIANTS)
 def test_the_page_of_a_node_is_current(made, name):
-    committed = (ROOT / 'docs' / 'nodes' / f'{name}.md').read_text(encoding='utf-8')
-    assert committed == made[f'{name}.md'], 'run: pam nodes --markdown docs/nodes'
+    committed = (ROOT / 'docs' / 'reference' / 'nodes' / f'{name}.md').read_text(encoding='utf-8')
+    assert committed == made[f'{name}.md'], 'run: pam nodes --markdown docs/reference/nodes'
 
 
 def test_what_comes_with_certain_parameters_is_said_so(made):
@@ -63,7 +63,7 @@ def test_what_comes_with_certain_parameters_is_said_so(made):
 def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
     text = (ROOT / 'config' / 'security' / f'{name}.policy.xml').read_text(encoding='utf-8')
     nodes = POLICIES[name]()
-    assert text == policy(nodes), 'make it anew, see docs/security.md'
+    assert text == policy(nodes), 'make it anew, see docs/guides/security.md'
     publishers, enclaves = {}, ElementTree.fromstring(text.encode()).findall('.//enclave')
     assert [enclave.get('path') for enclave in enclaves] == [
         *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session', '/operator']

@@ -49,7 +49,7 @@ segments:
 
 
 def test_the_page_shows_the_example_as_it_is():
-    page = (ROOT / 'docs' / 'own_controller.md').read_text(encoding='utf-8')
+    page = (ROOT / 'docs' / 'guides' / 'own_controller.md').read_text(encoding='utf-8')
     shown = re.search(r'```python\n(.*?)```', page, re.S)[1]
     text = EXAMPLE.read_text(encoding='utf-8')
     assert text.partition('"""')[0].startswith('# Copyright')
