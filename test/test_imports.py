@@ -1,0 +1,166 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which module imports which: no circle, and no arrow that points up."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+# From the bottom: a room imports from its own row and from those above it in this table.
+LAYERS = (
+    ('messages', 'namespaces', 'resources', 'interrupts', 'parallel', 'ros_missing', 'slow_rise',
+     'control', 'drivers', 'loops', 'bags', 'hardware', 'plant_loop', 'joint_plant_loop'),
+    ('experiments', 'replay', 'tuning', 'valves', 'rules'),
+    ('report', 'models'),
+    ('rigging',),
+    ('nodes',),
+    ('cli', 'demo', 'warm_up'))
+# What studies a rig or lists all there is; the physics below knows none of it.
+ABOVE_THE_PHYSICS = ('characterise', 'gap', 'catalogue')
+# Neither of these two lists gets longer.
+ARROWS_UP = {
+    ('pam_actuation.control.lqi_model', 'pam_actuation.experiments.experiment'),
+    ('pam_actuation.rigging.client', 'pam_actuation.nodes.qos'),
+    ('pam_actuation.rigging.client', 'pam_actuation.nodes.transport'),
+    ('pam_actuation.rigging.processes', 'pam_actuation.nodes.transport'),
+    ('pam_actuation.rules.page', 'pam_actuation.report.page'),
+    ('pam_actuation.rules.page', 'pam_actuation.report.svg'),
+    ('pam_actuation.valves.present', 'pam_actuation.models.text'),
+    ('pam_actuation.valves.present', 'pam_actuation.report.figures'),
+    ('pam_actuation.valves.present', 'pam_actuation.report.page'),
+}
+# Modules that reach each other by an import within a function.
+CIRCLES = [
+    {'pam_actuation.control.sofc.persistence', 'pam_actuation.control.sofc.rule_table'},
+    {'pam_actuation.control.compiled_controller', 'pam_actuation.control.config',
+     'pam_actuation.control.fixed_law', 'pam_actuation.control.lqi',
+     'pam_actuation.control.lqi_files', 'pam_actuation.control.modes.files',
+     'pam_actuation.control.modes.force', 'pam_actuation.control.modes.joint',
+     'pam_actuation.control.modes.wrapped', 'pam_actuation.control.pid',
+     'pam_actuation.control.sofc.controller'},
+]
+
+
+def modules():
+    """Return {name: syntax tree} of all modules of both packages."""
+    return {
+        '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'):
+        ast.parse(path.read_text(encoding='utf-8'))
+        for top in ('pam_sim', 'pam_actuation') for path in sorted((ROOT / top).rglob('*.py'))}
+
+
+def imported(tree, known):
+    """Return (at the top, within functions): the modules that one module imports."""
+    at_top, within = set(), set()
+    waiting = [(tree, at_top)]
+    while waiting:
+        node, found = waiting.pop()
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [full if (full := f'{node.module}.{alias.name}') in known else node.module
+                     for alias in node.names]
+        found.update(set(names) & set(known))
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            found = within
+        waiting += [(child, found) for child in ast.iter_child_nodes(node)]
+    return at_top, within
+
+
+@pytest.fixture(scope='module')
+def imports():
+    """Return {module: (modules it imports at the top, those its functions import)}."""
+    known = modules()
+    return {name: imported(tree, known) for name, tree in known.items()}
+
+
+@pytest.fixture(scope='module')
+def at_top(imports):
+    """Return {module: modules imported when it is imported}."""
+    return {name: found[0] for name, found in imports.items()}
+
+
+@pytest.fixture(scope='module')
+def anywhere(imports):
+    """Return {module: modules imported when it is imported, or by one of its functions}."""
+    return {name: found[0] | found[1] for name, found in imports.items()}
+
+
+def circles(graph):
+    """Return the sets of modules that reach each other."""
+    def reached(start):
+        seen, waiting = set(), [start]
+        while waiting:
+            for one in graph[waiting.pop()] - seen:
+                seen.add(one)
+                waiting.append(one)
+        return seen
+
+    reach = {name: reached(name) for name in graph}
+    found = []
+    for name in graph:
+        circle = {other for other in reach[name] if name in reach[other]}
+        if circle and circle not in found:
+            found.append(circle)
+    return found
+
+
+def layer_of(module):
+    """Return the layer of a module of pam_actuation, counted from the bottom."""
+    room = module.split('.')[1]
+    return next(number for number, rooms in enumerate(LAYERS) if room in rooms)
+
+
+def test_circles_are_found():
+    assert circles({'a': {'b'}, 'b': {'c'}, 'c': {'b', 'd'}, 'd': set()}) == [{'b', 'c'}]
+    tree = ast.parse('from p import a, x\ndef f():\n    import p.b\n')
+    assert imported(tree, {'p': 0, 'p.a': 0, 'p.b': 0}) == ({'p', 'p.a'}, {'p.b'})
+
+
+def test_no_modules_import_each_other_in_a_circle(at_top):
+    assert circles(at_top) == []
+
+
+def test_no_circle_through_a_function_but_those_listed(anywhere):
+    assert [sorted(circle) for circle in circles(anywhere)
+            if not any(circle <= listed for listed in CIRCLES)] == []
+
+
+def test_every_room_has_a_layer():
+    rooms = {path.stem for path in (ROOT / 'pam_actuation').iterdir()
+             if path.suffix == '.py' or (path / '__init__.py').is_file()} - {'__init__'}
+    assert sorted(room for rooms in LAYERS for room in rooms) == sorted(rooms)
+
+
+def test_arrows_point_down_but_those_listed(anywhere):
+    up = {(name, other) for name, others in anywhere.items() for other in others
+          if name.startswith('pam_actuation.') and other.startswith('pam_actuation.')
+          and layer_of(other) > layer_of(name)}
+    assert sorted(up - ARROWS_UP) == []
+
+
+def test_the_list_of_arrows_up_holds_no_more_than_there_are(anywhere):
+    assert sorted(arrow for arrow in ARROWS_UP if arrow[1] not in anywhere.get(arrow[0], ())) == []
+
+
+def test_the_physics_does_not_know_what_studies_it(anywhere):
+    above = tuple(f'pam_sim.{room}' for room in ABOVE_THE_PHYSICS)
+    found = {(name, other) for name, others in anywhere.items() for other in others
+             if name.startswith('pam_sim.') and not name.startswith(above)
+             and other.startswith(above)}
+    assert sorted(found) == []
