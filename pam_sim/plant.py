@@ -14,9 +14,20 @@
 
 """The rig as a live object: one physics step at a time, the compiled step of the rollout."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.rollout import kernel, layout
+from pam_sim.records import cells, fields, zeros
+from pam_sim.rollout import kernel
+from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 
 class Plant:
@@ -35,23 +46,24 @@ class Plant:
 
     """
 
-    def __init__(self, rig, seed=0, dt_s=0.001, **initial):
+    def __init__(self, rig: Rig, seed: int = 0, dt_s: float = 0.001, **initial: Any) -> None:
         self.rig = rig
         self.seed = int(seed)
         self.dt_s = float(dt_s)
         self._initial = initial
-        self._inp = np.zeros(layout.INP_SIZE)
-        self._out = np.zeros(layout.OUT_SIZE)
+        self._inp, self._out = zeros(INPUT), zeros(OUTPUT)
+        self._given, self._now = cells(self._inp, INPUT), cells(self._out, OUTPUT)
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Go back to the start."""
         self.state, self.par = self.rig.pack(dt_s=self.dt_s, **self._initial)
         self._inp[:] = 0.0
-        self._inp[layout.INP_CONTRACTION] = self.state[layout.S_CONTRACTION]
+        self._given.contraction_m[...] = fields(self.state, STATE).contraction_m
         kernel.look(self.state, self.par, self._inp, self._out)
 
-    def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
+    def step(self, signal: float | Sequence[float], external_force_n: float = 0.0,
+             contraction_m: float | None = None, steps: int = 1) -> None:
         """
         Advance by ``steps`` times ``dt_s`` with the valve signal held.
 
@@ -80,9 +92,9 @@ class Plant:
                              'valve signal')
         inp = self._inp
         inp[:wanted] = values
-        inp[layout.INP_EXTERNAL_FORCE] = external_force_n
+        self._given.external_force_n[...] = external_force_n
         if contraction_m is not None:
-            inp[layout.INP_CONTRACTION] = contraction_m
+            self._given.contraction_m[...] = contraction_m
         if not np.isfinite(inp).all():
             raise InputError('is not finite', 'valve signal, force or contraction')
         for _ in range(steps):
@@ -93,41 +105,41 @@ class Plant:
                              f'rig {self.rig.name}')
 
     @property
-    def time_s(self):
+    def time_s(self) -> float:
         """Time since the start, s."""
-        return float(self._out[layout.OUT_TIME])
+        return self._now.time_s.item()
 
     @property
-    def pressure_pa(self):
+    def pressure_pa(self) -> float:
         """Absolute pressure as the sensor reads it (no noise), Pa."""
-        return float(self._out[layout.OUT_PRESSURE])
+        return self._now.pressure_pa.item()
 
     @property
-    def contraction_m(self):
+    def contraction_m(self) -> float:
         """Contraction as the sensor reads it (no noise), m."""
-        return float(self._out[layout.OUT_CONTRACTION])
+        return self._now.contraction_m.item()
 
     @property
-    def velocity_m_per_s(self):
+    def velocity_m_per_s(self) -> float:
         """Contraction rate, true, m/s."""
-        return float(self._out[layout.OUT_VELOCITY])
+        return self._now.velocity_m_per_s.item()
 
     @property
-    def force_n(self):
+    def force_n(self) -> float:
         """Load cell force as the sensor reads it (no noise), N."""
-        return float(self._out[layout.OUT_FORCE])
+        return self._now.force_n.item()
 
     @property
-    def air_mass_kg(self):
+    def air_mass_kg(self) -> float:
         """Air in muscle and dead volume, kg."""
-        return float(self._out[layout.OUT_AIR_MASS])
+        return self._now.air_mass_kg.item()
 
     @property
-    def supply_pa(self):
+    def supply_pa(self) -> float:
         """Supply pressure, absolute, Pa."""
-        return float(self._out[layout.OUT_SUPPLY])
+        return self._now.supply_pa.item()
 
     @property
-    def outputs(self):
-        """All outputs after the last step (copy), indexed by ``layout.OUT_*``."""
+    def outputs(self) -> FloatArray:
+        """All outputs after the last step (copy), a record ``layout.OUTPUT``."""
         return self._out.copy()

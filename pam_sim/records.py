@@ -17,83 +17,105 @@ Rows of numbers with names: parameters, states, inputs and outputs of compiled c
 
 A record is declared once, as a numpy dtype of float64 fields; units stand in the names.
 Compiled functions take plain float64 arrays from Python, look at them through the dtype
-once, ``par.view(PARAMETERS)[0]``, and read ``par.supply_pa`` from there on. Python does the
+once, ``part(par, 0, PARAMETERS)``, and read ``par.supply_pa`` from there on. Python does the
 same with ``fields``. An inserted field moves its neighbours in memory and nowhere else.
 """
 
+from collections.abc import Mapping
 import types
+from typing import Any
 
+from llvmlite import ir
+from numba import types as numba_types
+from numba.core import cgutils
+from numba.extending import lower_builtin, type_callable
 import numpy as np
+from pam_sim.annotations import FloatArray
+
+# A name; a name with the length of an array; a name with a record, or with so many of it.
+Declared = str | tuple[str, 'int | np.dtype[Any] | tuple[np.dtype[Any], int]']
+_NUMBER = np.dtype(np.float64).itemsize
 
 
-def record(*declared):
+def record(*declared: Declared) -> np.dtype[Any]:
     """
     Return the dtype of a row of float64 numbers with names.
 
     Parameters
     ----------
-    declared : str or (str, int) or (str, numpy.dtype)
-        Name of a number, of an array of so many, or of a record within the record.
+    declared : str or (str, int) or (str, numpy.dtype) or (str, (numpy.dtype, int))
+        Name of a number, of an array of so many, of a record within the record, or of so
+        many records.
 
     Returns
     -------
     numpy.dtype
 
     """
-    parts = []
+    parts: list[tuple[Any, ...]] = []
     for one in declared:
-        name, what = (one, None) if isinstance(one, str) else one
-        if what is None:
-            parts.append((name, np.float64))
-        elif isinstance(what, np.dtype):
-            parts.append((name, what))
+        if isinstance(one, str):
+            parts.append((one, np.float64))
+        elif isinstance(one[1], int):
+            parts.append((one[0], np.float64, (one[1],)))
+        elif isinstance(one[1], tuple):
+            parts.append((one[0], one[1][0], (one[1][1],)))
         else:
-            parts.append((name, np.float64, (what,)))
+            parts.append((one[0], one[1]))
     return np.dtype((np.record, parts))
 
 
-def size_of(dtype):
+def size_of(dtype: np.dtype[Any]) -> int:
     """Return how many float64 numbers a record takes."""
-    return dtype.itemsize // np.dtype(np.float64).itemsize
+    return dtype.itemsize // _NUMBER
 
 
-def zeros(dtype):
+def place_of(dtype: np.dtype[Any], name: str) -> int:
+    """Return how many float64 numbers stand in a record before a field."""
+    return _field(dtype, name)[1]
+
+
+def zeros(dtype: np.dtype[Any]) -> FloatArray:
     """Return a float64 array of the size of a record, filled with zeros."""
     return np.zeros(size_of(dtype))
 
 
-def fields(array, dtype):
+def fields(array: FloatArray, dtype: np.dtype[Any], place: int = 0) -> Any:
     """
-    Look at an array through a record; both share their memory.
+    Look at an array through a record, from ``place`` on; both share their memory.
 
     ``fields(out, OUTPUT).pressure_pa`` reads and writes a number of ``out``. What an array
     holds beyond the record is left out.
     """
-    return array[:size_of(dtype)].view(dtype)[0]
+    return array[place:place + size_of(dtype)].view(dtype)[0]
 
 
-def cells(array, dtype):
+def cells(array: FloatArray, dtype: np.dtype[Any]) -> Any:
     """
     Return a namespace with one 0-d array for each number of a record, sharing its memory.
 
     ``cells(out, OUTPUT).pressure_pa.item()`` reads and ``[...] =`` writes a number as fast as
     an index does, for loops in Python; made once, beside the array. An array within the record
-    is an array, a record within it a namespace.
+    is an array, a record within it a namespace, an array of records a tuple of namespaces.
     """
     seen = types.SimpleNamespace()
-    for name in dtype.names:
-        inner, offset = dtype.fields[name][:2]
-        begin = offset // np.dtype(np.float64).itemsize
-        part = array[begin:begin + size_of(inner)]
-        if inner.names:
-            part = cells(part, inner)
-        elif not inner.shape:
-            part = part.reshape(())
-        setattr(seen, name, part)
+    for name in dtype.names or ():
+        inner, begin = _field(dtype, name)
+        setattr(seen, name, _cell(array[begin:begin + size_of(inner)], inner))
     return seen
 
 
-def columns(rows, dtype):
+def _cell(array: FloatArray, dtype: np.dtype[Any]) -> Any:
+    if dtype.names:
+        return cells(array, dtype)
+    if not dtype.shape:
+        return array.reshape(())
+    if not dtype.base.names:
+        return array
+    return tuple(cells(one, dtype.base) for one in array.reshape(-1, size_of(dtype.base)))
+
+
+def columns(rows: FloatArray, dtype: np.dtype[Any]) -> Any:
     """
     Return rows of records (N, size) as a structured array (N,), sharing memory.
 
@@ -102,7 +124,7 @@ def columns(rows, dtype):
     return np.ascontiguousarray(rows).view(dtype)[:, 0]
 
 
-def values_of(dtype, values):
+def values_of(dtype: np.dtype[Any], values: Mapping[str, Any]) -> FloatArray:
     """
     Return a float64 array for a record from a mapping that names each of its fields.
 
@@ -112,11 +134,84 @@ def values_of(dtype, values):
         A field is missing, or there is none of a name.
 
     """
-    if set(values) != set(dtype.names):
-        raise ValueError(
-            f'fields {sorted(set(values) ^ set(dtype.names))} are missing or unknown')
     array = zeros(dtype)
-    seen = array.view(dtype)[0]
-    for name, value in values.items():
-        seen[name] = value
+    put(array, dtype, values)
     return array
+
+
+def put(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
+        place: int = 0) -> None:
+    """
+    Write a mapping that names each field of a record into an array, from ``place`` on.
+
+    Raises
+    ------
+    ValueError
+        A field is missing, or there is none of a name.
+
+    """
+    names = dtype.names or ()
+    if values.keys() != set(names):
+        raise ValueError(
+            f'fields {sorted(set(values) ^ set(names))} are missing or unknown')
+    if size_of(dtype) == len(names):        # numbers alone
+        array[place:place + len(names)] = [values[name] for name in names]
+        return
+    for name in names:
+        inner, begin = _field(dtype, name)
+        array[place + begin:place + begin + size_of(inner)] = np.ravel(values[name])
+
+
+def _field(dtype: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:
+    """Return the dtype of a field and the numbers before it."""
+    assert dtype.fields is not None
+    inner, begin = dtype.fields[name][:2]
+    return inner, begin // _NUMBER
+
+
+def part(whole: Any, place: int, dtype: np.dtype[Any]) -> Any:
+    """
+    Return the record that begins ``place`` numbers behind the begin of an array or record.
+
+    For compiled code, where it is an address and checks nothing: a function with the first
+    record of an array reaches what stands behind it. Interpreted code gets the same.
+    """
+    return fields(whole if isinstance(whole, np.ndarray) else _memory_from(whole), dtype, place)
+
+
+def _memory_from(seen: Any) -> FloatArray:
+    """Return the memory from the begin of a record to the end of the array it looks at."""
+    owner = seen.base
+    while owner.base is not None:
+        owner = owner.base
+    before = (seen.__array_interface__['data'][0] - owner.__array_interface__['data'][0])
+    memory: FloatArray = owner.reshape(-1).view(np.float64)[before // _NUMBER:]
+    return memory
+
+
+@type_callable(part)
+def _type_part(context: Any) -> Any:
+    def typed(whole: Any, place: Any, dtype: Any) -> Any:
+        if (isinstance(whole, (numba_types.Array, numba_types.Record))
+                and isinstance(place, numba_types.Integer)
+                and isinstance(dtype, numba_types.DType)):
+            return dtype.dtype
+        return None
+    return typed
+
+
+@lower_builtin(part, numba_types.Array, numba_types.Integer, numba_types.DType)
+def _part_of_array(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+    return _address(context, builder, signature, data, arguments[1])
+
+
+@lower_builtin(part, numba_types.Record, numba_types.Integer, numba_types.DType)
+def _part_of_record(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    return _address(context, builder, signature, arguments[0], arguments[1])
+
+
+def _address(context: Any, builder: Any, signature: Any, begin: Any, place: Any) -> Any:
+    numbers = builder.bitcast(begin, ir.DoubleType().as_pointer())
+    found = cgutils.gep_inbounds(builder, numbers, place)
+    return builder.bitcast(found, context.get_value_type(signature.return_type))

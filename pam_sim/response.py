@@ -15,23 +15,9 @@
 """What a simulation returns."""
 
 import numpy as np
-from pam_sim.rollout import layout
+from pam_sim.rollout.layout import OUTPUT
 
-COLUMNS = {
-    'time_s': layout.OUT_TIME,
-    'pressure_pa': layout.OUT_PRESSURE,
-    'contraction_m': layout.OUT_CONTRACTION,
-    'velocity_m_per_s': layout.OUT_VELOCITY,
-    'force_n': layout.OUT_FORCE,
-    'air_mass_kg': layout.OUT_AIR_MASS,
-    'supply_pa': layout.OUT_SUPPLY,
-    'true_pressure_pa': layout.OUT_TRUE_PRESSURE,
-    'true_contraction_m': layout.OUT_TRUE_CONTRACTION,
-    'true_force_n': layout.OUT_TRUE_FORCE,
-    'filled_kg': layout.OUT_FILLED,
-    'vented_kg': layout.OUT_VENTED,
-    'acceleration_m_per_s2': layout.OUT_ACCELERATION,
-}
+COLUMNS = {name: place for place, name in enumerate(OUTPUT.names)}
 
 
 def brief_span(time_s):

@@ -17,7 +17,8 @@
 import math
 
 import numpy as np
-from pam_sim.rollout import layout
+from pam_sim.records import fields
+from pam_sim.rollout.layout import PARAMETERS, STATE
 from scipy.optimize import brentq
 
 _SCAN = 48                     # angles looked at for changes of sign over the whole range
@@ -39,9 +40,9 @@ def static_torque(joint, angle_rad, pressures_pa, external_n_m):
 def _static_force(rig, pressure, contraction):
     state, par = rig.pack(initial_pressure_pa=pressure,
                           initial_contraction_m=max(contraction, 0.0))
-    if contraction > par[layout.PAR_MAX_CONTRACTION]:
+    if contraction > fields(par, PARAMETERS).max_contraction_m:
         return 0.0
-    return max(state[layout.S_MUSCLE_FORCE], 0.0)
+    return max(fields(state, STATE).muscle_force_n, 0.0)
 
 
 def largest_torque_n_m(joint, pressure_pa):

@@ -29,8 +29,10 @@ import threading
 
 import numpy as np
 from pam_sim.errors import InputError
+from pam_sim.records import size_of
 from pam_sim.response import COLUMNS, Response
-from pam_sim.rollout import kernel, layout
+from pam_sim.rollout import kernel
+from pam_sim.rollout.layout import OUTPUT
 from pam_sim.rollout.sampling import Placed
 from pam_sim.rollout.simulate import check_outputs, prepare
 from pam_sim.short_repr import short_repr
@@ -221,7 +223,7 @@ def _run_all(pairs, finish, workers):
     queue = iter(range(len(pairs)))     # taking the next is atomic
 
     def work():
-        buffer = np.empty((0, layout.OUT_SIZE))
+        buffer = np.empty((0, size_of(OUTPUT)))
         for index in queue:
             # A run before the first mistake is still made: it may hold an earlier one.
             if stop.is_set() or index > min(tuple(errors), default=index):
@@ -230,7 +232,7 @@ def _run_all(pairs, finish, workers):
             try:
                 state, par, inputs = record.prepare(rig)
                 if len(buffer) <= len(inputs):
-                    buffer = np.empty((len(inputs) + 1, layout.OUT_SIZE))
+                    buffer = np.empty((len(inputs) + 1, size_of(OUTPUT)))
                 outputs = buffer[:len(inputs) + 1]
                 kernel.rollout(state, par, inputs, outputs)
                 check_outputs(rig, outputs)

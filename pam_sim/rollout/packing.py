@@ -23,6 +23,7 @@ from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.records import fields, put
 from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.generate import effect_layout, hook_flag, law_codes
 from pam_sim.units import (
@@ -48,7 +49,7 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
         rest_m = kernel.rest_contraction(numbers.pressure_pa, state, par)
         if rest_m != numbers.contraction_m:         # effects start from where the load rests
             numbers = replace(numbers, contraction_m=rest_m)
-            state[layout.S_CONTRACTION] = rest_m
+            fields(state, layout.STATE).contraction_m = rest_m
             _pack_effects(rig, numbers, state, par)
     kernel.settle(state, par)
     return state, par
@@ -59,7 +60,7 @@ def _pack_effects(rig, numbers, state, par):
         k, i = _PLACES[setting.name]
         effects()[setting.name].pack_into(setting.parameters, numbers, par, k, state, i)
         if par[k - 1] != 0.0:
-            par[layout.PAR_BEYOND_NOMINAL] = 1.0
+            fields(par, layout.PARAMETERS).beyond_nominal = 1.0
             for place in _FLAGS[setting.name]:
                 par[place] = 1.0
 
@@ -123,44 +124,47 @@ def _pack_base(rig, numbers, state, par):
     muscle = rig.muscle
     length_m, thread_squared, inverse_4_pi_n2 = muscle.shape
     substeps = round(numbers.dt_s / numbers.substep_s)
-    valve = layout.VALVE_PPR
+    valve = layout.PPR
     if rig.valve == 'hsv':
-        valve = (layout.VALVE_HSV_SWITCHING if rig.fidelity == 'switching'
-                 else layout.VALVE_HSV_AVERAGED)
+        valve = (layout.HSV_SWITCHING if rig.fidelity == 'switching'
+                 else layout.HSV_AVERAGED)
     mass = value.get('mass_kg', 1.0)
-    for index, number in (
-            (layout.PAR_DT, numbers.dt_s),
-            (layout.PAR_SUBSTEPS, substeps),
-            (layout.PAR_SUBSTEP, numbers.substep_s),
-            (layout.PAR_VALVE, valve),
-            (layout.PAR_FREE_LOAD, LOADS[rig.load].MOVES_FREELY),
-            (layout.PAR_ATMOSPHERE, P_ATM_PA),
-            (layout.PAR_LENGTH, length_m),
-            (layout.PAR_FORCE_GAIN, value['force_map_gain']),
-            (layout.PAR_DAMPING, value['damping_n_s_per_m']),
-            (layout.PAR_MASS, mass),
-            (layout.PAR_WEIGHT, mass * GRAVITY_M_PER_S2),
-            (layout.PAR_MAX_CONTRACTION, muscle.stroke_m),
-            (layout.PAR_THREAD_SQUARED, thread_squared),
-            (layout.PAR_INVERSE_4_PI_N2, inverse_4_pi_n2),
-            (layout.PAR_DEAD_VOLUME, value['V_dead']),
-            (layout.PAR_RT, GAS_CONSTANT_AIR * TEMPERATURE_K),
-            (layout.PAR_CONDUCTANCE,
-             value['C'] * RHO_REFERENCE * math.sqrt(T_REFERENCE_K / TEMPERATURE_K)),
-            (layout.PAR_CRITICAL_RATIO, value['b']),
-            (layout.PAR_SUPPLY, value['supply_pa']),
-            (layout.PAR_GAIN_PPR, value['K_m']),
-            (layout.PAR_TIME_CONSTANT, value['T_m']),
-            (layout.PAR_DECAY_HALF, math.exp(-0.5 * numbers.substep_s / value['T_m'])),
-            (layout.PAR_PWM_PERIOD, value['pwm_period_s']),
-            (layout.PAR_INVERSE_LENGTH, 1.0 / length_m),
-            (layout.PAR_INVERSE_MASS, 1.0 / mass),
-            (layout.PAR_INVERSE_RT, 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K)),
-            (layout.PAR_LAW, _LAW_CODES[muscle.law.name]),
-            (layout.PAR_LAW_PLACE, _PAR_SIZE),
-            (layout.PAR_BEYOND_NOMINAL, _LAW_CODES[muscle.law.name] != 0.0),
-            (layout.PAR_LAW_DAMPER, type(muscle.law.law).COMPILED_DAMPER is not None)):
-        par[index] = number
-    state[layout.S_PRESSURE] = numbers.pressure_pa
-    state[layout.S_CONTRACTION] = numbers.contraction_m
-    state[layout.S_PERIOD] = -1e9         # no PWM period yet
+    law = _LAW_CODES[muscle.law.name]
+    put(par, layout.PARAMETERS, {
+        'dt_s': numbers.dt_s,
+        'substeps': substeps,
+        'substep_s': numbers.substep_s,
+        'valve': valve,
+        'free_load': LOADS[rig.load].MOVES_FREELY,
+        'atmosphere_pa': P_ATM_PA,
+        'length_m': length_m,
+        'force_gain': value['force_map_gain'],
+        'damping_n_s_per_m': value['damping_n_s_per_m'],
+        'mass_kg': mass,
+        'weight_n': mass * GRAVITY_M_PER_S2,
+        'max_contraction_m': muscle.stroke_m,
+        'thread_squared_m2': thread_squared,
+        'inverse_4_pi_n2': inverse_4_pi_n2,
+        'dead_volume_m3': value['V_dead'],
+        'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K,
+        'conductance_kg_per_s_pa':
+            value['C'] * RHO_REFERENCE * math.sqrt(T_REFERENCE_K / TEMPERATURE_K),
+        'critical_ratio': value['b'],
+        'supply_pa': value['supply_pa'],
+        'gain_ppr_pa_per_v': value['K_m'],
+        'time_constant_s': value['T_m'],
+        'decay_half': math.exp(-0.5 * numbers.substep_s / value['T_m']),
+        'pwm_period_s': value['pwm_period_s'],
+        'inverse_length_per_m': 1.0 / length_m,
+        'inverse_mass_per_kg': 1.0 / mass,
+        'inverse_rt_kg_per_j': 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K),
+        'law': law,
+        'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
+        'law_place': _PAR_SIZE,
+        'beyond_nominal': law != 0.0,
+        'used': 0.0,
+    })
+    start = fields(state, layout.STATE)
+    start.pressure_pa = numbers.pressure_pa
+    start.contraction_m = numbers.contraction_m
+    start.period = -1e9         # no PWM period yet

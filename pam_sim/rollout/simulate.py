@@ -21,8 +21,10 @@ import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.law import ExtrapolationWarning
+from pam_sim.records import columns, fields, size_of
 from pam_sim.response import Response
-from pam_sim.rollout import kernel, layout
+from pam_sim.rollout import kernel
+from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
 from pam_sim.units import P_ATM_PA
 
 MAX_FORCE_N = 1e5
@@ -34,7 +36,7 @@ def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initi
     """Return the Response; arguments and errors as of ``Rig.simulate``."""
     state, par, inputs = prepare(
         rig, valve_signal, external_force_n, contraction_m, dt_s, initial)
-    outputs = np.empty((len(inputs) + 1, layout.OUT_SIZE))
+    outputs = np.empty((len(inputs) + 1, size_of(OUTPUT)))
     kernel.rollout(state, par, inputs, outputs)
     check_outputs(rig, outputs)
     return Response(outputs)
@@ -47,7 +49,7 @@ def prepare(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
         initial = {**initial, 'initial_contraction_m': start}
     state, par = rig.pack(dt_s=dt_s, **initial)
     if start is None and not LOADS[rig.load].MOVES_FREELY:
-        inputs[:, layout.INP_CONTRACTION] = state[layout.S_CONTRACTION]
+        columns(inputs, INPUT)['contraction_m'] = fields(state, STATE).contraction_m
     return state, par, inputs
 
 
@@ -62,7 +64,8 @@ def check_outputs(rig, outputs):
         began.
 
     """
-    pressure = outputs[:, layout.OUT_TRUE_PRESSURE]
+    seen = columns(outputs, OUTPUT)
+    pressure = seen['true_pressure_pa']
     if not math.isfinite(outputs.sum()) or pressure.min() <= 0.0:
         row = int(np.argmax(~np.isfinite(outputs).all(axis=1) | ~(pressure > 0.0)))
         raise InputError(
@@ -71,8 +74,8 @@ def check_outputs(rig, outputs):
             f'rig {rig.name}')
     law = rig.muscle.law.law
     if not law.EXTRAPOLATES:
-        gauge = outputs[:, layout.OUT_TRUE_PRESSURE] - P_ATM_PA
-        beyond = law.outside(gauge, outputs[:, layout.OUT_TRUE_CONTRACTION] / rig.muscle.length_m)
+        beyond = law.outside(
+            pressure - P_ATM_PA, seen['true_contraction_m'] / rig.muscle.length_m)
         if beyond.any():
             low, high = law.validity.pressure_gauge_pa
             warnings.warn(
@@ -84,7 +87,7 @@ def check_outputs(rig, outputs):
 
 def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
     """
-    Return (inputs (N, INP_SIZE), contraction at the start or None).
+    Return (inputs, N rows of ``layout.INPUT``; contraction at the start or None).
 
     Raises
     ------
@@ -104,12 +107,13 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
     count = len(signal)
     for column, name in enumerate(rig.signal_names):
         _check_range(signal[:, column], *rig.signal_range, name)
-    inputs = np.zeros((count, layout.INP_SIZE))
+    inputs = np.zeros((count, size_of(INPUT)))
     inputs[:, :wanted] = signal
+    given = columns(inputs, INPUT)
     if external_force_n is not None:
         force = _sized(external_force_n, (count,), 'external_force_n')
         _check_range(force, -MAX_FORCE_N, MAX_FORCE_N, 'N', 'external_force_n')
-        inputs[:, layout.INP_EXTERNAL_FORCE] = force
+        given['external_force_n'] = force
     start = None
     if contraction_m is not None:
         if LOADS[rig.load].MOVES_FREELY:
@@ -120,8 +124,8 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
         low, high = (share * rig.muscle.length_m for share in STRAIN_RANGE)
         _check_range(path, low, high, 'm', 'contraction_m')
         start = float(path[0])
-        inputs[:len(path) - 1, layout.INP_CONTRACTION] = path[1:]
-        inputs[len(path) - 1:, layout.INP_CONTRACTION] = path[-1]
+        given['contraction_m'][:len(path) - 1] = path[1:]
+        given['contraction_m'][len(path) - 1:] = path[-1]
     elif LOADS[rig.load].NEEDS_CONTRACTION:
         raise InputError('is missing; a driven load needs it', 'contraction_m')
     return inputs, start
