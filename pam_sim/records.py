@@ -25,7 +25,6 @@ from collections.abc import Mapping
 import types
 from typing import Any
 
-from llvmlite import ir
 from numba import types as numba_types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
@@ -212,6 +211,7 @@ def _part_of_record(context: Any, builder: Any, signature: Any, arguments: Any) 
 
 
 def _address(context: Any, builder: Any, signature: Any, begin: Any, place: Any) -> Any:
-    numbers = builder.bitcast(begin, ir.DoubleType().as_pointer())
+    pointer = context.get_value_type(numba_types.CPointer(numba_types.float64))
+    numbers = builder.bitcast(begin, pointer)
     found = cgutils.gep_inbounds(builder, numbers, place)
     return builder.bitcast(found, context.get_value_type(signature.return_type))
