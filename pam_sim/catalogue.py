@@ -48,8 +48,10 @@ def catalogue():
         Each with ``kind``, ``name``, ``sentence``, ``equation``, ``source`` (str),
         ``parameters`` (list of dict: name, unit, nominal, lower, upper, description,
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
-        ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``;
-        valves ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
+        ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``,
+        ``fitted`` (what ``pam gap`` fits: name, typical, lower, upper), ``limits`` (simpler
+        look-alikes), ``same_as`` (number of the model); valves ``signals``; rigs ``yaml``. A
+        muscle's nominal numbers are its own. Plain data.
 
     Raises
     ------
@@ -127,11 +129,16 @@ def _effect(effect):
         found |= effect.report(nominal, Rig('nominal', 'hanging_mass', valve=valve))
     reported = [{'name': name, 'unit': unit, 'nominal': value}
                 for name, (value, unit) in found.items()]
+    fitted = {free.name: free for valve in effect.valves
+              for free in effect.free_parameters(valve)}
     return _entry(
         'effect', effect.name, effect.sentence, effect.equation, effect.source,
         effect.parameters, subsystem=effect.subsystem, family=effect.family,
         valves=list(effect.valves), variant_of=effect.variant_of,
-        relative_of=list(effect.relative_of), reported=reported)
+        relative_of=list(effect.relative_of), reported=reported,
+        fitted=[{'name': free.name, 'typical': free.typical, 'lower': free.lower,
+                 'upper': free.upper} for free in fitted.values()],
+        limits=list(effect.fitting.limits), same_as=effect.fitting.same_as)
 
 
 def _by_subsystem(found):

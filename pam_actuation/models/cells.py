@@ -52,6 +52,12 @@ def facts(entry):
         ('valve types', ', '.join(entry.get('valves', ()))),
         ('another form of', entry.get('variant_of', '')),
         ('looks like, and is not named', ', '.join(entry.get('relative_of', ()))),
+        ('simpler look-alikes, named instead where they explain as much',
+         ', '.join(entry.get('limits', ()))),
+        ('does the same as the number', entry.get('same_as', '')),
+        ('fitted', '; '.join(
+            f'{item["name"]} {_range((item["lower"], item["upper"]), 1.0)}, '
+            f'typically {item["typical"]:g}' for item in entry.get('fitted', ()))),
         ('signals', ', '.join(entry.get('signals', ()))),
         ('claims', ' '.join(f'({n}) {rule}' for n, rule in entry.get('claims', {}).items())),
         ('source', entry['source'])) if value]

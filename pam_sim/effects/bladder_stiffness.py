@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -32,6 +33,10 @@ EFFECT = Effect(
     amplitude=('stiffness_n_per_m',),
     reported=(Reported(
         'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m']),),
+    fitting=Fitting(
+        free=(
+            # It takes force; one that gave some would be an error of the force map.
+            FreeParameter('stiffness_n_per_m', 200.0, 0.0, 1e4),)),
 )
 
 

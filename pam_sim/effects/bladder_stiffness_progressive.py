@@ -17,8 +17,9 @@
 from pam_sim.compiled import compiled
 from pam_sim.effects.bladder_stiffness import EFFECT as _SIBLING
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.progressive import (
-    HARDENING, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
+    HARDENING, HARDENING_FREE, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
 
 EFFECT = Effect(
     name='bladder_stiffness_progressive',
@@ -32,6 +33,7 @@ EFFECT = Effect(
     amplitude=_SIBLING.amplitude,
     reported=SECANT_REPORTED,
     pack=pack_progressive,
+    fitting=Fitting(free=(FreeParameter('stiffness_n_per_m', 200.0, 0.0, 1e4), HARDENING_FREE)),
 )
 
 

@@ -39,6 +39,7 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import braid
 from pam_sim.parameters import Parameter
 
@@ -96,6 +97,7 @@ EFFECT = Effect(
                        *_constants(values, rig.muscle)))),),
     slots=5,
     pack=_pack,
+    fitting=Fitting(free=(FreeParameter('friction_coefficient', 0.3, 0.0, 2.0),)),
 )
 
 

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -31,6 +32,7 @@ EFFECT = Effect(
     amplitude=('bias_m',),
     reported=(Reported('bias_m', 'm', lambda values, rig: values['bias_m']),),
     order=60,               # after lag and scale
+    fitting=Fitting(sensor_signal='contraction', sensor_change='bias'),
 )
 
 

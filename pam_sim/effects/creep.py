@@ -22,6 +22,7 @@ Generalised Maxwell solid, e.g. Findley, Lai, Onaran (1976), ch. 5.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 _K1, _TAU1, _K2, _TAU2 = range(4)
@@ -67,6 +68,13 @@ EFFECT = Effect(
     ),
     states=2,
     initial=_initial,
+    fitting=Fitting(
+        free=(
+            FreeParameter('stiffness_1_n_per_m', 50.0, 0.0, 5e3),
+            FreeParameter('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
+            FreeParameter('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
+            FreeParameter('time_constant_2_s', 10.0, 4.0, 100.0, True, ends=('upper',))),
+        limits=('viscous_damping', 'bladder_stiffness')),
 )
 
 

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -32,6 +33,7 @@ EFFECT = Effect(
     amplitude=('extra_volume_m3',),
     reported=(Reported('extra_volume_m3', 'm3', lambda values, rig: values['extra_volume_m3']),),
     valves=('hsv',),
+    fitting=Fitting(free=(FreeParameter('extra_volume_m3', 2e-6, 0.0, 1e-4),), same_as='V_dead'),
 )
 
 

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass, field
 
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import check_parameters
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
@@ -117,6 +118,8 @@ class Effect:
         Effects of one hook are applied by rising order, then name.
     active : callable, optional
         ``active(values, numbers) -> bool``; by default any amplitude not zero.
+    fitting : Fitting
+        What a fit to recordings needs: ranges, starts, look-alikes.
 
     """
 
@@ -138,6 +141,7 @@ class Effect:
     valves: tuple = ('ppr', 'hsv')
     order: int = 50
     active: object = None
+    fitting: Fitting = Fitting()
     hooks: dict = field(default_factory=dict, compare=False)
 
     def __post_init__(self):
@@ -147,6 +151,17 @@ class Effect:
         known = {parameter.name for parameter in self.parameters}
         if self.subsystem not in SUBSYSTEMS or not self.amplitude or set(self.amplitude) - known:
             raise ValueError(f'effect {self.name}: wrong subsystem or amplitude')
+        fitted = {free.name for free in self.fitting.free}
+        if (fitted | {*self.fitting.edges, *filter(None, [self.fitting.delay])}) - known:
+            raise ValueError(f'effect {self.name}: fits what is no parameter of it')
+
+    def free_parameters(self, valve: str) -> tuple[FreeParameter, ...]:
+        """Return what is fitted with a type of valve; by default every amplitude."""
+        declared = tuple(free for free in self.fitting.free if valve in free.valves)
+        return declared or tuple(
+            FreeParameter(p.name, abs(p.nominal) or 1e-3 * max(abs(p.lower), abs(p.upper)),
+                          p.lower, p.upper)
+            for p in self.parameters if p.name in self.amplitude)
 
     def values(self, given=(), where=''):
         """Return all parameter values, checked; nominal where not given (see Parameter)."""

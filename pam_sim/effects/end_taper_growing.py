@@ -17,6 +17,7 @@
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.end_taper import EFFECT as _SIBLING, force_change_n
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 _AT_START, _PER_STRAIN = range(2)
@@ -48,6 +49,11 @@ EFFECT = Effect(
         Reported('force_change_at_500kpa_10mm_n', 'N',
                  lambda values, rig: force_change_n({'k_minus_1': _there(values, rig)}, rig)),
     ),
+    fitting=Fitting(
+        free=(
+            FreeParameter('k_minus_1', 0.05, -0.3, 1.0),
+            FreeParameter('k_per_strain', 0.2, -3.0, 3.0)),
+        refinement=True),
 )
 
 

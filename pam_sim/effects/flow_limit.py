@@ -24,6 +24,7 @@ is the rig's own supply.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
@@ -32,6 +33,7 @@ from pam_sim.valve.flow import mass_flow_kg_per_s
 CRITICAL_RATIO = 0.3
 _GAUGE_PA, _CONTRACTION_M, _NOMINAL_SUPPLY_PA = 400e3, 0.010, 801_325.0
 _NO_LIMIT = 1e30
+_RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
 _FILL, _VENT, _SUPPLY, _ATMOSPHERE, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(8)
 
 
@@ -74,6 +76,10 @@ EFFECT = Effect(
     pack=_pack,
     valves=('ppr',),
     order=40,               # the regulator's own rate: before what leaks behind it
+    fitting=Fitting(
+        free=(
+            FreeParameter('fill_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES),
+            FreeParameter('vent_rate_at_400kpa_pa_per_s', 1e6, 5e4, 5e7, True, _RATES))),
 )
 
 

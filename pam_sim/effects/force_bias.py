@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -31,6 +32,7 @@ EFFECT = Effect(
     amplitude=('bias_n',),
     reported=(Reported('bias_n', 'N', lambda values, rig: values['bias_n']),),
     order=60,               # after lag and scale
+    fitting=Fitting(sensor_signal='force', sensor_change='bias'),
 )
 
 

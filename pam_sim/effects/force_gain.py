@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -30,6 +31,7 @@ EFFECT = Effect(
     ),
     amplitude=('gain_error',),
     reported=(Reported('gain_error', '-', lambda values, rig: values['gain_error']),),
+    fitting=Fitting(sensor_signal='force', sensor_change='gain'),
 )
 
 

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -31,6 +32,7 @@ EFFECT = Effect(
     ),
     amplitude=('force_n',),
     reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),),
+    fitting=Fitting(free=(FreeParameter('force_n', 1.0, 0.0, 50.0),)),
 )
 
 

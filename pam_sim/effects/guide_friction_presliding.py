@@ -18,9 +18,11 @@ from functools import partial
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.guide_friction import EFFECT as _SIBLING
 from pam_sim.effects.presliding import (
-    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_SLOTS, share_of_sliding, SOURCE)
+    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_FREE, PRESLIDING_SLOTS,
+    share_of_sliding, SOURCE)
 
 _LEVEL = PRESLIDING_SLOTS
 
@@ -40,6 +42,9 @@ EFFECT = Effect(
     states=1,
     slots=PRESLIDING_SLOTS + _SIBLING.slots,
     pack=partial(pack_presliding, _SIBLING),
+    fitting=Fitting(
+        free=(FreeParameter('force_n', 1.0, 0.0, 50.0), *PRESLIDING_FREE),
+        refinement=True),
 )
 
 

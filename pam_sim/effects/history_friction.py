@@ -35,8 +35,10 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
+    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    pack_level)
 from pam_sim.parameters import Parameter
 
 _DEPTH = 8              # turning points remembered, the start included
@@ -77,6 +79,7 @@ EFFECT = Effect(
     slots=LEVEL_SLOTS + 2,
     pack=_pack,
     initial=_initial,
+    fitting=Fitting(free=(*LEVEL_FREE, FreeParameter('width_m', 8e-4, 2e-4, 8e-3, True))),
 )
 
 

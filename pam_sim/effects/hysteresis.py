@@ -23,8 +23,10 @@ Automatic Control 50(11); for muscles Vo-Minh et al. (2011), Mechatronics 21.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
+    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    pack_level)
 from pam_sim.parameters import Parameter
 
 # Break-away travel and weight of each element, design values.
@@ -59,6 +61,9 @@ EFFECT = Effect(
     states=_ELEMENTS,
     slots=LEVEL_SLOTS + 2 * _ELEMENTS,
     pack=_pack,
+    fitting=Fitting(
+        free=(*LEVEL_FREE, FreeParameter('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
+        limits=('coulomb_friction', 'pressure_friction')),
 )
 
 

@@ -27,8 +27,10 @@ large one does not close on itself, unlike Maxwell slip.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
+    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    pack_level)
 from pam_sim.parameters import Parameter
 
 _INVERSE_WIDTH, _EXPONENT, _BACK = range(LEVEL_SLOTS, LEVEL_SLOTS + 3)
@@ -64,6 +66,7 @@ EFFECT = Effect(
     states=1,
     slots=LEVEL_SLOTS + 3,
     pack=_pack,
+    fitting=Fitting(free=(*LEVEL_FREE, FreeParameter('width_m', 8e-4, 2e-4, 8e-3, True))),
 )
 
 

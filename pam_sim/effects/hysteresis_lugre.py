@@ -33,18 +33,33 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED, pack_level)
+    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    pack_level)
 from pam_sim.effects.presliding import bent
 from pam_sim.parameters import Parameter
 
 _STIFFNESS, _DAMPING, _EXCESS, _INVERSE_SPEED = range(LEVEL_SLOTS, LEVEL_SLOTS + 4)
+
+_NARROW_M, _AT_PA = 1e-4, 4e5      # a loop that is narrower at this pressure is dry friction
 
 
 def _pack(values, numbers):
     return (*pack_level(values, numbers),
             values['stiffness_n_per_m'], values['bristle_damping_n_s_per_m'],
             values['static_ratio'] - 1.0, 1.0 / values['stribeck_m_per_s'])
+
+
+def _is_dry(values):
+    """
+    Return whether bristles slip after so short a way that they are dry friction.
+
+    Their stiffness alone does not tell: a small force bends stiff ones as little as a large
+    one bends stiffer ones.
+    """
+    force_n = values['force_n'] + _AT_PA * values['force_per_pa']
+    return force_n < _NARROW_M * values['stiffness_n_per_m']
 
 
 EFFECT = Effect(
@@ -73,6 +88,9 @@ EFFECT = Effect(
     states=1,
     slots=LEVEL_SLOTS + 4,
     pack=_pack,
+    fitting=Fitting(
+        free=(*LEVEL_FREE, FreeParameter('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
+        is_limit=_is_dry),
 )
 
 

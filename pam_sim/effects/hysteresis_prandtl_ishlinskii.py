@@ -32,6 +32,7 @@ give the same kind of loop. Both return to the point where a minor loop began.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 # Half width of each play over that of the loop, and its weight: design values.
@@ -84,6 +85,10 @@ EFFECT = Effect(
     pack=_pack,
     initial=_initial,
     order=40,               # on the true pressure, before a threshold is taken off
+    fitting=Fitting(
+        free=(
+            FreeParameter('half_width_pa', 2e3, 0.0, 5e4),
+            FreeParameter('half_width_per_pa', 0.02, 0.0, 0.3))),
 )
 
 

@@ -21,6 +21,7 @@ left with a small droop.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
 from pam_sim.units import (
@@ -65,6 +66,7 @@ EFFECT = Effect(
     ),
     slots=7,
     pack=_pack,
+    fitting=Fitting(free=(FreeParameter('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),)),
 )
 
 

@@ -22,6 +22,7 @@ grows with p.
 import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.leakage import CRITICAL_RATIO, EFFECT as _SIBLING, flow_at_400kpa
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
@@ -72,6 +73,10 @@ EFFECT = Effect(
     ),
     slots=8,
     pack=_pack,
+    fitting=Fitting(
+        free=(
+            FreeParameter('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),
+            FreeParameter('slit_flow_at_400kpa_kg_per_s', 1e-7, 0.0, 1e-4))),
 )
 
 

@@ -21,6 +21,7 @@ packed values from ``par[k + LEVEL_SLOTS]`` on.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Reported
+from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 
 LEVEL_AMPLITUDE = ('force_n', 'force_per_pa')
@@ -29,6 +30,9 @@ _FORCE, _PER_PA, _ATMOSPHERE = range(LEVEL_SLOTS)
 LOOP_REPORTED = (Reported(
     'loop_half_width_at_400kpa_n', 'N',
     lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),)
+
+LEVEL_FREE = (FreeParameter('force_n', 1.0, 0.0, 50.0, starts=(1.0,)),
+              FreeParameter('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)))
 
 
 def level_parameters(what='half width of the loop'):

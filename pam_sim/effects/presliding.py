@@ -29,6 +29,7 @@ stable however short the way.
 import math
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 
 SOURCE = ('LuGre, Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE Trans. Automatic '
@@ -43,6 +44,10 @@ PARAMETERS = (
     Parameter('stribeck_m_per_s', 'm/s', 3e-3, 1e-4, 1.0,
               description='Speed v_s at which the friction falls to the sliding one.'),
 )
+# Bent by more, it is a loop.
+PRESLIDING_FREE = (
+    FreeParameter('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
+    FreeParameter('static_excess', 0.05, 0.0, 0.6))
 PRESLIDING_SLOTS = 4
 _WAY, _TIME, _EXCESS, _INVERSE_SPEED = range(PRESLIDING_SLOTS)
 _SLIDING = 40.0             # square of a relative speed; beyond, less than the last bit

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
 
@@ -44,6 +45,7 @@ EFFECT = Effect(
         'force_at_400kpa_n', 'N', lambda values, rig: values['force_at_400kpa_n']),),
     slots=2,
     pack=_pack,
+    fitting=Fitting(free=(FreeParameter('force_at_400kpa_n', 1.0, 0.0, 100.0),)),
 )
 
 

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
 
@@ -31,6 +32,7 @@ EFFECT = Effect(
     ),
     amplitude=('gain_error',),
     reported=(Reported('gain_error', '-', lambda values, rig: values['gain_error']),),
+    fitting=Fitting(sensor_signal='pressure', sensor_change='gain'),
 )
 
 

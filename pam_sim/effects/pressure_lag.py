@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import advance_sampled, pack_sampled
 from pam_sim.parameters import Parameter
 
@@ -42,6 +43,10 @@ EFFECT = Effect(
     initial=_initial,
     active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
     order=30,               # before scale and offset
+    fitting=Fitting(
+        free=(FreeParameter('time_constant_s', 0.01, 0.0, 0.2, starts=DELAY_STARTS_S),),
+        delay='time_constant_s',
+        sensor_signal='pressure', sensor_change='lag'),
 )
 
 

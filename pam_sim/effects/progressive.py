@@ -20,11 +20,13 @@ The first term of any hardening law; ``stiffness_n_per_m`` is the first paramete
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Reported
+from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 
 SOURCE = 'Spring with a linear rise of its secant; form and size: design choice.'
 HARDENING = Parameter('hardening_m', 'm', 0.1, 2e-3, 100.0,
                       description='Contraction x_h at which the secant has doubled.')
+HARDENING_FREE = FreeParameter('hardening_m', 0.1, 0.01, 1.0, True, ends=())
 _STIFFNESS, _PER_M = range(2)
 _AT_M = 14e-3               # where the secant is that of a linear spring fitted over the stroke
 SECANT_REPORTED = (Reported(

@@ -23,7 +23,7 @@ from pam_sim.plugins import pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
-_NOT_EFFECTS = ('effect', 'registry')
+_NOT_EFFECTS = ('effect', 'fitting', 'registry')
 _SHARED = ('lag', 'loop_level', 'presliding', 'progressive')   # that several effects call
 
 

@@ -25,7 +25,9 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
-from pam_sim.effects.loop_level import LEVEL_AMPLITUDE, LEVEL_SLOTS, loop_level_n, pack_level
+from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.loop_level import (
+    LEVEL_AMPLITUDE, LEVEL_FREE, LEVEL_SLOTS, loop_level_n, pack_level)
 from pam_sim.parameters import Parameter
 
 _INVERSE_SPEED = LEVEL_SLOTS
@@ -54,6 +56,8 @@ EFFECT = Effect(
     reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),),
     slots=LEVEL_SLOTS + 1,
     pack=_pack,
+    fitting=Fitting(
+        free=(*LEVEL_FREE, FreeParameter('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=()))),
 )
 
 

@@ -23,6 +23,7 @@ and stops at the nominal supply. Isothermal; at the start the reservoir is full.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 from pam_sim.rollout.layout import S_FILLED, S_SUPPLY
@@ -70,6 +71,11 @@ EFFECT = Effect(
     pack=_pack,
     initial=_initial,
     valves=('hsv',),
+    fitting=Fitting(
+        free=(
+            # A compressor that starts once more or less makes other valleys of the misfit.
+            FreeParameter('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True,
+                          (2e-4, 4e-4, 7e-4, 1.2e-3, 2.5e-3, 5e-3)),)),
 )
 
 

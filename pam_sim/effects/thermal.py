@@ -28,6 +28,7 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 
@@ -71,6 +72,9 @@ EFFECT = Effect(
     valves=('hsv',),
     active=lambda values, numbers: values['heat_exchange_time_s'] >= 1e-9,
     order=70,               # scales the flows that the other effects leave
+    fitting=Fitting(
+        free=(
+            FreeParameter('heat_exchange_time_s', 0.2, 0.01, 20.0, True, (0.05, 0.2, 1.0)),)),
 )
 
 

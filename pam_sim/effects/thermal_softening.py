@@ -25,6 +25,7 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 _REFERENCE_M_PER_S = 0.020
@@ -55,6 +56,10 @@ EFFECT = Effect(
     states=1,
     slots=3,
     pack=_pack,
+    fitting=Fitting(
+        free=(
+            FreeParameter('gain_loss_at_20mm_per_s', 0.02, -0.2, 0.5),
+            FreeParameter('time_constant_s', 60.0, 10.0, 600.0, True))),
 )
 
 

@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -30,6 +31,10 @@ EFFECT = Effect(
     ),
     amplitude=('pressure_pa',),
     reported=(Reported('pressure_pa', 'Pa', lambda values, rig: values['pressure_pa']),),
+    fitting=Fitting(
+        free=(
+            # It takes force; one that gave some would be an error of the force map.
+            FreeParameter('pressure_pa', 10e3, 0.0, 2e5),)),
 )
 
 

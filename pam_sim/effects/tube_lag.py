@@ -23,6 +23,7 @@ each valve. The mean of y over a physics step is used, exact for a held u.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import mean_of_held, pack_held
 from pam_sim.parameters import Parameter
 from pam_sim.valve.hsv import clip_duty
@@ -54,6 +55,9 @@ EFFECT = Effect(
     pack=pack_held,
     initial=_initial,
     order=40,               # before the threshold of the main stage
+    fitting=Fitting(
+        free=(FreeParameter('time_constant_s', 0.01, 0.0, 0.5, starts=DELAY_STARTS_S),),
+        delay='time_constant_s'),
 )
 
 

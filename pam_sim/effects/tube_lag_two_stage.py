@@ -22,6 +22,7 @@ PPR: y is the set point that reaches the regulator. HSV: y is the opening of eac
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.lag import mean_of_held, pack_held
 from pam_sim.effects.tube_lag import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
@@ -63,6 +64,11 @@ EFFECT = Effect(
     pack=_pack,
     initial=_initial,
     order=_SIBLING.order,
+    fitting=Fitting(
+        free=(
+            FreeParameter('time_constant_s', 0.01, 0.0, 0.5),
+            FreeParameter('second_stage_share', 0.2, 0.02, 0.5, True, ends=())),
+        refinement=True),
 )
 
 

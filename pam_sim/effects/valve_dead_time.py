@@ -19,6 +19,7 @@ import math
 import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 
@@ -64,6 +65,9 @@ EFFECT = Effect(
     pack=_pack,
     initial=_initial,
     order=90,               # after anything that changes the command itself
+    fitting=Fitting(
+        free=(FreeParameter('delay_s', 0.01, 0.0, 0.3, starts=DELAY_STARTS_S),),
+        delay='delay_s'),
 )
 
 

@@ -22,9 +22,16 @@ swallow short pulses, and a valve not yet shut at the next pulse stays open.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 _HALF_WIDTH, _OPEN, _CLOSE = range(3)
+
+# Their difference is added up by the valve, pulse by pulse; their sum is hardly seen.
+_TRIED_S = (1e-3, 1e-4, 0.0)
+SWITCHING_EDGES = ('open_time_s', 'close_time_s')
+SWITCHING_FREE = tuple(FreeParameter(name, 1e-3, 0.0, 9e-3, starts=_TRIED_S, valves=('hsv',))
+                       for name in SWITCHING_EDGES)
 
 
 def _active(values, numbers):
@@ -57,6 +64,11 @@ EFFECT = Effect(
         Reported('close_time_s', 's', lambda values, rig: values['close_time_s'], ('hsv',)),
     ),
     active=_active,
+    fitting=Fitting(
+        free=(
+            FreeParameter('half_width_pa', 2e3, 0.0, 5e4, valves=('ppr',)),
+            *SWITCHING_FREE),
+        edges=SWITCHING_EDGES),
 )
 
 

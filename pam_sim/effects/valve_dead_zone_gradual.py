@@ -28,7 +28,9 @@ import math
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
-from pam_sim.effects.valve_dead_zone import EFFECT as _SIBLING
+from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.valve_dead_zone import (
+    EFFECT as _SIBLING, SWITCHING_EDGES, SWITCHING_FREE)
 from pam_sim.parameters import Parameter
 
 _HALF_WIDTH, _OPEN, _CLOSE, _RAMP = range(4)
@@ -59,6 +61,12 @@ EFFECT = Effect(
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
     active=_SIBLING.active,
+    fitting=Fitting(
+        free=(
+            FreeParameter('half_width_pa', 2e3, 0.0, 5e4, valves=('ppr',)),
+            *SWITCHING_FREE,
+            FreeParameter('ramp_s', 5e-4, 0.0, 9e-3, valves=('hsv',))),
+        edges=SWITCHING_EDGES),
 )
 
 

@@ -21,7 +21,9 @@ that ends before it is whole opens partially and closes sooner.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
-from pam_sim.effects.valve_dead_zone import EFFECT as _SIBLING
+from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.valve_dead_zone import (
+    EFFECT as _SIBLING, SWITCHING_EDGES, SWITCHING_FREE)
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.parameters import Parameter
 
@@ -50,6 +52,13 @@ EFFECT = Effect(
     amplitude=('open_time_s', 'close_time_s'),
     reported=tuple(r for r in _SIBLING.reported if 'hsv' in r.valves),
     valves=('hsv',),
+    fitting=Fitting(
+        free=(
+            *SWITCHING_FREE,
+            FreeParameter('rise_s', 1e-3, 0.0, 9e-3, valves=('hsv',)),
+            FreeParameter('fall_s', 1e-3, 0.0, 9e-3, valves=('hsv',))),
+        refinement=True,
+        edges=SWITCHING_EDGES),
 )
 
 

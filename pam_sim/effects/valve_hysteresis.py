@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.valve.ppr import set_point_pa
 
@@ -43,6 +44,7 @@ EFFECT = Effect(
     initial=_initial,
     valves=('ppr',),
     order=30,               # the command's side of every lag
+    fitting=Fitting(free=(FreeParameter('half_width_pa', 2e3, 0.0, 5e4),)),
 )
 
 

@@ -21,6 +21,7 @@ its set point. HSV: the flow through the vent valve is smaller by the ratio.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 _RATIO, _INVERSE = range(2)
@@ -50,6 +51,7 @@ EFFECT = Effect(
     slots=2,
     pack=_pack,
     order=60,               # after what changes the set point
+    fitting=Fitting(free=(FreeParameter('ratio_minus_1', 0.2, -0.4, 4.0),)),
 )
 
 

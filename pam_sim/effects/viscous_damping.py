@@ -16,6 +16,7 @@
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
 EFFECT = Effect(
@@ -32,6 +33,9 @@ EFFECT = Effect(
     amplitude=('damping_n_s_per_m',),
     reported=(Reported(
         'force_at_50mm_per_s_n', 'N', lambda values, rig: 0.05 * values['damping_n_s_per_m']),),
+    fitting=Fitting(
+        free=(FreeParameter('damping_n_s_per_m', 20.0, -200.0, 1000.0),),
+        same_as='damping_n_s_per_m'),
 )
 
 

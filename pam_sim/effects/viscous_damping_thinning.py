@@ -21,6 +21,7 @@ linear below the speed v0, ever less above it.
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.viscous_damping import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
 
@@ -54,6 +55,10 @@ EFFECT = Effect(
     amplitude=_SIBLING.amplitude,
     reported=(Reported('force_at_50mm_per_s_n', 'N', _reported),),
     pack=_pack,
+    fitting=Fitting(
+        free=(
+            FreeParameter('damping_n_s_per_m', 20.0, -200.0, 1000.0),
+            FreeParameter('speed_m_per_s', 0.2, 0.02, 5.0, True, ends=()))),
 )
 
 

@@ -22,7 +22,7 @@ numbers of the model bent is dropped, and the simpler one stands for the one it 
 from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
-from pam_sim.gap.candidates import is_narrow, LIMITS
+from pam_sim.gap.candidates import is_limit, is_limit_at, same_as
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.hypothesis import Found, Hypothesis
 from pam_sim.gap.parts import FIT, SELECT
@@ -41,7 +41,6 @@ UNPOLISHED = 0.5             # of the rest a fit may still be better than it see
 EDGE = 0.02                  # of a shape to the end of its range, in its logarithm
 ALMOST = 0.9                 # of the best share; a simpler name with it stands for its limit
 STRAIN = 9.0                 # squared prior deviations more than a rival needs count against it
-SAME_AS = {'viscous_damping': 'damping_n_s_per_m', 'dead_volume': 'V_dead'}
 
 
 @dataclass
@@ -64,7 +63,7 @@ class Rival:
         """
         for place, c in enumerate(self.found.hypothesis.effects):
             if c.name == self.name:
-                return is_narrow(c, self.found.values()[place]) or any(
+                return is_limit_at(c, self.found.values()[place]) or any(
                     f.shape and abs(x - f.coordinate(getattr(f, end))) < EDGE
                     for f, x in zip(c.free, self.found.theta_of(place)) for end in f.ends)
         return False
@@ -73,7 +72,7 @@ class Rival:
     def is_exact(self):
         """Return whether it has one form: a number of the model, a bias or gain of a sensor."""
         return self.name not in effects() or (
-            effects()[self.name].subsystem == 'sensor' and not self.name.endswith('_lag'))
+            effects()[self.name].fitting.sensor_change in ('bias', 'gain'))
 
 
 @dataclass
@@ -164,8 +163,8 @@ class Choice:
         as_good = {r.name for r in tied if is_same(r) or (
                    r.t[s] < BETTER_T and r.share[s] > close)}
         return [r for r in tied
-                if not any((simple, r.name) in LIMITS for simple in as_good)
-                and SAME_AS.get(r.name) not in names]
+                if not any(is_limit(simple, r.name) for simple in as_good)
+                and same_as(r.name) not in names]
 
     def _polish(self, rivals):
         """Let those go on that have not yet; return whether there were any."""
@@ -297,4 +296,4 @@ def without_limits(rivals, current, subsystem):
     simple = {r.name for r in ranked if r.share[subsystem] > ALMOST * ranked[0].share[subsystem]}
     simple |= set(current.hypothesis.names)
     return [r for r in ranked if not r.at_edge
-            or not any((name, r.name) in LIMITS for name in simple)]
+            or not any(is_limit(name, r.name) for name in simple)]

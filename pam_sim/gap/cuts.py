@@ -350,12 +350,10 @@ def of_run(name, index):
 
 def acts_on(effect, subsystem):
     """Return whether an effect (by name) shows in a cut: ``valve`` or ``muscle``."""
-    place = get_effect(effect).subsystem
-    if place != 'sensor':
-        return (place == 'valve') == (subsystem == 'valve')
-    if effect.startswith('pressure'):
-        return True
-    return subsystem != 'valve'
+    found = get_effect(effect)
+    if found.subsystem != 'sensor':
+        return (found.subsystem == 'valve') == (subsystem == 'valve')
+    return found.fitting.sensor_signal == 'pressure' or subsystem != 'valve'
 
 
 def _smooth(recording, signal):

@@ -20,8 +20,9 @@ its cut without numbers that are bent for it.
 """
 
 import numpy as np
-from pam_sim.gap.candidates import LIMITS, relatives
-from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival, SAME_AS
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.candidates import is_limit, relatives, same_as
+from pam_sim.gap.choice import ALMOST, LATER_STEP, Named, RIVAL, Rival
 from pam_sim.gap.compare import CERTAIN_T, gap, preference, share
 from pam_sim.gap.cuts import acts_on, LATENCY_PRIOR_S, LATENCY_SD_S
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -36,9 +37,7 @@ NAMED_CLEARLY = 0.95         # in several formulations, where the rest is so cle
 CLEAR = 25.0                 # floors squared
 NEAR_FLOOR = 0.25            # floors squared; a rest so small may be the floor's own error
 CERTAIN_SIZE = 5.0           # standard deviations of the size of an effect, to be named
-TIMES = ('delay_s', 'time_constant_s')       # of effects that a sensor's filter looks like
 HELD = 0.5                   # of what a name leaves; a relative that leaves less is the likelier
-EDGES = ('open_time_s', 'close_time_s')
 ALIKE = 0.02                 # of the later edge; as far apart both are one delay
 RIVALS = 4                   # that are ranked again when further effects are in
 
@@ -52,11 +51,12 @@ def within_the_chain(found, place):
     """
     candidate, values = found.hypothesis.effects[place], found.values()[place]
     longest_s = LATENCY_SD_S + (LATENCY_PRIOR_S if acts_on(candidate.effect, 'valve') else 0.0)
-    if len(candidate.free) == 1 and candidate.free[0].name in TIMES:
-        return values[candidate.free[0].name] < longest_s
+    fitting = get_effect(candidate.effect).fitting
+    if fitting.delay:
+        return values[fitting.delay] < longest_s
     # A switching valve that opens as late as it closes delays, and swallows the shortest pulses.
-    edges = [values[name] for name in EDGES if name in values]
-    return (len(edges) == len(EDGES) and max(edges) < LATENCY_SD_S
+    edges = [values[name] for name in fitting.edges if name in values]
+    return (bool(edges) and max(edges) < LATENCY_SD_S
             and max(edges) - min(edges) <= ALIKE * max(edges))
 
 
@@ -111,7 +111,7 @@ class Finish:
     def _eliminate(self, current, named):
         """Drop what is not missed when it is left out, once there are several."""
         # A number and the effect that is another name of it are one; the effect has forms.
-        for w in [w for w in named if w.name in {SAME_AS.get(o.name) for o in named}]:
+        for w in [w for w in named if w.name in {same_as(o.name) for o in named}]:
             current, named = self._swapped(current, w.name), [o for o in named if o is not w]
         for w in list(named):
             if len(named) < 2:
@@ -150,7 +150,7 @@ class Finish:
         explains almost as much as both.
         """
         for other in named:
-            if (w.name, other.name) in LIMITS and Rival(other.name, without).at_edge:
+            if is_limit(w.name, other.name) and Rival(other.name, without).at_edge:
                 alone, s = self._swapped(current, other.name), w.subsystem
                 if self.choice.shares(alone)[s] > ALMOST * self.choice.shares(current)[s]:
                     return other, alone

@@ -28,6 +28,7 @@ from pam_sim.gap.result import FIELD, SIGNALS
 from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
+SENSOR_CHANGES = ('bias', 'gain', 'lag')
 START_S = 0.05               # the state at the start is read from this stretch
 # Feeding a measured pressure: a regulator this fast follows it exactly enough.
 FAST_T_S = 0.001
@@ -230,10 +231,12 @@ def true_value(signal, rig, value, rate):
 
 def sensor_changes(signal, rig):
     """Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none."""
-    settings = {e.name: e.parameters for e in rig.effects}
-    return tuple(
-        next(iter(settings[f'{signal}_{change}'].values()))
-        if settings.get(f'{signal}_{change}') else None for change in ('bias', 'gain', 'lag'))
+    found = {}
+    for setting in rig.effects:
+        fitting = get_effect(setting.name).fitting
+        if fitting.sensor_signal == signal and setting.parameters:
+            found[fitting.sensor_change] = next(iter(setting.parameters.values()))
+    return tuple(found.get(change) for change in SENSOR_CHANGES)
 
 
 def undone(signal, changes, value, rate):

@@ -28,7 +28,7 @@ import math
 import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
-from pam_sim.gap.candidates import candidates, LIMITS, split_refinements
+from pam_sim.gap.candidates import candidates, is_limit, split_refinements
 from pam_sim.gap.cuts import acts_on, cuts_of
 from pam_sim.gap.fit import BOX
 from pam_sim.gap.parts import UNUSED
@@ -136,7 +136,7 @@ class Inner:
         column = self.priors + self.names.index(name)
         return {rival: min(self.left(column, columns) for columns in formulations.values())
                 for rival, formulations in self.rivals.items()
-                if rival != name and (name, rival) not in LIMITS}
+                if rival != name and not is_limit(name, rival)}
 
     def left(self, column, free=()):
         """

@@ -24,7 +24,7 @@ missed when it is left out.
 from dataclasses import dataclass, field
 
 from pam_sim.effects.registry import effects
-from pam_sim.gap.candidates import candidates, LIMITS, split_refinements
+from pam_sim.gap.candidates import candidates, is_limit, split_refinements
 from pam_sim.gap.choice import Choice, CLOSE, least_gain, RIVAL, Rival
 from pam_sim.gap.compare import gap
 from pam_sim.gap.cuts import acts_on
@@ -306,7 +306,7 @@ class Search(Finish):
             if plain is not None:
                 values = plain.found.values()[place]
                 found.append(Screened(c, tuple(
-                    f.coordinate(values.get(f.name, f.scale)) for f in c.free), {}))
+                    f.coordinate(values.get(f.name, f.typical)) for f in c.free), {}))
         return found
 
     def _names_that_contend(self, rivals, current, cuts):
@@ -356,7 +356,7 @@ class Search(Finish):
         """
         ranked = sorted(screened, key=lambda s: -sum(s.promise.values()))
         return _first_of_each([s for s in ranked if any(
-            (name, s.candidate.name) in LIMITS for name in taken)])
+            is_limit(name, s.candidate.name) for name in taken)])
 
     @staticmethod
     def _ranked(screened, subsystem):

@@ -20,6 +20,7 @@ are lowered by misfit and memory until they agree with the errors.
 """
 
 import numpy as np
+from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.gap.cuts import acts_on
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -45,7 +46,8 @@ def shows(effect, cut):
 
     What is read of the contraction, the volume behind the valve is taken from, too.
     """
-    return acts_on(effect, cut.subsystem) or effect.startswith('contraction')
+    return (acts_on(effect, cut.subsystem)
+            or get_effect(effect).fitting.sensor_signal == 'contraction')
 
 
 def within_reach(hypothesis, known, cuts):

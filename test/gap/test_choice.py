@@ -134,7 +134,7 @@ def test_an_experiment_decides_by_what_the_truth_leaves_not_by_a_floor_above_it(
     """Rivals of nearly one form: what both leave of many steps is below a careful floor."""
     names = ('valve_dead_time', 'tube_lag_two_stage')
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
-    starts = {n: [f.coordinate(f.scale) for f in by_name[n].free] for n in names}
+    starts = {n: [f.coordinate(f.typical) for f in by_name[n].free] for n in names}
     rivals = [(n, None, Hypothesis((by_name[n],)), starts[n]) for n in names]
     truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.0087})])
     steps = np.repeat(np.random.default_rng(4).uniform(3.2, 5.6, 24), 700)
@@ -226,7 +226,7 @@ def test_a_number_that_came_back_into_its_tolerance_is_not_wrong(z, stays):
 def test_a_lag_that_any_filter_may_have_is_no_effect(name, size, is_so):
     effect = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
                   if c.effect == name)
-    theta = [f.coordinate(size or f.scale) for f in effect.free]
+    theta = [f.coordinate(size or f.typical) for f in effect.free]
     assert within_the_chain(Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == is_so
 
 

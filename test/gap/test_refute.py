@@ -16,7 +16,7 @@
 
 from gap_runs import nominal
 import numpy as np
-from pam_sim.gap.candidates import candidates, is_narrow
+from pam_sim.gap.candidates import candidates, is_limit_at
 from pam_sim.gap.choice import Named, Rival
 from pam_sim.gap.cuts import SKEW_MAX_S
 from pam_sim.gap.hypothesis import Found, Hypothesis
@@ -155,8 +155,8 @@ def test_effects_are_taken_out_while_the_numbers_stay():
 @pytest.mark.parametrize('force_n, is_so', [(0.05, True), (1.0, False)])
 def test_stiff_bristles_under_a_small_force_are_dry_friction(force_n, is_so):
     values = {'force_n': force_n, 'force_per_pa': 0.0, 'stiffness_n_per_m': 3e3}
-    assert is_narrow(BY_NAME['hysteresis_lugre'], values) == is_so
-    assert not is_narrow(BY_NAME['coulomb_friction'], {'force_n': force_n})
+    assert is_limit_at(BY_NAME['hysteresis_lugre'], values) == is_so
+    assert not is_limit_at(BY_NAME['coulomb_friction'], {'force_n': force_n})
 
 
 @pytest.mark.parametrize('harm', ['muscle', 'valve', None])

@@ -137,7 +137,7 @@ def test_a_valve_that_opens_as_late_as_it_closes_only_delays(form, open_s, close
     effect = next(c for c in candidates(switching, ('pressure', 'contraction'))
                   if c.effect == form)
     times = {'open_time_s': open_s, 'close_time_s': close_s}
-    theta = [f.coordinate(times.get(f.name, f.scale)) for f in effect.free]
+    theta = [f.coordinate(times.get(f.name, f.typical)) for f in effect.free]
     assert within_the_chain(
         Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == delays
 

@@ -67,6 +67,7 @@ EFFECT_FILE = """
 import math
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 EFFECT = Effect(
     name='notched_rail', family='friction', subsystem='load',
@@ -74,7 +75,9 @@ EFFECT = Effect(
     equation='m dv/dt = F - c v - m g - F_n sin(x / 0.6 mm)',
     parameters=(Parameter('force_n', 'N', 1.0, 0.0, 10.0, description='Depth of a notch.'),),
     amplitude=('force_n',),
-    reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),))
+    reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),),
+    fitting=Fitting(free=(FreeParameter('force_n', 0.4, 0.0, 9.5),),
+                    limits=('guide_friction',)))
 @compiled
 def load_force(force_n, x, v, dx, elapsed, state, i, par, k):
     return force_n + par[k] * math.sin(x / 0.0006)
@@ -94,6 +97,32 @@ rig = load_rig('rig.yaml')
 ours = rig.simulate(np.full(60, 4.0), initial_pressure_pa=501325.0)
 bare = rig.with_(effects=[]).simulate(np.full(60, 4.0), initial_pressure_pa=501325.0)
 print(abs(ours.contraction_m - bare.contraction_m).max() > 1e-6)
+"""
+
+RANKING = """
+from pam_sim import load_rig
+from pam_sim.gap.candidates import candidates, is_limit
+from pam_sim.gap.cuts import cuts_of
+from pam_sim.gap.fit import Problem
+from pam_sim.gap.free_run import Recording
+from pam_sim.gap.screen import screen
+from pam_sim.run import Run, Series
+import numpy as np
+rig = load_rig('dmsp_5_300_hanging_mass')
+stamp = np.arange(400) * 5_000_000
+volts = 4.0 + np.sin(stamp * 3e-9)
+seen = load_rig('rig.yaml').simulate(np.repeat(volts, 5), initial_pressure_pa=501325.0)
+random = np.random.default_rng(1)
+run = Run({'valve_signal': Series(stamp, {'ppr_voltage': volts}), **{
+    topic: Series(stamp, {field: getattr(seen, field)[:-1:5] + sd * random.normal(size=400)})
+    for topic, field, sd in (('pressure', 'pressure_pa', 300.0),
+                             ('contraction', 'contraction_m', 1e-5))}}, {}, '', '')
+problem = Problem(rig, cuts_of(rig, [Recording(run, 'ppr')]))
+names = ('notched_rail', 'coulomb_friction', 'guide_friction')
+pool = candidates(rig, ('pressure', 'contraction'), names)
+found = screen(problem, problem.base, [c for c in pool if c.effect in names])
+print(max(found, key=lambda s: s.promise.get('muscle', 0.0)).candidate.name,
+      is_limit('guide_friction', 'notched_rail'))
 """
 
 
@@ -122,6 +151,11 @@ def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
     assert 'notched_rail' in listed and 'Force proportional to pressure.' in listed
     shown = run(*verb, 'notched_rail')
     assert 'sin(x / 0.6 mm)' in shown and 'Depth of a notch.' in shown
+    assert 'force_n 0 to 9.5, typically 0.4' in shown
+    assert re.search('look-alikes.*guide_friction', shown)
+    run(*verb, '--markdown', 'models.md')
+    assert 'force\\_n 0 to 9.5, typically 0.4' in (tmp_path / 'models.md').read_text()
     run(*verb, '--html', 'models.html')
     assert 'id="effect-notched_rail"' in (tmp_path / 'models.html').read_text()
     assert run('-c', ROLLOUT).strip() == 'True'
+    assert run('-c', RANKING).split() == ['notched_rail', 'True']
