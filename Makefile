@@ -1,9 +1,10 @@
-# Two commands on a fresh machine with Python 3.11 or 3.12, git and make:
+# The commands on a fresh machine with Python 3.11 or 3.12, git and make:
 #
 #   make demo    run the rig on real ROS 2 nodes and show what comes out
 #   make test    run every test
+#   make docs    build the documentation: build/docs/index.html
 #
-# Both create the environment first (.venv, once, and again when setup.py changes).
+# All create the environment first (.venv, once, and again when setup.py changes).
 #   PYTHON=/path/to/python3.12    use this interpreter
 #   VENV=folder                   put the environment elsewhere
 #   ARGS="..."                    further arguments of `pam demo` or pytest
@@ -17,7 +18,7 @@ STAMP := $(VENV)/installed
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo test env clean
+.PHONY: help demo test docs env clean
 
 # PYTHON names another version than the environment has: it is made anew.
 VERSION_OF = $(shell "$(1)" -c 'import sys; print(sys.version_info[:2])' 2>/dev/null)
@@ -48,6 +49,10 @@ ifeq ($(strip $(ARGS)),)
 else
 	@$(BIN)/python -m pytest $(ARGS)
 endif
+
+docs: $(STAMP)
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs $(ARGS)
+	@echo 'documentation: build/docs/index.html'
 
 env: $(STAMP)
 

@@ -53,7 +53,16 @@ ROS_REQUIRES = [
     'ros-jazzy-rmw-fastrtps-cpp',
 ]
 
+# `make docs`; see docs/dependencies.md.
+DOCS_REQUIRES = [
+    'sphinx>=7.2',
+    'docutils>=0.21',    # formulas as MathML, with the arguments used
+    'myst-parser>=2.0',
+    'furo>=2024.1',
+]
+
 TEST_REQUIRES = [
+    *DOCS_REQUIRES,
     'pytest>=7.4',
     'pytest-timeout>=2.1',
     'pytest-xdist>=3.0',
@@ -124,7 +133,7 @@ setup(
     python_requires='>=3.11,<3.13',
     install_requires=RUN_REQUIRES,
     extras_require={
-        'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'cluster': CLUSTER_REQUIRES,
+        'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES, 'cluster': CLUSTER_REQUIRES,
         'ray': RAY_REQUIRES,
         'bench': BENCH_REQUIRES},
     zip_safe=False,

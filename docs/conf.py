@@ -1,0 +1,68 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Settings of the documentation: ``make docs`` builds it with Sphinx into build/docs."""
+
+import importlib.util
+from pathlib import Path
+import sys
+
+HERE = Path(__file__).resolve().parent
+# rosdoc2 builds a copy of this folder; the packages then say where the repository is.
+if not (HERE.parent / 'msg_docs').is_dir():
+    ROOT = Path(importlib.util.find_spec('pam_actuation').origin).resolve().parents[1]
+else:
+    ROOT = HERE.parent
+sys.path[:0] = [str(ROOT), str(ROOT / 'docs')]
+
+from generate import pages                      # noqa: E402
+from generate.mathml import add_mathml          # noqa: E402
+from generate.outside import links_into_site    # noqa: E402
+from pam_actuation import __version__           # noqa: E402
+
+project = 'pam_actuation'
+author = 'pam_actuation developers'
+copyright = '2026 pam_actuation developers'  # noqa: A001
+version = release = __version__
+
+extensions = ['myst_parser']
+root_doc = 'index'
+exclude_patterns = ['generate', 'static', 'figures/*.py']
+
+myst_enable_extensions = ['dollarmath', 'colon_fence', 'deflist']
+myst_heading_anchors = 4
+myst_dmath_double_inline = True
+# Two classes of one name in different modules: a type in a signature may lead to either.
+suppress_warnings = ['ref.python']
+
+# Furo brings its own style sheets and fonts of the system: nothing is fetched from a network.
+html_theme = 'furo'
+html_title = f'pam_actuation {__version__}'
+html_static_path = ['static']
+html_css_files = ['site.css']
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {'navigation_with_keys': True}
+pygments_style = 'friendly'
+pygments_dark_style = 'native'
+toc_object_entries = False
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 80
+
+
+def setup(app):
+    """Write the generated pages, then let Sphinx read the sources."""
+    pages.write_all(ROOT, Path(app.srcdir))
+    add_mathml(app)
+    app.connect('source-read', links_into_site)
