@@ -22,6 +22,7 @@ that turn a joint. A recorded run is a ``Run`` of ``Series``, a simulated one a 
 """
 
 import importlib
+from typing import Any
 
 from pam_sim.errors import InputError
 
@@ -38,13 +39,13 @@ __all__ = ['Grid', 'InputError', 'JointRig', 'Record', 'Response', 'Rig', 'Run',
            'preset_names', 'simulate_batch']
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     """Import the simulation only when it is asked for: it brings the compiler with it."""
     if name in _PLACES:
         return getattr(importlib.import_module(f'pam_sim.{_PLACES[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
 
 
-def __dir__():
+def __dir__() -> list[str]:
     """Return what there is, without importing it."""
     return sorted([*__all__, *(name for name in globals() if name.startswith('__'))])

@@ -14,9 +14,15 @@
 
 """Names for the types that annotations of both packages share."""
 
+import os
+from typing import Any, TypeVar
+
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+StrPath = str | os.PathLike[str]
+# float64 everywhere; numpy's own annotations are this wide for what it calculates.
+FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Number = TypeVar('Number', float, FloatArray)      # one number, or an array of them

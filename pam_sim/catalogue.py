@@ -18,16 +18,21 @@ Everything the simulator knows, as plain data: laws, muscles, valves, loads, eff
 Read from the registries when asked, so that what is added there is listed here.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 import sys
+from types import ModuleType
+from typing import Any
 
+from pam_sim.effects.effect import Effect
 from pam_sim.effects.registry import effects
 from pam_sim.joint import joint_preset_names, load_joint, parameters as joint
 from pam_sim.load import LOADS
 from pam_sim.model_file import load_rig, preset_names
-from pam_sim.muscle.law import RULES
+from pam_sim.muscle.law import MuscleLaw, RULES
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names, MUSCLE_PARAMETERS
 from pam_sim.muscle.registry import laws
+from pam_sim.parameters import Parameter
 from pam_sim.plugins import pick
 from pam_sim.rig import Rig
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -38,7 +43,7 @@ KINDS = {
     'effect': 'Effects', 'sensors': 'Sensors', 'rig': 'Rigs'}
 
 
-def catalogue():
+def catalogue() -> list[dict[str, Any]]:
     """
     Return every entry, grouped by kind in the order of :data:`KINDS`.
 
@@ -71,7 +76,7 @@ def catalogue():
     ]
 
 
-def find(entries, name):
+def find(entries: Iterable[dict[str, Any]], name: str) -> list[dict[str, Any]]:
     """
     Return the entries of a name.
 
@@ -85,17 +90,19 @@ def find(entries, name):
     return [entry for entry in entries if entry['name'] == name]
 
 
-def _entry(kind, name, sentence, equation, source, parameters, **more):
+def _entry(
+        kind: str, name: str, sentence: str, equation: str, source: str,
+        parameters: Iterable[Parameter], **more: Any) -> dict[str, Any]:
     return {'kind': kind, 'name': name, 'sentence': sentence, 'equation': equation,
             'source': source, 'parameters': [_parameter(item) for item in parameters], **more}
 
 
-def _parameter(item):
+def _parameter(item: Parameter) -> dict[str, Any]:
     return {key: getattr(item, key) for key in (
         'name', 'unit', 'nominal', 'lower', 'upper', 'description', 'source')}
 
 
-def _law(law):
+def _law(law: type[MuscleLaw]) -> dict[str, Any]:
     sets = [{'name': name, 'values': dict(numbers.values), 'rests_on': numbers.rests_on,
              'pressure_gauge_pa': list(numbers.validity.pressure_gauge_pa),
              'strain': list(numbers.validity.strain)} for name, numbers in law.SETS.items()]
@@ -105,7 +112,7 @@ def _law(law):
         claims={str(number): RULES[number] for number in law.CLAIMS})
 
 
-def _muscle(name):
+def _muscle(name: str) -> dict[str, Any]:
     muscle = get_muscle(name)
     law = f'law {muscle.law.name}, set {muscle.law.law.muscle}'
     own = [replace(item, nominal=getattr(muscle, item.name), source='') for item in DIMENSIONS]
@@ -116,15 +123,15 @@ def _muscle(name):
         (*own, *MUSCLE_PARAMETERS))
 
 
-def _module(kind, module, **more):
+def _module(kind: str, module: ModuleType, **more: Any) -> dict[str, Any]:
     return _entry(
         kind, module.NAME, getattr(module, 'SENTENCE', '') or _first_sentence(module),
         getattr(module, 'EQUATION', ''), getattr(module, 'SOURCE', ''), module.PARAMETERS, **more)
 
 
-def _effect(effect):
+def _effect(effect: Effect) -> dict[str, Any]:
     nominal = effect.values()
-    found = {}
+    found: dict[str, tuple[float, str]] = {}
     for valve in effect.valves:
         found |= effect.report(nominal, Rig('nominal', 'hanging_mass', valve=valve))
     reported = [{'name': name, 'unit': unit, 'nominal': value}
@@ -141,19 +148,19 @@ def _effect(effect):
         limits=list(effect.fitting.limits), same_as=effect.fitting.same_as)
 
 
-def _by_subsystem(found):
+def _by_subsystem(found: Mapping[str, Effect]) -> list[Effect]:
     return sorted(found.values(), key=lambda item: (
         ('valve', 'muscle', 'load', 'sensor').index(item.subsystem), item.family, item.name))
 
 
-def _sensors():
+def _sensors() -> dict[str, Any]:
     return _entry(
         'sensors', 'sensors', 'Noise, quantisation and stamp jitter of the readings.',
         'reading = round((signal + noise) / step) step, stamp = time + jitter',
         'White noise with an explicit seed; design choice.', SENSOR_PARAMETERS)
 
 
-def _rig(name):
+def _rig(name: str) -> dict[str, Any]:
     rig = load_rig(name)
     effect_names = ', '.join(setting.name for setting in rig.effects)
     return _entry(
@@ -162,14 +169,14 @@ def _rig(name):
         '', '', rig.parameter_list, yaml=rig.to_yaml())
 
 
-def _joint_rig(name):
+def _joint_rig(name: str) -> dict[str, Any]:
     rig = load_joint(name)
     return _entry(
         'rig', name, f'Load {rig.load}, flexor {rig.flexor.muscle.name}, extensor '
         f'{rig.extensor.muscle.name}.', '', '', joint.PARAMETERS, yaml=rig.to_yaml())
 
 
-def _first_sentence(module):
+def _first_sentence(module: ModuleType) -> str:
     """Return the first sentence of a module's docstring on one line."""
     paragraph = (module.__doc__ or '').strip().split('\n\n')[0]
     return ' '.join(paragraph.split())

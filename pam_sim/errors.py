@@ -14,6 +14,7 @@
 
 """The one error a user's mistake raises, anywhere in the two packages, and its hints."""
 
+from collections.abc import Iterable
 import difflib
 
 
@@ -33,13 +34,15 @@ class InputError(ValueError):
 
     """
 
-    def __init__(self, problem: str, where: str = ''):
+    def __init__(self, problem: str, where: str = '') -> None:
         self.problem = problem
         self.where = where
         super().__init__(f'{where}: {problem}' if where else problem)
 
 
-def did_you_mean(name, known, quote='`', inside=' (did you mean {}?)'):
+def did_you_mean(
+        name: object, known: Iterable[object], quote: str = '`',
+        inside: str = ' (did you mean {}?)') -> str:
     """
     Return a hint at the known name that a wrong one is nearest to, empty without any.
 
@@ -58,12 +61,12 @@ def did_you_mean(name, known, quote='`', inside=' (did you mean {}?)'):
         The hint, with ``{}`` for the name.
 
     """
-    known = [str(one) for one in known]
+    spellings = [str(one) for one in known]
     plain = _plain(name)
     if not plain:
         return ''
-    spelled = {}
-    for one in known:
+    spelled: dict[str, str] = {}
+    for one in spellings:
         spelled.setdefault(_plain(one), one)
     near = difflib.get_close_matches(plain, spelled, n=1) \
         or [one for one in spelled if len(plain) > 1 and one.startswith(plain)] \
@@ -71,5 +74,5 @@ def did_you_mean(name, known, quote='`', inside=' (did you mean {}?)'):
     return inside.format(f'{quote}{spelled[near[0]]}{quote}') if near else ''
 
 
-def _plain(name):
+def _plain(name: object) -> str:
     return str(name).strip().lower().replace('-', '_')

@@ -21,6 +21,7 @@ starts (``check_file``, ``check_folder``) and written through temporary files be
 device, a pipe, a folder or what a symbolic link points to.
 """
 
+from collections.abc import Iterable, Iterator
 import contextlib
 import os
 from pathlib import Path
@@ -28,6 +29,7 @@ import shutil
 import stat
 import tempfile
 
+from pam_sim.annotations import StrPath
 from pam_sim.errors import InputError
 
 LONGEST_NAME = 100            # of an experiment or muscle: the file system takes 255 bytes in all
@@ -39,7 +41,8 @@ _KINDS = ((stat.S_ISLNK, 'a symbolic link'), (stat.S_ISDIR, 'a folder'),
           (stat.S_ISSOCK, 'a socket'))
 
 
-def check_file(path, overwrite=True, parents=True, ours=''):
+def check_file(
+        path: StrPath, overwrite: bool = True, parents: bool = True, ours: str = '') -> Path:
     """
     Look whether a file can be written, before the work whose result it shall hold.
 
@@ -89,7 +92,8 @@ def check_file(path, overwrite=True, parents=True, ours=''):
     return target
 
 
-def check_folder(path, names=(), overwrite=True, ours=''):
+def check_folder(
+        path: StrPath, names: Iterable[str] = (), overwrite: bool = True, ours: str = '') -> Path:
     """
     Look whether results can be written into a folder, before the work that makes them.
 
@@ -126,7 +130,7 @@ def check_folder(path, names=(), overwrite=True, ours=''):
     return folder
 
 
-def refuse_pipe(path):
+def refuse_pipe(path: StrPath) -> None:
     """Raise InputError for a pipe or socket with a name, which would be waited for for ever."""
     mode = None
     with contextlib.suppress(OSError, ValueError):
@@ -137,7 +141,7 @@ def refuse_pipe(path):
         raise InputError(f'cannot be read: it is {_kind(mode)}; give a file', shown(path))
 
 
-def holds(path, words):
+def holds(path: StrPath, words: str) -> bool:
     """Return whether a file has these words near its beginning; line ends count as spaces."""
     if not words or not os.path.isfile(path):
         return False
@@ -148,7 +152,7 @@ def holds(path, words):
         return False
 
 
-def make_folder(path):
+def make_folder(path: StrPath) -> Path:
     """Make a folder and those above it; InputError where that cannot be."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
@@ -158,7 +162,7 @@ def make_folder(path):
 
 
 @contextlib.contextmanager
-def whole_file(path, suffix='', parents=True):
+def whole_file(path: StrPath, suffix: str = '', parents: bool = True) -> Iterator[str]:
     """
     Give the name of a temporary file that becomes ``path`` when the block ends well.
 
@@ -200,7 +204,7 @@ def whole_file(path, suffix='', parents=True):
 
 
 @contextlib.contextmanager
-def whole_files(folder):
+def whole_files(folder: StrPath) -> Iterator[Path]:
     """
     Give a folder whose files all go into ``folder`` when the block ends well, else none.
 
@@ -233,7 +237,7 @@ def whole_files(folder):
                 path.rmdir()
 
 
-def write_text(path, content, parents=True):
+def write_text(path: StrPath, content: str, parents: bool = True) -> Path:
     """Write a text file, whole or not at all; return its path. InputError as ``whole_file``."""
     with whole_file(path, parents=parents) as temporary:
         with open(temporary, 'w', encoding='utf-8') as stream:
@@ -241,7 +245,7 @@ def write_text(path, content, parents=True):
     return Path(path)
 
 
-def try_to_write(path):
+def try_to_write(path: StrPath) -> None:
     """
     Write a little beside ``path``, or into the nearest folder there is, and remove it again.
 
@@ -257,7 +261,7 @@ def try_to_write(path):
             raise InputError(
                 f'cannot be written: {shown(folder)} is no folder', shown(path))
         folder = folder.parent
-    handle = name = None
+    name = None
     try:
         handle, name = tempfile.mkstemp(prefix='.unfinished-', dir=folder)
         if os.write(handle, bytes(_TRIED_BYTES)) < _TRIED_BYTES:
@@ -270,23 +274,23 @@ def try_to_write(path):
             os.unlink(name)
 
 
-def cannot_write(path, error):
+def cannot_write(path: StrPath, error: OSError) -> InputError:
     """Return the InputError for an OSError that came while writing ``path``."""
     return InputError(f'cannot be written: {reason(error)}', shown(path))
 
 
-def reason(error):
+def reason(error: OSError) -> str:
     """Return why the operating system refused, in words."""
     return error.strerror or str(error)
 
 
-def shown(path):
+def shown(path: StrPath) -> str:
     """Return a path as text for a message, cut where it is long."""
     text = os.fspath(path)
     return text if len(text) <= _SHOWN else f'{text[:_SHOWN // 2]}…{text[-_SHOWN // 3:]}'
 
 
-def check_name(name, what, where):
+def check_name(name: str, what: str, where: str) -> str:
     """
     Return a name that is also used for files, such as that of an experiment.
 
@@ -308,7 +312,7 @@ def check_name(name, what, where):
     return name
 
 
-def _checked_path(path, what):
+def _checked_path(path: StrPath, what: str) -> Path:
     """Return a Path of which the system can at least say whether it is there."""
     text = os.fspath(path)
     if not text.strip():
@@ -330,7 +334,7 @@ def _checked_path(path, what):
     return Path(text)
 
 
-def _mode(path):
+def _mode(path: StrPath) -> int | None:
     """Return the file mode of what has this name, links not followed; None without any."""
     try:
         return os.lstat(path).st_mode
@@ -338,5 +342,5 @@ def _mode(path):
         return None
 
 
-def _kind(mode):
+def _kind(mode: int) -> str:
     return next((words for matches, words in _KINDS if matches(mode)), 'no regular file')

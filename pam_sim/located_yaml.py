@@ -20,11 +20,13 @@ keys are refused, and :class:`Located` checks type, range and spelling with the
 file and line in the message.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 import math
 import os
 import re
+from typing import Any, Self
 
+from pam_sim.annotations import StrPath
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import refuse_pipe
 from pam_sim.units import allowed_range
@@ -42,10 +44,10 @@ MAX_DIGITS = 300          # of a whole number; such a number still fits a float
 class _Loader(yaml.SafeLoader):
     """Safe loader with the YAML 1.2 core scalars only."""
 
-    yaml_implicit_resolvers: dict = {}
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
     depth = 0
 
-    def compose_node(self, parent, index):
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """Compose a node as the base class does, unless it is nested too deeply."""
         self.depth += 1
         if self.depth > MAX_DEPTH:
@@ -57,7 +59,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
 
-def _construct_int(loader, node):
+def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
     text = loader.construct_scalar(node)
     if len(text) > MAX_DIGITS:
         raise yaml.constructor.ConstructorError(
@@ -78,7 +80,7 @@ for _tag, _pattern, _first in (
         f'tag:yaml.org,2002:{_tag}', re.compile(_pattern), list(_first))
 
 
-class Located(Mapping):
+class Located(Mapping[str, Any]):
     """
     A YAML mapping that knows the line of each of its keys.
 
@@ -98,33 +100,36 @@ class Located(Mapping):
 
     """
 
-    def __init__(self, values, lines=None, name='<text>', line=1):
+    def __init__(
+            self, values: Mapping[str, Any], lines: Mapping[str, int] | None = None,
+            name: str = '<text>', line: int = 1) -> None:
         self._values = dict(values)
         self._lines = dict(lines or {})
         self.name = name
         self.line = line
 
-    def __getitem__(self, key):
+    def __getitem__(self, key: str) -> Any:
         """Return the value of a key."""
         return self._values[key]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         """Iterate over the keys in file order."""
         return iter(self._values)
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of keys."""
         return len(self._values)
 
-    def where(self, key=None):
+    def where(self, key: str | None = None) -> str:
         """Return ``file:line`` of a key, or of the mapping itself."""
-        return f'{self.name}:{self._lines.get(key, self.line)}'
+        line = self.line if key is None else self._lines.get(key, self.line)
+        return f'{self.name}:{line}'
 
-    def error(self, problem, key=None):
+    def error(self, problem: str, key: str | None = None) -> InputError:
         """Return an ``InputError`` placed at a key, ready to be raised."""
         return InputError(problem, self.where(key))
 
-    def check_keys(self, allowed, what='key'):
+    def check_keys(self, allowed: Iterable[str], what: str = 'key') -> Self:
         """
         Refuse keys that are not in ``allowed``.
 
@@ -142,8 +147,11 @@ class Located(Mapping):
                     f'{", ".join(allowed) or "none"}', key)
         return self
 
-    def require(self, key, type=None,  # noqa: A002
-                lower=None, upper=None, choices=None, unit=''):
+    def require(
+            self, key: str, type: type | None = None,  # noqa: A002
+            lower: float | None = None,
+            upper: float | None = None, choices: Collection[Any] | None = None,
+            unit: str = '') -> Any:
         """
         Return a value that must be there.
 
@@ -172,34 +180,42 @@ class Located(Mapping):
         return check_value(
             self._values[key], f'`{key}`', self.where(key), type, lower, upper, choices, unit)
 
-    def get(self, key, type=None,  # noqa: A002
-            default=None, lower=None, upper=None, choices=None, unit=''):
+    def get(  # type: ignore[override]
+            self, key: str, type: type | None = None, default: Any = None,  # noqa: A002
+            lower: float | None = None, upper: float | None = None,
+            choices: Collection[Any] | None = None, unit: str = '') -> Any:
         """Return a checked value as :meth:`require` does, or ``default`` if the key is absent."""
         if key not in self._values:
             return default
         return self.require(key, type, lower, upper, choices, unit)
 
-    def plain(self):
+    def plain(self) -> dict[str, Any]:
         """Return nested plain dicts and lists."""
         return {key: _plain(value) for key, value in self._values.items()}
 
 
-class LocatedList(list):
+class LocatedList(list[Any]):
     """A YAML sequence that knows the line of each item."""
 
-    def __init__(self, items=(), lines=(), name='<text>', line=1):
+    def __init__(
+            self, items: Iterable[Any] = (), lines: Iterable[int] = (), name: str = '<text>',
+            line: int = 1) -> None:
         super().__init__(items)
         self._lines = list(lines)
         self.name = name
         self.line = line
 
-    def where(self, index=None):
+    def where(self, index: int | None = None) -> str:
         """Return ``file:line`` of an item, or of the sequence itself."""
-        known = index is not None and 0 <= index < len(self._lines)
-        return f'{self.name}:{self._lines[index] if known else self.line}'
+        if index is None or not 0 <= index < len(self._lines):
+            return f'{self.name}:{self.line}'
+        return f'{self.name}:{self._lines[index]}'
 
-    def require(self, index, type=None,  # noqa: A002
-                lower=None, upper=None, choices=None, unit=''):
+    def require(
+            self, index: int, type: type | None = None,  # noqa: A002
+            lower: float | None = None,
+            upper: float | None = None, choices: Collection[Any] | None = None,
+            unit: str = '') -> Any:
         """Return item ``index`` checked as :meth:`Located.require` does."""
         if not 0 <= index < len(self):
             raise InputError(f'item {index + 1} is missing', self.where())
@@ -209,9 +225,11 @@ class LocatedList(list):
 
 _TYPE_NAMES = {float: 'a number', int: 'a whole number', str: 'a text', bool: 'true or false',
                dict: 'a mapping (key: value)', list: 'a list'}
+# Those named in `require` for what is checked as a plain dict or list.
+_PLAIN_TYPES: dict[type | None, type | None] = {Located: dict, LocatedList: list}
 
 
-def _has_type(value, wanted):
+def _has_type(value: object, wanted: type) -> bool:
     if wanted is float:
         return (isinstance(value, (int, float)) and not isinstance(value, bool)
                 and math.isfinite(value))
@@ -222,8 +240,10 @@ def _has_type(value, wanted):
     return isinstance(value, wanted)
 
 
-def check_value(value, what, where, type=None,  # noqa: A002
-                lower=None, upper=None, choices=None, unit=''):
+def check_value(
+        value: Any, what: str, where: str, type: type | None = None,  # noqa: A002
+        lower: float | None = None,
+        upper: float | None = None, choices: Collection[Any] | None = None, unit: str = '') -> Any:
     """
     Return ``value`` (a number as ``float`` where ``type`` is float) or raise.
 
@@ -236,7 +256,7 @@ def check_value(value, what, where, type=None,  # noqa: A002
         Wrong type, out of range or not among the choices.
 
     """
-    wanted = {Located: dict, LocatedList: list}.get(type, type)
+    wanted = _PLAIN_TYPES.get(type, type)
     if wanted is not None and not _has_type(value, wanted):
         raise InputError(
             f'{what} must be {_TYPE_NAMES.get(wanted, wanted.__name__)}, not {_shown(value)}'
@@ -250,11 +270,11 @@ def check_value(value, what, where, type=None,  # noqa: A002
     return float(value) if wanted is float else value
 
 
-def _near(value, choices):
+def _near(value: object, choices: Collection[object]) -> str:
     return did_you_mean(value, choices) if isinstance(value, str) else ''
 
 
-def _shown(value):
+def _shown(value: object) -> str:
     if isinstance(value, Mapping):
         return 'a mapping'
     if isinstance(value, list):
@@ -262,7 +282,7 @@ def _shown(value):
     return f'`{value}`' if isinstance(value, str) else repr(value)
 
 
-def _range_text(lower, upper, unit):
+def _range_text(lower: float | None, upper: float | None, unit: str) -> str:
     unit = f' {unit}' if unit else ''
     if lower is not None and upper is not None:
         return f'; allowed {allowed_range(lower, upper, unit.strip())}'
@@ -271,7 +291,7 @@ def _range_text(lower, upper, unit):
     return f'; allowed up to {upper:g}{unit}' if upper is not None else ''
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     if isinstance(value, Located):
         return value.plain()
     if isinstance(value, list):
@@ -279,7 +299,7 @@ def _plain(value):
     return value
 
 
-def load_yaml(path_or_text, name=None):
+def load_yaml(path_or_text: StrPath, name: str | None = None) -> Located:
     """
     Read a YAML mapping with the place of every value.
 
@@ -301,9 +321,8 @@ def load_yaml(path_or_text, name=None):
         anybody writes by hand (``MAX_BYTES``, ``MAX_VALUES``, ``MAX_DEPTH``).
 
     """
-    is_text = isinstance(path_or_text, str) and (
-        '\n' in path_or_text or ': ' in path_or_text) and not os.path.exists(path_or_text)
-    if is_text:
+    if isinstance(path_or_text, str) and (
+            '\n' in path_or_text or ': ' in path_or_text) and not os.path.exists(path_or_text):
         raw, name = path_or_text.encode('utf-8', 'surrogatepass'), name or '<text>'
     else:
         path = os.fspath(path_or_text)
@@ -325,7 +344,8 @@ def load_yaml(path_or_text, name=None):
         if not isinstance(node, yaml.MappingNode):
             raise InputError('a mapping (key: value) is expected',
                              f'{name}:{node.start_mark.line + 1}')
-        return _Conversion(loader, name).convert(node)
+        mapping: Located = _Conversion(loader, name).convert(node)
+        return mapping
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f':{mark.line + 1}' if mark else ''
@@ -335,7 +355,7 @@ def load_yaml(path_or_text, name=None):
                          _line_at(name, text[:error.position].encode())) from error
 
 
-def _read(path, name):
+def _read(path: str, name: str) -> bytes:
     """Return the bytes of a file, or what shows that it is too large."""
     refuse_pipe(path)
     try:
@@ -346,7 +366,7 @@ def _read(path, name):
         raise InputError(f'cannot be read ({why})', name) from error
 
 
-def _line_at(name, before):
+def _line_at(name: str, before: bytes) -> str:
     """Return ``file:line`` of what follows some bytes."""
     return f'{name}:{before.count(10) + 1}'     # 10: line feed
 
@@ -354,11 +374,11 @@ def _line_at(name, before):
 class _Conversion:
     """YAML nodes to located values, with a limit on their number and depth."""
 
-    def __init__(self, loader, name):
+    def __init__(self, loader: _Loader, name: str) -> None:
         self._loader, self._name = loader, name
         self._left = MAX_VALUES
 
-    def convert(self, node, depth=0):
+    def convert(self, node: yaml.Node, depth: int = 0) -> Any:
         """Return the value of a node and of everything below it."""
         line = node.start_mark.line + 1
         self._left -= 1
@@ -372,9 +392,10 @@ class _Conversion:
             return LocatedList(
                 [self.convert(item, depth + 1) for item in node.value],
                 [item.start_mark.line + 1 for item in node.value], self._name, line)
+        assert isinstance(node, yaml.ScalarNode)
         return self._scalar(node)
 
-    def _mapping(self, node, line, depth):
+    def _mapping(self, node: yaml.MappingNode, line: int, depth: int) -> Located:
         values, lines = {}, {}
         before = None
         for key_node, value_node in node.value:
@@ -391,9 +412,11 @@ class _Conversion:
             lines[key] = key_line
         return Located(values, lines, self._name, line)
 
-    def _check_comma(self, before, key_node, value_node, line):
+    def _check_comma(
+            self, before: tuple[yaml.Node, yaml.Node], key_node: yaml.Node, value_node: yaml.Node,
+            line: int) -> None:
         """Refuse ``{mass_kg: 3,5}``, which to YAML is the key ``5`` without a value."""
-        texts = [getattr(one, 'value', None) for one in (before[1], key_node, value_node)]
+        texts = [one.value for one in (before[1], key_node, value_node)]
         together = key_node.start_mark.index == before[1].end_mark.index + 1
         if together and all(isinstance(text, str) for text in texts) and texts[2] == '' \
                 and _WHOLE.fullmatch(texts[0]) and texts[1].isdecimal():
@@ -401,7 +424,7 @@ class _Conversion:
                 f'`{before[0].value}: {texts[0]},{texts[1]}` has a decimal comma; write a decimal '
                 f'point: {texts[0]}.{texts[1]}', f'{self._name}:{line}')
 
-    def _scalar(self, node):
+    def _scalar(self, node: yaml.ScalarNode) -> Any:
         where = f'{self._name}:{node.start_mark.line + 1}'
         if node.style is None and _COMMA.fullmatch(node.value):
             raise InputError(
@@ -420,13 +443,13 @@ class _Conversion:
         return value
 
 
-def dump_yaml(data):
+def dump_yaml(data: Mapping[str, Any]) -> str:
     """Return deterministic YAML text of nested dicts, lists and scalars (keys keep order)."""
     return yaml.safe_dump(
         _dumpable(data), sort_keys=False, default_flow_style=False, allow_unicode=True, width=99)
 
 
-def _dumpable(value):
+def _dumpable(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _dumpable(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

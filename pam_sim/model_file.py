@@ -14,10 +14,13 @@
 
 """Model files and presets: YAML in, Rig out."""
 
+from collections.abc import Callable, Iterable
+
+from pam_sim.annotations import StrPath
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.load import LOADS
-from pam_sim.located_yaml import Located
+from pam_sim.located_yaml import Located, LocatedList
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
@@ -31,12 +34,14 @@ KEYS = ('name', 'rig', 'muscle', 'law', 'load', 'valve', 'fidelity', 'parameters
 _PRESETS = NamedFiles('presets')
 
 
-def preset_names():
+def preset_names() -> list[str]:
     """Return the names of the presets, sorted."""
     return _PRESETS.names()
 
 
-def load_rig(source, valve=None, fidelity=None):
+def load_rig(
+        source: StrPath | Located | Rig, valve: str | None = None,
+        fidelity: str | None = None) -> Rig:
     """
     Return a rig from a preset or a model file.
 
@@ -71,7 +76,7 @@ def load_rig(source, valve=None, fidelity=None):
     return rig.with_(valve=valve, fidelity=fidelity)
 
 
-def _from_mapping(data, name, seen):
+def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig:
     if data.get('load') == 'antagonistic_joint' or 'joint' in data:
         raise data.error('describes a joint with two muscles; `pam_sim.load_joint` reads it',
                          'load' if 'load' in data else 'joint')
@@ -113,23 +118,24 @@ def _from_mapping(data, name, seen):
         {**base.sensors, **dict(sensors)}, tolerance, muscle)
 
 
-def _check_made_of(data):
+def _check_made_of(data: Located) -> None:
     """Raise InputError unless a model without ``rig`` says muscle and load."""
     missing = [key for key in ('muscle', 'load') if key not in data]
     if len(missing) == 2:
         raise data.error(f'`rig` is missing; allowed: {", ".join(preset_names())}')
-    choices = {'muscle': muscle_names, 'load': lambda: LOADS}
+    choices: dict[str, Callable[[], Iterable[str]]] = {
+        'muscle': muscle_names, 'load': lambda: LOADS}
     for key in missing:
         other = 'muscle' if key == 'load' else 'load'
         raise data.error(f'`{key}` is missing beside `{other}`; allowed: '
                          f'{", ".join(choices[key]())}', other)
 
 
-def _effects(data, base):
+def _effects(data: Located, base: Rig) -> list[EffectSetting]:
     """Return the base's effects with those of the file added; the file wins on equal names."""
     settings = {item.name: item for item in base.effects}
-    listed = data.get('effects', list) if data.get('effects') is not None else []
-    stated = set()
+    listed: LocatedList = data.get('effects', list) or LocatedList()
+    stated: set[str] = set()
     for index, item in enumerate(listed):
         if not isinstance(item, Located):
             raise InputError('an effect is a mapping with `name` and `parameters`',

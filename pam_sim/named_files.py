@@ -17,13 +17,14 @@
 import os
 from pathlib import Path
 
+from pam_sim.annotations import StrPath
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import load_yaml, Located
 
 _HERE = Path(__file__).parent
 
 
-def file_stem(source):
+def file_stem(source: StrPath | Located) -> str | None:
     """Return the name of a file without folder and ending; None for a text or a mapping."""
     if isinstance(source, Located) or isinstance(source, str) and (
             '\n' in source or ': ' in source) and not os.path.exists(source):
@@ -42,19 +43,19 @@ class NamedFiles:
 
     """
 
-    def __init__(self, folder):
+    def __init__(self, folder: str) -> None:
         self._folder = _HERE / folder
 
-    def names(self):
+    def names(self) -> list[str]:
         """Return the names, sorted."""
         return sorted(path.stem for path in self._folder.glob('*.yaml'))
 
-    def read(self, name):
+    def read(self, name: str) -> Located:
         """Return the content of a file as a Located mapping."""
         path = self._folder / f'{name}.yaml'
         return load_yaml(path.read_text(encoding='utf-8'), name=path.name)
 
-    def locate(self, source, what):
+    def locate(self, source: StrPath | Located, what: str) -> tuple[Located, str | None]:
         """
         Return (content, name): of a preset, a file or a text; the name is None but for a preset.
 

@@ -14,8 +14,10 @@
 
 """Numbers of the rig with unit, bounds, tolerance and source."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import math
+from typing import Any, SupportsFloat
 
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import allowed_range
@@ -53,7 +55,7 @@ class Parameter:
     description: str = ''
     source: str = ''
 
-    def check(self, value, where=''):
+    def check(self, value: object, where: str = '') -> float:
         """
         Return ``value`` as float.
 
@@ -63,10 +65,8 @@ class Parameter:
             Not a finite number, or out of bounds.
 
         """
-        is_number = (isinstance(value, (int, float)) or hasattr(value, '__float__')) \
-            and not isinstance(value, (bool, str))
         allowed = f'allowed {allowed_range(self.lower, self.upper, self.unit, self.name)}'
-        if not is_number:
+        if not isinstance(value, SupportsFloat) or isinstance(value, bool):
             raise InputError(f'`{self.name}` must be a number, not {value!r}; {allowed}', where)
         number = float(value)
         if not math.isfinite(number) or not self.lower <= number <= self.upper:
@@ -74,7 +74,9 @@ class Parameter:
         return number
 
 
-def check_parameters(parameters, values, what='parameter', where=''):
+def check_parameters(
+        parameters: Iterable[Parameter], values: Mapping[str, Any], what: str = 'parameter',
+        where: str = '') -> dict[str, float]:
     """
     Return the full value dict: nominal values overlaid with ``values``.
 

@@ -19,16 +19,21 @@ A folder of this package and the folders an environment variable names are searc
 a module is a plug-in by being there.
 """
 
+from collections.abc import Mapping
 import importlib
 import importlib.util
 import os
 from pathlib import Path
 import sys
+from types import ModuleType
+from typing import TypeVar
 
 from pam_sim.errors import did_you_mean, InputError
 
+T = TypeVar('T')
 
-def plugin_files(own_folder, variable, not_plugins=()):
+
+def plugin_files(own_folder: Path, variable: str, not_plugins: tuple[str, ...] = ()) -> list[Path]:
     """
     Return the source files of all plug-ins, sorted by name.
 
@@ -58,19 +63,21 @@ def plugin_files(own_folder, variable, not_plugins=()):
     return sorted(files, key=lambda path: (path.stem, str(path)))
 
 
-def plugin_module(path, own_folder, package, prefix):
+def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> ModuleType:
     """Return the imported module of a plug-in file, of the package or from elsewhere."""
     if path.parent == Path(own_folder):
         return importlib.import_module(f'{package}.{path.stem}')
     name = f'{prefix}_{path.stem}'
     spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError('is no Python file', str(path))
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
 
-def pick(known, name, what, where=''):
+def pick(known: Mapping[str, T], name: str, what: str, where: str = '') -> T:
     """
     Return ``known[name]``.
 

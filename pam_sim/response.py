@@ -14,13 +14,16 @@
 
 """What a simulation returns."""
 
+from collections.abc import Mapping
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.rollout.layout import OUTPUT
 
-COLUMNS = {name: place for place, name in enumerate(OUTPUT.names)}
+COLUMNS = {name: place for place, name in enumerate(OUTPUT.names or ())}
 
 
-def brief_span(time_s):
+def brief_span(time_s: FloatArray) -> str:
     """Return the first and the last of some times as text."""
     return f'{time_s[0]:.6g} to {time_s[-1]:.6g} s' if len(time_s) else 'empty'
 
@@ -49,30 +52,30 @@ class Response:
 
     """
 
-    def __init__(self, outputs, columns=COLUMNS):
+    def __init__(self, outputs: FloatArray, columns: Mapping[str, int] = COLUMNS) -> None:
         self.outputs = outputs
         self._columns = columns     # name -> column of what was kept
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of samples, N + 1."""
         return len(self.outputs)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """Return length and names in one line."""
         return (f'{type(self).__name__}({len(self)} samples, {brief_span(self.time_s)}: '
                 f'{", ".join(self._columns)})')
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> FloatArray:
         """Return a signal by name."""
         if name != '_columns' and name in self._columns:
             return self.outputs[:, self._columns[name]]
         raise AttributeError(name)
 
-    def __dir__(self):
+    def __dir__(self) -> list[str]:
         """List the signals too."""
         return [*super().__dir__(), *self._columns]
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, FloatArray]:
         """Return name -> ndarray of all signals."""
         return {name: np.ascontiguousarray(self.outputs[:, column])
                 for name, column in self._columns.items()}

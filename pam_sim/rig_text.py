@@ -15,16 +15,20 @@
 """A rig as text: the model file that gives an equal rig, and its title for people."""
 
 from dataclasses import replace
+from typing import Any, TYPE_CHECKING
 
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.muscle.muscle import get_muscle
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 _MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
 
 
-def _base(rig):
+def _base(rig: 'Rig') -> dict[str, Any]:
     """Return the lines that choose muscle, law and load."""
     nominal = get_muscle(_MUSCLE)
     if rig.muscle == nominal:
@@ -34,7 +38,7 @@ def _base(rig):
     return {'muscle': rig.muscle.plain(), 'load': rig.load}
 
 
-def rig_title(rig):
+def rig_title(rig: 'Rig') -> str:
     """Return the name of a rig for people, with the preset or muscle it is made from."""
     base = f'{rig.muscle.name}_{rig.load}'
     made_of = [] if rig.name == base else [base]
@@ -43,7 +47,7 @@ def rig_title(rig):
     return f'{rig.name} ({", ".join(made_of)})' if made_of else rig.name
 
 
-def rig_to_yaml(rig):
+def rig_to_yaml(rig: 'Rig') -> str:
     """Return the text of a model file that gives an equal rig."""
     known = rig_parameters(rig.load)
     data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}

@@ -14,9 +14,12 @@
 
 """A recorded or simulated run as named arrays with units: what every analysis starts from."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.short_repr import short_repr
 
@@ -36,18 +39,20 @@ class Seconds(np.ndarray):
     stamp, by default after stamp 0.
     """
 
-    def __new__(cls, stamp_ns, start_ns):
+    _stamp_ns: IntArray
+
+    def __new__(cls, stamp_ns: IntArray, start_ns: int) -> Self:
         """Return the stamps in seconds after ``start_ns``."""
         self = _seconds(stamp_ns, start_ns).view(cls)
         self._stamp_ns = stamp_ns
         return self
 
-    def __call__(self, origin_ns=0):
+    def __call__(self, origin_ns: int = 0) -> FloatArray:
         """Return the stamps in seconds after ``origin_ns``."""
         return _seconds(self._stamp_ns, origin_ns)
 
 
-def _seconds(stamp_ns, origin_ns):
+def _seconds(stamp_ns: IntArray, origin_ns: int) -> FloatArray:
     return (np.asarray(stamp_ns, dtype=np.int64) - int(origin_ns)) * 1e-9
 
 
@@ -70,23 +75,23 @@ class Series:
 
     """
 
-    stamp_ns: np.ndarray
-    values: dict
-    unit: dict = field(default_factory=dict)
-    start_ns: int = field(default=None, compare=False)
+    stamp_ns: IntArray
+    values: dict[str, FloatArray]
+    unit: dict[str, str] = field(default_factory=dict)
+    start_ns: int | None = field(default=None, compare=False)
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of messages."""
         return len(self.stamp_ns)
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> FloatArray:
         """Return the samples of one field; the error names those there are."""
         if name not in self.values:
             raise KeyError(f'{name}{did_you_mean(name, self.values)}; there are: '
                            + ', '.join(self.values))
         return self.values[name]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """Return number, span and fields in one line."""
         span = f'{self.time_s[0]:.6g} to {self.time_s[-1]:.6g} s' if len(self) else 'empty'
         fields = [f'{name} [{self.unit[name]}]' if name in self.unit else name
@@ -95,7 +100,7 @@ class Series:
         return f'Series({len(self)} messages, {span}: {shown})'
 
     @property
-    def time_s(self):
+    def time_s(self) -> Seconds:
         """Seconds since the start of the run, shape (N,)."""
         start_ns = self.start_ns
         if start_ns is None:
@@ -126,12 +131,12 @@ class Run:
 
     """
 
-    topics: dict
-    metadata: dict = field(default_factory=dict)
+    topics: dict[str, Series]
+    metadata: dict[str, str] = field(default_factory=dict)
     namespace: str = ''
     path: str = ''
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Give all topics one start; a series of another run is copied, its arrays are not."""
         start_ns = self.start_ns
         for series in self.topics.values():
@@ -141,14 +146,14 @@ class Run:
             name: series if series.start_ns == start_ns else replace(series, start_ns=start_ns)
             for name, series in self.topics.items()}
 
-    def __getitem__(self, topic):
+    def __getitem__(self, topic: str) -> Series:
         """Return the series of a topic; like ``require``, but the mistake is a KeyError."""
         if topic not in self.topics:
             raise KeyError(f'{topic}{did_you_mean(topic, self.topics)}; there are: '
                            + (', '.join(self.topics) or 'none'))
         return self.topics[topic]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """Return where it came from, its length and its topics in a few lines."""
         topics = ', '.join(f'{name} {len(series)}' for name, series in self.topics.items())
         parts = [repr(self.path)] if self.path else []
@@ -157,11 +162,11 @@ class Run:
         parts += [f'metadata: {", ".join(self.metadata)}'] if self.metadata else []
         return f'{type(self).__name__}({"; ".join(parts)})'
 
-    def __contains__(self, topic):
+    def __contains__(self, topic: object) -> bool:
         """Return whether a topic is there with at least one message."""
         return topic in self.topics and len(self.topics[topic]) > 0
 
-    def require(self, topic):
+    def require(self, topic: str) -> Series:
         """
         Return the series of a topic.
 
@@ -177,21 +182,23 @@ class Run:
         return self.topics[topic]
 
     @property
-    def start_ns(self):
+    def start_ns(self) -> int:
         """Earliest stamp of any topic [ns]; 0 for an empty run."""
         return min((int(np.min(s.stamp_ns)) for s in self.topics.values() if len(s)), default=0)
 
     @property
-    def end_ns(self):
+    def end_ns(self) -> int:
         """Latest stamp of any topic [ns]; 0 for an empty run."""
         return max((int(np.max(s.stamp_ns)) for s in self.topics.values() if len(s)), default=0)
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Seconds from the first to the last stamp."""
         return (self.end_ns - self.start_ns) * 1e-9
 
-    def on_grid(self, dt_s=0.001, start_ns=None, end_ns=None, topics=None, max_gap_s=None):
+    def on_grid(
+            self, dt_s: float = 0.001, start_ns: int | None = None, end_ns: int | None = None,
+            topics: Iterable[str] | None = None, max_gap_s: float | None = None) -> 'Grid':
         """
         Resample topics on one common time grid.
 
@@ -274,31 +281,33 @@ class Grid:
 
     start_ns: int
     dt_s: float
-    time_s: np.ndarray
-    values: dict
+    time_s: FloatArray
+    values: dict[str, dict[str, FloatArray]]
 
-    def __getitem__(self, key):
+    def __getitem__(self, key: str | tuple[str, str]) -> Any:
         """Return one field by ``(topic, field)``, or the dict of a topic."""
         if isinstance(key, tuple):
             return self.values[key[0]][key[1]]
         return self.values[key]
 
-    def __contains__(self, topic):
+    def __contains__(self, topic: object) -> bool:
         """Return whether the topic is on the grid."""
         return topic in self.values
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of grid points."""
         return len(self.time_s)
 
 
-def _held(time_s, stamp_s, samples):
+def _held(time_s: FloatArray, stamp_s: FloatArray, samples: FloatArray) -> FloatArray:
     # A nanosecond of slack: a message stamped on a grid point is in force there.
     index = np.searchsorted(stamp_s, time_s + 1e-9, side='right') - 1
     return samples[np.clip(index, 0, len(samples) - 1)]
 
 
-def _interpolated(time_s, stamp_s, samples, max_gap_s):
+def _interpolated(
+        time_s: FloatArray, stamp_s: FloatArray, samples: FloatArray,
+        max_gap_s: float | None) -> FloatArray:
     first = np.append(True, np.diff(stamp_s) > 0.0)
     stamp_s, samples = stamp_s[first], samples[first]
     values = np.interp(time_s, stamp_s, samples)

@@ -14,30 +14,34 @@
 
 """Short ``repr`` texts for objects that hold arrays: what there is, not every number."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 
 LONGEST = 60        # characters of one value
 SHOWN = 8           # names of a mapping, items of a short sequence
 
+T = TypeVar('T')
 
-def short_repr(cls):
+
+def short_repr(cls: type[T]) -> type[T]:
     """
     Give a dataclass a ``repr`` that stays short however much its fields hold.
 
     ``Trace(stamp_ns=int64[2000], measured={contraction: float64[2000]})``. Decorates the
     class above ``@dataclass``.
     """
-    def __repr__(self):
+    def __repr__(self: Any) -> str:
         inside = ', '.join(
             f'{one.name}={brief(getattr(self, one.name))}' for one in fields(self) if one.repr)
         return f'{type(self).__name__}({inside})'
-    cls.__repr__ = __repr__
+    setattr(cls, '__repr__', __repr__)
     return cls
 
 
-def brief(value, depth=1):
+def brief(value: object, depth: int = 1) -> str:
     """Return a value in at most a line: arrays by type and shape, mappings by their names."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f'{value.dtype}[{", ".join(map(str, value.shape))}]'
@@ -55,7 +59,7 @@ def brief(value, depth=1):
     return f'<{type(value).__name__}>'
 
 
-def _mapping(value, depth):
+def _mapping(value: Mapping[Any, object], depth: int) -> str:
     names = list(value)
     if not names:
         return '{}'
@@ -66,7 +70,7 @@ def _mapping(value, depth):
     return '{' + ', '.join(parts + rest) + '}'
 
 
-def _sequence(value, depth):
+def _sequence(value: Collection[object], depth: int) -> str:
     left, right = '[]' if isinstance(value, list) else '()'
     if len(value) <= SHOWN and depth > 0:
         text = f'{left}{", ".join(brief(item, depth - 1) for item in value)}{right}'

@@ -14,6 +14,8 @@
 
 """Physical constants of the rig and the few unit conversions people need (SI inside)."""
 
+from pam_sim.annotations import Number
+
 P_ATM_PA = 101_325.0          # atmospheric pressure; gauge = absolute - P_ATM_PA
 GRAVITY_M_PER_S2 = 9.80665
 GAS_CONSTANT_AIR = 287.05     # J/(kg K)
@@ -27,31 +29,31 @@ _UNIT_OF_ENDING = (
     ('_nanosec', 'ns'), ('_v', 'V'))
 
 
-def gauge_pa(absolute_pa):
+def gauge_pa(absolute_pa: Number) -> Number:
     """Return gauge pressure [Pa] of an absolute pressure [Pa]; scalar or array."""
     return absolute_pa - P_ATM_PA
 
 
-def absolute_pa(gauge_pressure_pa):
+def absolute_pa(gauge_pressure_pa: Number) -> Number:
     """Return absolute pressure [Pa] of a gauge pressure [Pa]; scalar or array."""
     return gauge_pressure_pa + P_ATM_PA
 
 
-def gauge_kpa(absolute_pressure_pa):
+def gauge_kpa(absolute_pressure_pa: float) -> float:
     """Return gauge pressure [kPa] of an absolute pressure [Pa], for people to read."""
     return (absolute_pressure_pa - P_ATM_PA) * 1e-3
 
 
-def unit_of(name):
+def unit_of(name: str) -> str:
     """Return the SI unit a value's name ends in; '1' for plain numbers."""
     return next((unit for ending, unit in _UNIT_OF_ENDING if name.endswith(ending)), '1')
 
 
-def allowed_range(lower, upper, unit='', name=''):
+def allowed_range(lower: float, upper: float, unit: str = '', name: str = '') -> str:
     """
     Return a range in words, in the unit that is to be written: ``0.1 to 500 kg``.
 
-    Pressures are told once more as people read them: gauge kPa.
+    Numbers are told once more as people read them: gauge kPa.
 
     Parameters
     ----------

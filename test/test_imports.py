@@ -64,12 +64,18 @@ def modules():
 
 
 def imported(tree, known):
-    """Return (at the top, within functions): the modules that one module imports."""
+    """
+    Return (at the top, within functions): the modules that one module imports.
+
+    What stands below ``if TYPE_CHECKING:`` is never run, so it closes no circle.
+    """
     at_top, within = set(), set()
     waiting = [(tree, at_top)]
     while waiting:
         node, found = waiting.pop()
         names = []
+        if isinstance(node, ast.If) and getattr(node.test, 'id', '') == 'TYPE_CHECKING':
+            continue
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

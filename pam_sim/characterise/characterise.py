@@ -14,16 +14,22 @@
 
 """Recordings or a table in, the surfaces of one muscle out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.characterise.dimensions import Dimensions
-from pam_sim.characterise.fixed_load import fixed_load
+from pam_sim.characterise.fixed_load import fixed_load, FixedLoad
 from pam_sim.characterise.points import points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
-from pam_sim.characterise.tables import loads_of_table, points_of_map
+from pam_sim.characterise.tables import loads_of_table, MeasuredTable, points_of_map
 from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
+from pam_sim.muscle.lookup_table import LookupTable
+from pam_sim.rig import Rig
+from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
 from pam_sim.units import absolute_pa
 
@@ -55,24 +61,27 @@ class Characterisation:
     surfaces: Surfaces
     dimensions: Dimensions
     kind: str
-    loads: list = field(default_factory=list)
-    paths: list = field(default_factory=list)
-    provenance: list = field(default_factory=list)
-    remarks: list = field(default_factory=list)
-    truth: dict | None = None
+    loads: list[FixedLoad] = field(default_factory=list)
+    paths: list[str] = field(default_factory=list)
+    provenance: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    truth: dict[str, Any] | None = None
 
     @property
-    def derived(self):
+    def derived(self) -> list[str]:
         """Names of the surfaces there are."""
         names = ['F(strain, P)', 'strain(P, load)']
         return names if self.surfaces.air_mass_kg is None else names + ['P(air mass, load)']
 
-    def table(self):
+    def table(self) -> LookupTable:
         """Return the LookupTable, its source the provenance."""
         return self.surfaces.table('\n'.join(self.provenance))
 
 
-def characterise_runs(runs, dimensions=None, loads_n=None, load_step_n=None):
+def characterise_runs(
+        runs: Sequence[Run], dimensions: Dimensions | None = None,
+        loads_n: Sequence[float] | None = None,
+        load_step_n: float | None = None) -> Characterisation:
     """
     Return the Characterisation of recordings, one fixed load each.
 
@@ -97,11 +106,11 @@ def characterise_runs(runs, dimensions=None, loads_n=None, load_step_n=None):
     if loads_n and len(loads_n) != len(runs):
         raise InputError(f'has {len(loads_n)} loads for {len(runs)} recordings', '--load-n')
     rigs = [_rig_of(run) for run in runs]
-    dimensions = _one_muscle(runs, rigs, dimensions)
-    loads = [fixed_load(run, dimensions.length_m, loads_n[k] if loads_n else None, rigs[k])
+    size = _one_muscle(runs, rigs, dimensions)
+    loads = [fixed_load(run, size.length_m, loads_n[k] if loads_n else None, rigs[k])
              for k, run in enumerate(runs)]
     points, stuck = without_stuck(points_of(loads))
-    surfaces = build_surfaces(points, dimensions, load_step_n)
+    surfaces = build_surfaces(points, size, load_step_n)
     loads = sorted(loads, key=lambda one: one.load_n)
     provenance = [f'{len(runs)} recordings of a fixed load under stepped pressure, '
                   f'{loads[0].load_n:.2f} to {loads[-1].load_n:.2f} N']
@@ -110,14 +119,16 @@ def characterise_runs(runs, dimensions=None, loads_n=None, load_step_n=None):
         f'{run.metadata.get("experiment_name", "unknown")}'
         + ('; simulated' if _simulated(run) else '')
         for run, rig in zip(runs, rigs) if rig is not None})
-    result = Characterisation(surfaces, dimensions, 'recordings', loads,
+    result = Characterisation(surfaces, size, 'recordings', loads,
                               [run.path for run in runs], provenance)
     result.remarks += _stuck_words(stuck)
     _finish(result)
     return result
 
 
-def characterise_table(table, dimensions, load_step_n=None):
+def characterise_table(
+        table: MeasuredTable, dimensions: Dimensions,
+        load_step_n: float | None = None) -> Characterisation:
     """
     Return the Characterisation of a table measured by others.
 
@@ -136,7 +147,8 @@ def characterise_table(table, dimensions, load_step_n=None):
         Too few pressures or loads.
 
     """
-    loads, stuck = [], []
+    loads: list[FixedLoad] = []
+    stuck: list[float] = []
     if table.kind == 'force map':
         top = float(table.columns['force'].max())
         wanted = None if load_step_n is None else load_step_n * np.arange(
@@ -159,12 +171,12 @@ def characterise_table(table, dimensions, load_step_n=None):
     return result
 
 
-def _stuck_words(loads):
+def _stuck_words(loads: Sequence[float]) -> list[str]:
     return [f'The load of {load:.2f} N did not pull the muscle long again when the pressure fell '
             f'(friction holds it); it was left out.' for load in loads]
 
 
-def _rig_of(run):
+def _rig_of(run: Run) -> Rig | None:
     """Return the rig in the metadata of a run, None where there is none that can be read."""
     text = (run.metadata or {}).get('rig')
     if not text:
@@ -176,16 +188,18 @@ def _rig_of(run):
                          run.path) from None
 
 
-def _simulated(run):
+def _simulated(run: Run) -> bool:
     """Return whether a run says that it comes from the offline simulation."""
     return bool(run.metadata.get('seed')) and run.metadata.get('origin') != 'live'
 
 
-def _one_muscle(runs, rigs, given):
+def _one_muscle(
+        runs: Sequence[Run], rigs: Sequence[Rig | None],
+        given: Dimensions | None) -> Dimensions:
     """Return the Dimensions all runs share."""
     if not runs:
         raise InputError('no recording given', 'characterise')
-    seen = {}
+    seen: dict[tuple[Dimensions, str, float], str] = {}
     for run, rig in zip(runs, rigs):
         if rig is None and given is None:
             raise InputError('says nothing of its muscle; give --length-m and --bore-m', run.path)
@@ -199,7 +213,7 @@ def _one_muscle(runs, rigs, given):
     return given if given is not None else next(iter(seen))[0]
 
 
-def _finish(result):
+def _finish(result: Characterisation) -> None:
     """Add what every result says of itself."""
     size = result.dimensions
     bore = '' if size.bore_m is None else f', bore {1e3 * size.bore_m:g} mm'
@@ -230,7 +244,7 @@ def _finish(result):
             f'{100 * moved["largest_strain"]:.4f} % contraction to make the surface monotone.')
 
 
-def against_rig(surfaces, rig):
+def against_rig(surfaces: Surfaces, rig: Rig) -> dict[str, float | list[list[float]]]:
     """
     Return how far eps(P, load) is from the static map of a rig, in % contraction.
 
@@ -252,7 +266,7 @@ def against_rig(surfaces, rig):
     """
     length = Dimensions.of_rig(rig).length_m
 
-    def truth(pressures, loads):
+    def truth(pressures: FloatArray, loads: FloatArray) -> FloatArray:
         # Without any load a clipped force map holds every contraction beyond the first
         # of zero force; a breath of load picks that one.
         return rig.static_contraction_m(

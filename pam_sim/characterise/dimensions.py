@@ -16,9 +16,11 @@
 
 from dataclasses import dataclass
 
+from pam_sim.annotations import FloatArray, Number
 from pam_sim.errors import InputError
 from pam_sim.muscle import geometry
 from pam_sim.muscle.muscle import Muscle
+from pam_sim.rig import Rig
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 
 
@@ -50,7 +52,7 @@ class Dimensions:
     dead_volume_m3: float = 0.0
     braid_angle_rad: float = geometry.BRAID_ANGLE_RAD
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check the numbers."""
         for name, value, low, high, unit in (
                 ('length', self.length_m, 0.01, 20.0, 'm'),
@@ -62,25 +64,25 @@ class Dimensions:
                                  f'muscle, {name}')
 
     @classmethod
-    def of_rig(cls, rig):
+    def of_rig(cls, rig: Rig) -> 'Dimensions':
         """Return the dimensions of the muscle of a :class:`pam_sim.rig.Rig`."""
         muscle = rig.muscle
         return cls(muscle.length_m, muscle.bore_m, rig.parameters['V_dead'],
                    muscle.braid_angle_rad)
 
-    def volume_m3(self, strain):
+    def volume_m3(self, strain: Number) -> Number:
         """Return the volume [m^3] of muscle and dead volume at a contraction; broadcasts."""
         if self.bore_m is None:
             raise InputError('is not known, so the volume of air is not either', 'muscle, bore')
         muscle = Muscle('measured', self.length_m, self.bore_m, self.braid_angle_rad)
         return self.dead_volume_m3 + muscle.volume_m3(self.length_m * strain)
 
-    def volume_slope_m3(self, strain):
+    def volume_slope_m3(self, strain: FloatArray) -> FloatArray:
         """Return dV/d(contraction as a fraction) [m^3]; broadcasts."""
         half = 1e-5
         return (self.volume_m3(strain + half) - self.volume_m3(strain - half)) / (2.0 * half)
 
-    def air_mass_kg(self, pressure_gauge_pa, strain):
+    def air_mass_kg(self, pressure_gauge_pa: Number, strain: Number) -> Number:
         """Return the mass of air [kg] at 293.15 K, ideal gas; broadcasts."""
         return absolute_pa(pressure_gauge_pa) * self.volume_m3(strain) / (
             GAS_CONSTANT_AIR * TEMPERATURE_K)

@@ -14,11 +14,15 @@
 
 """One fixed load: its force, its branches of rising and falling pressure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from pam_sim.characterise.holds import find_holds
+from pam_sim.annotations import FloatArray
+from pam_sim.characterise.holds import find_holds, Hold
 from pam_sim.errors import InputError
+from pam_sim.rig import Rig
+from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
 from pam_sim.units import GRAVITY_M_PER_S2
 
@@ -54,11 +58,11 @@ class FixedLoad:
     load_u_n: float
     load_from: str
     length_m: float
-    holds: list
-    unsettled: list = field(default_factory=list)
+    holds: list[Hold]
+    unsettled: list[Hold] = field(default_factory=list)
     path: str = ''
 
-    def branch(self, name):
+    def branch(self, name: str) -> FloatArray:
         """
         Return (pressure, strain, standard error, drift) of a branch, pressure ascending.
 
@@ -75,7 +79,9 @@ class FixedLoad:
         return np.array([rows[group == k].mean(axis=0) for k in range(group[-1] + 1)]).T
 
 
-def fixed_load(run, length_m, load_n=None, rig=None):
+def fixed_load(
+        run: Run, length_m: float, load_n: float | None = None,
+        rig: Rig | None = None) -> FixedLoad:
     """
     Return the FixedLoad of a recording.
 
@@ -109,7 +115,9 @@ def fixed_load(run, length_m, load_n=None, rig=None):
                      [hold for hold in found if not hold.settled], run.path)
 
 
-def _load(holds, length_m, given, rig, path):
+def _load(
+        holds: Sequence[Hold], length_m: float, given: float | None, rig: Rig | None,
+        path: str) -> tuple[float, float, str]:
     """Return (load [N], standard uncertainty [N], where it comes from)."""
     if given is not None:
         if not 0.0 <= given <= 1e5:
@@ -130,12 +138,12 @@ def _load(holds, length_m, given, rig, path):
             raise InputError(f'the load cell reads {mean:.1f} N; pull must be positive', path)
         return (round(max(mean, 0.0), 4), round(spread / np.sqrt(len(force)), 4), 'load cell')
     mass = None if rig is None else rig.parameters.get('mass_kg')
-    if mass is None:
+    if rig is None or mass is None:
         raise InputError('has no force and no rig with a mass; give the load with --load-n', path)
     return mass * GRAVITY_M_PER_S2, rig.tolerance['mass_kg'] * mass * GRAVITY_M_PER_S2, 'rig'
 
 
-def by_load(loads):
+def by_load(loads: Sequence[FixedLoad]) -> list[FixedLoad]:
     """
     Return the FixedLoads in ascending order, repetitions of a load put together.
 
@@ -149,7 +157,7 @@ def by_load(loads):
     if len(lengths) > 1:
         raise InputError('the recordings are of different muscles: lengths '
                          + ', '.join(f'{length:g}' for length in lengths) + ' m')
-    merged = []
+    merged: list[FixedLoad] = []
     for one in sorted(loads, key=lambda one: one.load_n):
         if merged and one.load_n - merged[-1].load_n < SAME_LOAD_N:
             last = merged[-1]

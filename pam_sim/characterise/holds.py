@@ -20,10 +20,13 @@ recording of any origin will do. Increments must be 5 kPa or more and holds
 1 s or longer.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
 
 BIN_S = 0.1                 # pressure is averaged over such bins before its rate is judged
@@ -71,7 +74,7 @@ class Hold:
     settled: bool
 
 
-def find_holds(run, length_m):
+def find_holds(run: Run, length_m: float) -> list[Hold]:
     """
     Return the holds of a run in order of time, the unsettled ones included.
 
@@ -95,7 +98,7 @@ def find_holds(run, length_m):
         np.zeros(0), np.zeros(0))
     if pressure_t[-1] - pressure_t[0] < SHORTEST_S:
         raise InputError(f'is shorter than one hold of {SHORTEST_S:g} s', run.path)
-    holds = []
+    holds: list[Hold] = []
     for begin, end in _still_spans(pressure_t, pressure):
         # The last bin already feels the next increment.
         stop = end - 0.5 * BIN_S
@@ -106,7 +109,7 @@ def find_holds(run, length_m):
     return holds
 
 
-def _samples(run, topic, key, origin_ns):
+def _samples(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArray, FloatArray]:
     """Return (time [s], value) of the finite samples of one topic, times ascending."""
     series = run.require(topic)
     value = np.asarray(series.values[key], dtype=float)
@@ -118,7 +121,7 @@ def _samples(run, topic, key, origin_ns):
     return time[order], value[good][order]
 
 
-def _still_spans(time, pressure):
+def _still_spans(time: FloatArray, pressure: FloatArray) -> list[tuple[float, float]]:
     """Return (begin, end) [s] of every stretch of at least a hold without pressure change."""
     index = np.floor((time - time[0]) / BIN_S).astype(int)
     count = np.bincount(index)
@@ -142,7 +145,9 @@ def _still_spans(time, pressure):
             if BIN_S * (b - a) >= SHORTEST_S - 1e-9]
 
 
-def _blocks(start, stop, series):
+def _blocks(
+        start: float, stop: float,
+        series: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray, float] | None:
     """Return (samples, block means, standard error of one block mean) in a window."""
     time, value = series
     inside = (time >= start) & (time < stop)
@@ -155,7 +160,10 @@ def _blocks(start, stop, series):
     return value, means, scatter / np.sqrt(value.size / BLOCKS)
 
 
-def _means(start, stop, pressure, contraction, force, length_m, before):
+def _means(
+        start: float, stop: float, pressure: tuple[FloatArray, FloatArray],
+        contraction: tuple[FloatArray, FloatArray], force: tuple[FloatArray, FloatArray],
+        length_m: float, before: Sequence[Hold]) -> Hold | None:
     """Return the Hold of a window, None where it has too few samples."""
     p, x, f = (_blocks(start, stop, series) for series in (pressure, contraction, force))
     if p is None or x is None:
@@ -177,7 +185,7 @@ def _means(start, stop, pressure, contraction, force, length_m, before):
         round(float(np.std(x[0])), 10), round(drift, 10), branch, bool(settled))
 
 
-def _standard_error(blocks):
+def _standard_error(blocks: tuple[FloatArray, FloatArray, float]) -> float:
     """Return the standard error of the mean, by single samples or by blocks, the larger."""
     value, means, _ = blocks
     return float(max(np.std(value) / np.sqrt(value.size), np.std(means) / np.sqrt(BLOCKS)))

@@ -21,12 +21,15 @@ Statistics 10(3), An algorithm for isotonic regression for two or more
 independent variables).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 
 ROUNDS = 200
 
 
-def rising(values):
+def rising(values: Sequence[float] | FloatArray) -> FloatArray:
     """Return the nearest non-decreasing sequence (least squares) of a 1-D array."""
     means, sizes = [], []
     for value in np.asarray(values, dtype=float):
@@ -39,7 +42,7 @@ def rising(values):
     return np.repeat(means, sizes)
 
 
-def monotone_surface(strain):
+def monotone_surface(strain: FloatArray) -> FloatArray:
     """
     Return the nearest surface that rises along axis 0 and falls along axis 1, not below zero.
 

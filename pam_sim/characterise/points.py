@@ -20,10 +20,12 @@ with the hysteresis lumped into the non-linear characteristic curve". Half the
 distance of the branches is kept.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.characterise.fixed_load import by_load
+from pam_sim.annotations import FloatArray
+from pam_sim.characterise.fixed_load import by_load, FixedLoad
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
@@ -57,17 +59,17 @@ class Points:
 
     """
 
-    pressure_gauge_pa: np.ndarray
-    load_n: np.ndarray
-    load_u_n: np.ndarray
-    strain: np.ndarray
-    half_distance: np.ndarray
-    noise: np.ndarray
-    settling: np.ndarray
-    reading: np.ndarray
+    pressure_gauge_pa: FloatArray
+    load_n: FloatArray
+    load_u_n: FloatArray
+    strain: FloatArray
+    half_distance: FloatArray
+    noise: FloatArray
+    settling: FloatArray
+    reading: FloatArray
 
 
-def points_of(loads, pressures_pa=None):
+def points_of(loads: Sequence[FixedLoad], pressures_pa: FloatArray | None = None) -> Points:
     """
     Return the Points of recordings.
 
@@ -93,7 +95,7 @@ def points_of(loads, pressures_pa=None):
                   np.zeros_like(strain))
 
 
-def _levels(loads):
+def _levels(loads: Sequence[FixedLoad]) -> FloatArray:
     low = max(min(h.pressure_gauge_pa for h in one.holds) for one in loads)
     high = min(max(h.pressure_gauge_pa for h in one.holds) for one in loads)
     levels = SAME_PA * np.round(loads[0].branch('up')[0] / SAME_PA)
@@ -106,7 +108,8 @@ def _levels(loads):
     return levels
 
 
-def _column(one, grid):
+def _column(
+        one: FixedLoad, grid: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return (mean, half distance, noise, settling) of one load on the grid of pressures."""
     parts = []
     for name in ('up', 'down'):
@@ -131,7 +134,7 @@ def _column(one, grid):
             np.where(both, 0.5 * (up[2] + down[2]), either[2]) / np.sqrt(3.0))
 
 
-def load_grid(load_n, step_n=None):
+def load_grid(load_n: FloatArray, step_n: float | None = None) -> FloatArray:
     """
     Return the loads of the surfaces [N], from 0 to the largest measured one.
 
@@ -164,14 +167,14 @@ def load_grid(load_n, step_n=None):
     return _with_middles(grid)
 
 
-def _with_middles(axis):
+def _with_middles(axis: FloatArray) -> FloatArray:
     """Return an axis; with the middles between its points where they are too few for PCHIP."""
     if axis.size >= LEAST:
         return axis
     return np.sort(np.concatenate([axis, 0.5 * (axis[:-1] + axis[1:])]))
 
 
-def with_enough_pressures(points):
+def with_enough_pressures(points: Points) -> Points:
     """Return Points with at least LEAST pressures; those between are interpolated."""
     old, new = points.pressure_gauge_pa, _with_middles(points.pressure_gauge_pa)
     if new.size == old.size:
@@ -182,7 +185,7 @@ def with_enough_pressures(points):
     return Points(new, points.load_n, points.load_u_n, **between)
 
 
-def without_stuck(points):
+def without_stuck(points: Points) -> tuple[Points, list[float]]:
     """
     Return (Points, loads left out [N]): without small loads that friction alone can hold.
 
@@ -202,7 +205,7 @@ def without_stuck(points):
     return points, left_out
 
 
-def with_no_load(points):
+def with_no_load(points: Points) -> Points:
     """
     Return the Points with a column of 0 N, extrapolated where no run had it.
 
@@ -241,9 +244,10 @@ def with_no_load(points):
     return _replaced(points, np.concatenate([[0.0], load]), (extrapolated, doubt))
 
 
-def _replaced(points, load, added):
+def _replaced(
+        points: Points, load: FloatArray, added: tuple[FloatArray, FloatArray] | None) -> Points:
     """Return Points with other loads and, if ``added``, one more column in front."""
-    def front(surface, column=None):
+    def front(surface: FloatArray, column: FloatArray | None = None) -> FloatArray:
         if added is None:
             return surface
         column = surface[:, 0] if column is None else column

@@ -15,10 +15,13 @@
 """From points to the chapter's surfaces P(m_air, load), eps(P, load), F(eps, P)."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.monotone import monotone_surface
-from pam_sim.characterise.points import load_grid, with_enough_pressures, with_no_load
+from pam_sim.characterise.points import load_grid, Points, with_enough_pressures, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.muscle.lookup_table import LookupTable
@@ -58,20 +61,20 @@ class Surfaces:
 
     """
 
-    pressure_gauge_pa: np.ndarray
-    load_n: np.ndarray
-    strain: np.ndarray
-    strain_u: np.ndarray
-    parts: dict
-    half_distance: np.ndarray
-    force_strain: np.ndarray
-    force_n: np.ndarray
-    force_u_n: np.ndarray
-    air_mass_kg: np.ndarray | None = None
-    pressure_u_pa: np.ndarray | None = None
-    monotone: dict = field(default_factory=dict)
+    pressure_gauge_pa: FloatArray
+    load_n: FloatArray
+    strain: FloatArray
+    strain_u: FloatArray
+    parts: dict[str, FloatArray]
+    half_distance: FloatArray
+    force_strain: FloatArray
+    force_n: FloatArray
+    force_u_n: FloatArray
+    air_mass_kg: FloatArray | None = None
+    pressure_u_pa: FloatArray | None = None
+    monotone: dict[str, Any] = field(default_factory=dict)
 
-    def table(self, source=''):
+    def table(self, source: str = '') -> LookupTable:
         """
         Return the LookupTable of the surfaces.
 
@@ -87,12 +90,13 @@ class Surfaces:
         return LookupTable(self.pressure_gauge_pa, self.load_n, self.strain, self.air_mass_kg,
                            source)
 
-    def law(self):
+    def law(self) -> Lookup:
         """Return the Lookup law of contraction and force; the air is right only if known."""
         return _law(self.pressure_gauge_pa, self.load_n, self.strain, self.air_mass_kg)
 
 
-def build_surfaces(points, dimensions, load_step_n=None):
+def build_surfaces(
+        points: Points, dimensions: Dimensions, load_step_n: float | None = None) -> Surfaces:
     """
     Return the Surfaces through measured Points.
 
@@ -115,7 +119,7 @@ def build_surfaces(points, dimensions, load_step_n=None):
     loads = load_grid(points.load_n, load_step_n)
     at = np.clip(loads, points.load_n[0], points.load_n[-1])
 
-    def onto(surface):
+    def onto(surface: FloatArray) -> FloatArray:
         return np.array([np.interp(at, points.load_n, row) for row in surface])
 
     measured = PchipInterpolator(points.load_n, points.strain, axis=1)(at)
@@ -148,7 +152,7 @@ def build_surfaces(points, dimensions, load_step_n=None):
             'rms_strain': float(np.sqrt(np.mean(parts['monotone'] ** 2)))})
 
 
-def _open_loop(half_distance):
+def _open_loop(half_distance: FloatArray) -> FloatArray:
     """
     Return the half distance of the branches as if the loop never closed.
 
@@ -161,7 +165,9 @@ def _open_loop(half_distance):
     return widest
 
 
-def _air(pressure, strain, strain_u, dimensions):
+def _air(
+        pressure: FloatArray, strain: FloatArray, strain_u: FloatArray,
+        dimensions: Dimensions) -> tuple[FloatArray | None, FloatArray | None]:
     """Return (air mass, uncertainty of P at a known mass and load), None twice if unknown."""
     if dimensions.bore_m is None:
         return None, None
@@ -171,13 +177,17 @@ def _air(pressure, strain, strain_u, dimensions):
     return np.round(mass, _DIGITS_MASS), np.abs(per_strain) * strain_u / per_pascal
 
 
-def _law(pressure, loads, strain, mass):
+def _law(
+        pressure: FloatArray, loads: FloatArray, strain: FloatArray,
+        mass: FloatArray | None) -> Lookup:
     # The force does not depend on the air: any rising mass serves where it is unknown.
     air = mass if mass is not None else np.repeat(1.0 + pressure[:, None], loads.size, axis=1)
     return Lookup(LookupTable(pressure, loads, strain, air))
 
 
-def _force(pressure, loads, strain, strain_u, mass):
+def _force(
+        pressure: FloatArray, loads: FloatArray, strain: FloatArray, strain_u: FloatArray,
+        mass: FloatArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (contractions, F, uncertainty of F); NaN where only larger loads would reach."""
     law = _law(pressure, loads, strain, mass)
     axis = np.append(np.arange(0.0, strain.max(), STRAIN_STEP), strain.max())

@@ -24,6 +24,7 @@ kept as the source.
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.annotations import FloatArray, StrPath
 from pam_sim.characterise.fixed_load import FixedLoad
 from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
@@ -56,13 +57,13 @@ class MeasuredTable:
     """
 
     kind: str
-    columns: dict
-    branch: list
+    columns: dict[str, FloatArray]
+    branch: list[str]
     source: str
     path: str
 
 
-def read_measured_table(path):
+def read_measured_table(path: StrPath) -> MeasuredTable:
     """
     Return the MeasuredTable of a CSV file.
 
@@ -81,7 +82,8 @@ def read_measured_table(path):
     if unknown:
         raise InputError(
             f'has the column `{unknown[0]}`; known are {", ".join(COLUMNS)}, branch', str(path))
-    cells, branch = {COLUMNS[name][0]: [] for name in head if name != 'branch'}, []
+    cells: dict[str, list[float]] = {COLUMNS[name][0]: [] for name in head if name != 'branch'}
+    branch: list[str] = []
     for number, row in enumerate(rows[1:], 1):
         if len(row) != len(head):
             raise InputError(f'has {len(row)} cells in data row {number}, not {len(head)}',
@@ -110,7 +112,7 @@ def read_measured_table(path):
     return MeasuredTable(kind, columns, branch, source, str(path))
 
 
-def strain_of(table, length_m):
+def strain_of(table: MeasuredTable, length_m: float) -> FloatArray:
     """Return the contraction (fraction) of every row, for a length at rest [m]."""
     columns = table.columns
     if 'strain' in columns:
@@ -126,7 +128,7 @@ def strain_of(table, length_m):
     return strain
 
 
-def loads_of_table(table, length_m):
+def loads_of_table(table: MeasuredTable, length_m: float) -> list[FixedLoad]:
     """Return the FixedLoads of a contraction table, one per load that it lists."""
     columns, strain = table.columns, strain_of(table, length_m)
     zeros = np.zeros_like(strain)
@@ -149,7 +151,8 @@ def loads_of_table(table, length_m):
     return loads
 
 
-def points_of_map(table, length_m, loads_n=None):
+def points_of_map(
+        table: MeasuredTable, length_m: float, loads_n: FloatArray | None = None) -> Points:
     """
     Return the Points of a force map: the isobars read at equal loads.
 
@@ -184,7 +187,8 @@ def points_of_map(table, length_m, loads_n=None):
                   np.full_like(eps, np.nan), nothing, nothing, doubt)
 
 
-def _isobar(strain, force, loads):
+def _isobar(
+        strain: FloatArray, force: FloatArray, loads: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (contraction, uncertainty) under each load, from one measured isobar."""
     order = np.argsort(strain)
     strain, force = strain[order], np.minimum.accumulate(force[order])
