@@ -23,6 +23,7 @@ them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
 
 from dataclasses import dataclass
 import math
+from typing import Protocol
 
 # Virtual clocks start here, not at the date of the run.
 START_NS = 1_000_000_000 * 1_000_000_000
@@ -34,6 +35,14 @@ SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 def valve_of(names):
     """Return 'ppr' or 'hsv' by the names of the efforts of a valve signal, '' for others."""
     return next((valve for valve, own in VALVE_NAMES.items() if {*own} & {*names}), '')
+
+
+class Message(Protocol):
+    """What every message has: the time of its measurement."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """Return the ``header.stamp`` [ns]."""
 
 
 @dataclass(frozen=True, slots=True)

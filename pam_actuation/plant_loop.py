@@ -24,6 +24,7 @@ import math
 
 from pam_actuation.messages import (
     Contraction, Force, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
+from pam_sim.rig import Rig
 from pam_sim.sensors import SensorChain
 
 _NS = 1_000_000_000
@@ -208,12 +209,15 @@ class PlantLoop(PlantClock):
         Of the sensor noise.
     longest_catch_up_s : float
         As of ``PlantClock``.
+    **initial
+        Where it starts, as for :meth:`pam_sim.rig.Rig.pack`.
 
     """
 
-    def __init__(self, rig, seed=0, longest_catch_up_s=0.25):
+    def __init__(self, rig: Rig, seed: int = 0, longest_catch_up_s: float = 0.25,
+                 **initial: float) -> None:
         self.rig = rig
-        self.plant = rig.plant(seed)
+        self.plant = rig.plant(seed, **initial)
         super().__init__(self.plant.dt_s, longest_catch_up_s)
         self.sensors = SensorChain(rig.sensors, seed)
         self._held = HeldSignal(rig.valve)

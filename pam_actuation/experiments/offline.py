@@ -21,6 +21,7 @@ seed, all stamps from the virtual clock.
 """
 
 from collections import Counter
+from functools import partial
 import os
 
 from pam_actuation import interrupts
@@ -94,7 +95,8 @@ class _Loops:
         if experiment.tracked:
             control = ControllerLoop(controller)
             attach(bus, control)
-            add('controller', controller_tick(bus, control, learning), controller.rate_hz)
+            add('controller', partial(controller_tick(bus, control), learning=learning),
+                controller.rate_hz)
         add('driver', driver_tick(bus, driver, told=self._told), driver.rate_hz)
 
     def _told(self, now_ns, status):

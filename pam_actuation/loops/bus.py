@@ -22,9 +22,15 @@ time tick in the order in which they were added.
 """
 
 from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 import heapq
+import math
+from typing import Any
 
-from pam_actuation.messages import START_NS
+from pam_actuation.messages import Message, START_NS
+
+Take = Callable[[Any], object]              # takes the messages of one topic
+Tick = Callable[[int], object]              # is called with the time [ns]
 
 
 class Bus:
@@ -40,33 +46,34 @@ class Bus:
 
     """
 
-    def __init__(self, transport_ns=0, on_sent=None):
+    def __init__(self, transport_ns: int = 0,
+                 on_sent: Callable[[str, Message, int], object] | None = None) -> None:
         self._transport_ns = transport_ns
         self._on_sent = on_sent
-        self._takers = {}
-        self._on_the_way = deque()
-        self._ticks = []            # of each loop: what is called
-        self._times = []            # and when, an iterator
-        self._due = []              # heap of (time, loop)
+        self._takers: dict[str, list[Take]] = {}
+        self._on_the_way: deque[tuple[int, Take, Message]] = deque()
+        self._ticks: list[Tick] = []                # of each loop: what is called
+        self._times: list[Iterator[int]] = []       # and when
+        self._due: list[tuple[int, int]] = []       # heap of (time, loop)
 
-    def connect(self, topic, take):
+    def connect(self, topic: str, take: Take) -> None:
         """Have ``take(message)`` called with every message of a topic."""
         self._takers.setdefault(topic, []).append(take)
 
-    def send(self, topic, message, now_ns):
+    def send(self, topic: str, message: Message, now_ns: int) -> None:
         """Put a message on its way to all who take the topic."""
         if self._on_sent is not None:
             self._on_sent(topic, message, now_ns)
         for take in self._takers.get(topic, ()):
             self._on_the_way.append((now_ns + self._transport_ns, take, message))
 
-    def deliver(self, now_ns):
+    def deliver(self, now_ns: int) -> None:
         """Hand over what has arrived."""
         while self._on_the_way and self._on_the_way[0][0] <= now_ns:
             _, take, message = self._on_the_way.popleft()
             take(message)
 
-    def add(self, tick, times_ns):
+    def add(self, tick: Tick, times_ns: Iterable[int]) -> None:
         """
         Add a loop.
 
@@ -82,17 +89,17 @@ class Bus:
         self._times.append(iter(times_ns))
         self._schedule(len(self._ticks) - 1)
 
-    def _schedule(self, loop):
+    def _schedule(self, loop: int) -> None:
         time_ns = next(self._times[loop], None)
         if time_ns is not None:
             heapq.heappush(self._due, (time_ns, loop))
 
     @property
-    def next_ns(self):
+    def next_ns(self) -> int | None:
         """Time of the next tick [ns], None after the last one."""
         return self._due[0][0] if self._due else None
 
-    def step(self):
+    def step(self) -> int:
         """Hand over what has arrived at the time of the next tick, and tick; return the time."""
         now_ns, loop = heapq.heappop(self._due)
         self.deliver(now_ns)
@@ -100,13 +107,13 @@ class Bus:
         self._schedule(loop)
         return now_ns
 
-    def run_until(self, end_ns):
-        """Run all ticks up to a time, it included."""
+    def run_until(self, end_ns: float = math.inf) -> None:
+        """Run all ticks up to a time, it included; without one, all there are."""
         while self._due and self._due[0][0] <= end_ns:
             self.step()
 
 
-def every(rate_hz, first_ns=START_NS, lead_ns=0):
+def every(rate_hz: float, first_ns: int = START_NS, lead_ns: int = 0) -> Iterator[int]:
     """
     Yield the times [ns] of a timer, without an end.
 

@@ -19,21 +19,69 @@ A loop says with ``takes()`` which topics it takes. ``prefix`` is the namespace 
 a rig of several, such as ``flexor/``.
 """
 
+from collections.abc import Callable, Mapping
+from typing import Protocol
 
-def attach(bus, loop, prefix=''):
+from pam_actuation.loops.bus import Bus, Take, Tick
+from pam_actuation.messages import (
+    ControllerState, Message, Pressure, Status, ValveSignal)
+
+
+class Takes(Protocol):
+    """A loop that takes messages."""
+
+    def takes(self) -> Mapping[str, Take]:
+        """Return what takes each topic."""
+
+
+class Plant(Takes, Protocol):
+    """What a plant on a clock does."""
+
+    def advance_to(self, now_ns: int) -> int:
+        """Step the physics up to a time."""
+
+    def sample(self, now_ns: int) -> Mapping[str, Message]:
+        """Read the sensors."""
+
+
+class Reference(Protocol):
+    """What a reference on a clock does."""
+
+    def tick(self, now_ns: int) -> Mapping[str, Message]:
+        """Return what is wanted from now on, by topic."""
+
+
+class Controller(Takes, Protocol):
+    """What a controller on a clock does."""
+
+    def tick(self, now_ns: int, learning: bool) -> tuple[Pressure, ControllerState]:
+        """Return command and internals."""
+
+
+class Driver(Takes, Protocol):
+    """What a valve driver on a clock does."""
+
+    def tick(self, now_ns: int) -> tuple[ValveSignal, Status]:
+        """Return the valve signal and how the driver is."""
+
+    def followed(self) -> Pressure | None:
+        """Return the pressure that the driver follows."""
+
+
+def attach(bus: Bus, loop: Takes, prefix: str = '') -> None:
     """Have a loop take its topics."""
     for topic, take in loop.takes().items():
         bus.connect(f'{prefix}{topic}', take)
 
 
-def attach_plant(bus, plant):
+def attach_plant(bus: Bus, plant: Plant) -> Tick:
     """
-    Have a ``PlantLoop`` or ``JointPlantLoop`` take its topics; return its tick, which measures.
+    Have a plant on a clock take its topics; return its tick, which measures.
 
     A message acts from its stamp on, where physics has not passed that yet.
     """
-    def from_its_stamp(apply):
-        def take(message):
+    def from_its_stamp(apply: Take) -> Take:
+        def take(message: Message) -> None:
             plant.advance_to(message.stamp_ns)
             apply(message)
         return take
@@ -41,7 +89,7 @@ def attach_plant(bus, plant):
     for topic, apply in plant.takes().items():
         bus.connect(topic, from_its_stamp(apply))
 
-    def tick(now_ns):
+    def tick(now_ns: int) -> None:
         plant.advance_to(now_ns)
         for topic, message in plant.sample(now_ns).items():
             bus.send(topic, message, now_ns)
@@ -49,18 +97,18 @@ def attach_plant(bus, plant):
     return tick
 
 
-def reference_tick(bus, reference):
-    """Return the tick of a ``ReferenceLoop``."""
-    def tick(now_ns):
+def reference_tick(bus: Bus, reference: Reference) -> Tick:
+    """Return the tick of a reference."""
+    def tick(now_ns: int) -> None:
         for topic, message in reference.tick(now_ns).items():
             bus.send(topic, message, now_ns)
 
     return tick
 
 
-def controller_tick(bus, control, learning=True):
-    """Return the tick of a ``ControllerLoop``."""
-    def tick(now_ns):
+def controller_tick(bus: Bus, control: Controller) -> Callable[[int, bool], None]:
+    """Return the tick of a controller: ``tick(now_ns, learning)``."""
+    def tick(now_ns: int, learning: bool = True) -> None:
         command, state = control.tick(now_ns, learning)
         bus.send('pressure_command', command, now_ns)
         bus.send('controller_state', state, now_ns)
@@ -68,15 +116,33 @@ def controller_tick(bus, control, learning=True):
     return tick
 
 
-def driver_tick(bus, driver, prefix='', told=None):
-    """Return the tick of a ``DriverLoop``; ``told(now_ns, status)`` hears its status."""
-    def tick(now_ns):
+def driver_tick(bus: Bus, driver: Driver, prefix: str = '',
+                told: Callable[[int, Status], object] | None = None) -> Tick:
+    """Return the tick of a driver; ``told(now_ns, status)`` hears its status."""
+    send_signal = signal_tick(bus, driver, prefix, told)
+
+    def tick(now_ns: int) -> None:
+        send_signal(now_ns)
+        send_followed(bus, driver, now_ns, prefix)
+
+    return tick
+
+
+def signal_tick(bus: Bus, driver: Driver, prefix: str = '',
+                told: Callable[[int, Status], object] | None = None) -> Tick:
+    """Return the tick of a driver that does not say which pressure it follows."""
+    def tick(now_ns: int) -> None:
         signal, status = driver.tick(now_ns)
         bus.send(f'{prefix}valve_signal', signal, now_ns)
-        followed = driver.followed()
-        if followed is not None:
-            bus.send(f'{prefix}followed_pressure', followed, now_ns)
         if told is not None:
             told(now_ns, status)
 
     return tick
+
+
+def send_followed(bus: Bus, driver: Driver, now_ns: int, prefix: str = '') -> Pressure | None:
+    """Send the pressure that a driver follows; return it, None where it is an opening."""
+    followed = driver.followed()
+    if followed is not None:
+        bus.send(f'{prefix}followed_pressure', followed, now_ns)
+    return followed

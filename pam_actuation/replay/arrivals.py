@@ -21,15 +21,21 @@ received each message. For a simulated bag this is exactly when the loops got it
 one it is another process's receive time, near that of the node but not the same.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+import os
+from typing import Any
 
 import numpy as np
 from pam_actuation.bags import codecs, series
 from pam_actuation.bags.load import is_read, topics_of
-from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.source import read_bag, TopicData
+from pam_actuation.loops.bus import Bus
+from pam_actuation.messages import Message
+from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
+from pam_sim.run import Run
 
-# At equal times: measure, want, decide, act; the order in which the simulation runs its loops.
+# At equal times: measure, want, decide, act. The simulation runs its loops in this order too.
 ORDER = (
     'pressure', 'contraction', 'force', 'supply_pressure', 'external_force', 'reference',
     'reference_trajectory', 'controller_state', 'pressure_command', 'valve_command',
@@ -42,25 +48,23 @@ ONLY = {'controller_state': ('learning',)}
 _BLOCK = 8192             # messages made at a time
 
 
-class Arrival(NamedTuple):
-    """One message: when it arrived [ns], the short name of its topic, the plain message."""
+class RecordedTopic:
+    """
+    The messages of one topic in the order of their arrival.
 
-    time_ns: int
-    topic: str
-    message: object
+    They are read as arrays; a plain message is made when its turn comes, so that an
+    hour takes no more memory than its numbers.
+    """
 
-
-class _Topic:
-    """The messages of one topic in the order of arrival, made when they are asked for."""
-
-    def __init__(self, short, topic, by_stamp, path):
+    def __init__(self, short: str, topic: TopicData, by_stamp: bool,
+                 path: str | os.PathLike[str]) -> None:
         self.short = short
+        self._messages: list[Message] | None = None
         if short == 'reference_trajectory':
             self._messages = [codecs.decode(short, raw) for raw in topic.payloads]
             self._columns = {}
             stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
         else:
-            self._messages = None
             stamp_ns, self._columns, bad = series.table(short, topic.payloads, ONLY.get(short))
             if bad.any():
                 raise InputError(
@@ -73,9 +77,18 @@ class _Topic:
         self.time_ns = time_ns[self._order]
         self._stamp_ns = stamp_ns
 
-    def __iter__(self):
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return len(self.time_ns)
+
+    def times(self) -> Iterator[int]:
+        """Return an iterator over the times of arrival [ns]."""
+        for begin in range(0, len(self), _BLOCK):
+            yield from self.time_ns[begin:begin + _BLOCK].tolist()
+
+    def __iter__(self) -> Iterator[Message]:
         """Return an iterator over the plain messages."""
-        for begin in range(0, len(self._order), _BLOCK):
+        for begin in range(0, len(self), _BLOCK):
             places = self._order[begin:begin + _BLOCK]
             if self._messages is not None:
                 yield from (self._messages[i] for i in places.tolist())
@@ -85,42 +98,16 @@ class _Topic:
             for stamp_ns, *values in zip(self._stamp_ns[places].tolist(), *columns):
                 yield codecs.from_values(self.short, stamp_ns, dict(zip(names, values)))
 
+    def play(self, bus: Bus, tick: Callable[[Any, int], object]) -> None:
+        """Have a bus call ``tick(message, now_ns)`` when a message arrived."""
+        messages = iter(self)
+        bus.add(lambda now_ns: tick(next(messages), now_ns), self.times())
 
-class Arrivals:
+
+def recorded_topics(run: Run, topics: Iterable[str],
+                    ticks: Iterable[str] = TICKED) -> dict[str, RecordedTopic]:
     """
-    The messages of some topics in the order of their arrival; iterating gives ``Arrival``.
-
-    They are read as arrays; a plain message is made when its turn comes, so that an
-    hour takes no more memory than its numbers.
-    """
-
-    def __init__(self, topics):
-        self._topics = topics
-        self.topics = {topic.short for topic in topics if len(topic.time_ns)}
-        rank = {name: place for place, name in enumerate(ORDER)}
-        which = np.repeat(np.arange(len(topics)), [len(topic.time_ns) for topic in topics])
-        ranks = np.array([rank[topic.short] for topic in topics], dtype=np.int64)
-        time_ns = np.concatenate([np.zeros(0, dtype=np.int64)] + [t.time_ns for t in topics])
-        order = np.lexsort((ranks[which], time_ns))
-        self._time_ns, self._which = time_ns[order], which[order]
-
-    def __len__(self):
-        """Return the number of messages."""
-        return len(self._time_ns)
-
-    def __iter__(self):
-        """Return an iterator over the arrivals."""
-        names = [topic.short for topic in self._topics]
-        messages = [iter(topic) for topic in self._topics]
-        for begin in range(0, len(self), _BLOCK):
-            block = slice(begin, begin + _BLOCK)
-            for time_ns, k in zip(self._time_ns[block].tolist(), self._which[block].tolist()):
-                yield Arrival(time_ns, names[k], next(messages[k]))
-
-
-def arrivals(run, topics, ticks=TICKED):
-    """
-    Return the messages of some topics of a run's bag in the order of their arrival.
+    Return some topics of a run's bag as they arrived, by short name in the order ``ORDER``.
 
     Parameters
     ----------
@@ -132,10 +119,6 @@ def arrivals(run, topics, ticks=TICKED):
         Topics whose messages mark a tick: they are placed at their header stamp, all others
         at their receive time.
 
-    Returns
-    -------
-    Arrivals
-
     Raises
     ------
     InputError
@@ -143,18 +126,19 @@ def arrivals(run, topics, ticks=TICKED):
         receive times come from different clocks.
 
     """
-    topics = set(topics)
+    topics, ticks = set(topics), set(ticks)
     bag = read_bag(run.path, recover=True, wanted=lambda name, *kind: (
         name.rsplit('/', 1)[-1] in topics and is_read(name, *kind)))
-    found = []
+    found = {}
     for short, topic in topics_of(bag, run.namespace).items():
         if short in topics:
-            found.append(_Topic(short, topic, short in ticks, run.path))
+            found[short] = RecordedTopic(short, topic, short in ticks, run.path)
         bag.topics.pop(topic.name)            # its bytes are not needed any more
-    return Arrivals(found)
+    return {short: found[short] for short in ORDER if short in found}
 
 
-def _check_clocks(stamp_ns, received_ns, topic, path):
+def _check_clocks(stamp_ns: IntArray, received_ns: IntArray, topic: TopicData,
+                  path: str | os.PathLike[str]) -> None:
     """Raise InputError where header stamps are of another clock than the receive times."""
     if not len(stamp_ns):
         return

@@ -24,20 +24,24 @@ calls of the services emergency_stop and reset, and the signal that vents when t
 
 from array import array
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.replay.arrivals import arrivals
-from pam_actuation.replay.difference import difference
+from pam_actuation.loops.bus import Bus
+from pam_actuation.loops.wiring import attach
+from pam_actuation.messages import ValveSignal
+from pam_actuation.replay.arrivals import recorded_topics
+from pam_actuation.replay.difference import Difference, difference
 from pam_sim import load_rig
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.run import Run, Series
 from pam_sim.short_repr import short_repr
 
 UNITS = {'ppr_voltage': 'V', 'fill_duty': '1', 'vent_duty': '1'}
 COMMANDS = ('pressure_command', 'valve_command')
-_TAKEN_BY = {'pressure': 'on_pressure', 'supply_pressure': 'on_supply',
-             'pressure_command': 'on_command', 'valve_command': 'on_valve_command'}
 
 
 @short_repr
@@ -50,45 +54,45 @@ class DriverReplay:
     ``note`` says what the driver was told of the rig.
     """
 
-    stamp_ns: np.ndarray
-    recorded: dict
-    replayed: dict
+    stamp_ns: IntArray
+    recorded: dict[str, FloatArray]
+    replayed: dict[str, FloatArray]
     note: str
     start_ns: int
 
     @property
-    def differences(self):
+    def differences(self) -> list[Difference]:
         """Return one Difference a signal."""
         return [difference(f'valve_signal.{name}', UNITS[name], self.stamp_ns,
                            self.recorded[name], self.replayed[name], self.start_ns)
                 for name in self.recorded]
 
     @property
-    def identical(self):
+    def identical(self) -> bool:
         """Return whether every valve signal is equal to the bit."""
         return all(one.identical for one in self.differences)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, object]:
         """Return plain data for ``--json``."""
         return {'ticks': len(self.stamp_ns), 'identical': self.identical, 'note': self.note,
                 'signals': [one.to_dict() for one in self.differences]}
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the outcome for people."""
         return [f'driver: {len(self.stamp_ns)} ticks on the recorded commands and pressures'
                 + (f' ({self.note})' if self.note else ''),
                 *(one.line() for one in self.differences)]
 
-    def arrays(self):
+    def arrays(self) -> dict[str, IntArray | FloatArray]:
         """Return all arrays by name, for saving."""
-        out = {'driver_stamp_ns': self.stamp_ns}
+        out: dict[str, IntArray | FloatArray] = {'driver_stamp_ns': self.stamp_ns}
         for name in self.recorded:
             out[f'driver_{name}_recorded'] = self.recorded[name]
             out[f'driver_{name}_replayed'] = self.replayed[name]
         return out
 
 
-def replay_driver(run):
+def replay_driver(run: Run) -> DriverReplay:
     """
     Replay the driver of a recording.
 
@@ -96,10 +100,6 @@ def replay_driver(run):
     ----------
     run : pam_sim.run.Run
         A loaded bag with ``valve_signal`` and what the driver was told to do.
-
-    Returns
-    -------
-    DriverReplay
 
     Raises
     ------
@@ -109,27 +109,34 @@ def replay_driver(run):
     """
     signals = run.require('valve_signal')
     driver, note = _driver(run, signals)
-    stamps, told, sent = array('q'), {}, {}
-    found = arrivals(run, (*_TAKEN_BY, 'valve_signal'), ticks=('valve_signal',))
-    if not found.topics & set(COMMANDS):
+    takes = driver.takes()
+    recorded = recorded_topics(run, (*takes, 'valve_signal'), ticks=('valve_signal',))
+    if not any(len(recorded.get(topic, ())) for topic in COMMANDS):
         run.require('pressure_command')
-    for _, topic, message in found:
-        if topic in _TAKEN_BY:
-            getattr(driver, _TAKEN_BY[topic])(message)
-        else:
-            signal, _ = driver.tick(message.stamp_ns)
-            stamps.append(message.stamp_ns)
-            recorded = dict(zip(message.names, message.efforts))
-            for name, effort in zip(signal.names, signal.efforts):
-                told.setdefault(name, array('d')).append(recorded.get(name, np.nan))
-                sent.setdefault(name, array('d')).append(effort)
+    stamps: array[int] = array('q')
+    told: dict[str, array[float]] = {}
+    sent: dict[str, array[float]] = {}
+
+    def tick(message: ValveSignal, now_ns: int) -> None:
+        signal, _ = driver.tick(now_ns)
+        stamps.append(now_ns)
+        efforts = dict(zip(message.names, message.efforts))
+        for name, effort in zip(signal.names, signal.efforts):
+            told.setdefault(name, array('d')).append(efforts.get(name, np.nan))
+            sent.setdefault(name, array('d')).append(effort)
+
+    bus = Bus()
+    attach(bus, driver)
+    for topic, messages in recorded.items():
+        messages.play(bus, tick if topic == 'valve_signal' else partial(bus.send, topic))
+    bus.run_until()
     names = [name for name in UNITS if name in sent]
     return DriverReplay(
         np.array(stamps, dtype=np.int64), {name: np.array(told[name]) for name in names},
         {name: np.array(sent[name]) for name in names}, note, run.start_ns)
 
 
-def _driver(run, signals):
+def _driver(run: Run, signals: Series) -> tuple[DriverLoop, str]:
     """Return the driver of a run's rig, and what it was not told."""
     text = run.metadata.get('rig')
     if text:

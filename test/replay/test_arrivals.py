@@ -14,6 +14,7 @@
 
 """Arrivals read as arrays: message by message those that decoding one by one gives."""
 
+from functools import partial
 import math
 
 import numpy as np
@@ -22,7 +23,8 @@ from pam_actuation.bags import codecs, series
 from pam_actuation.bags.load import load_run, topics_of
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
-from pam_actuation.replay.arrivals import Arrival, arrivals, ORDER, TICKED
+from pam_actuation.loops.bus import Bus
+from pam_actuation.replay.arrivals import ORDER, recorded_topics, TICKED
 from pam_sim.errors import InputError
 from process_replay import bag_of
 import pytest
@@ -30,16 +32,29 @@ import pytest
 START_NS = 1_000_000_000_000
 
 
+def arrivals(run, topics):
+    """Return (time, topic, message) of some topics as a bus plays them."""
+    bus, found = Bus(), []
+
+    def note(topic, message, now_ns):
+        found.append((now_ns, topic, message))
+
+    for topic, recorded in recorded_topics(run, topics).items():
+        recorded.play(bus, partial(note, topic))
+    bus.run_until()
+    return found
+
+
 def one_by_one(run, topics):
-    """Return the arrivals of some topics, each message decoded by itself, sorted as a list."""
+    """Return the same, each message decoded by itself, sorted as a list."""
     found = []
     for short, topic in topics_of(read_bag(run.path), run.namespace).items():
         for raw, received_ns in zip(topic.payloads, topic.log_time_ns.tolist()):
             if short in topics:
                 message = codecs.decode(short, raw)
                 time_ns = message.stamp_ns if short in TICKED else received_ns
-                found.append(Arrival(time_ns, short, message))
-    return sorted(found, key=lambda one: (one.time_ns, ORDER.index(one.topic)))
+                found.append((time_ns, short, message))
+    return sorted(found, key=lambda one: (one[0], ORDER.index(one[1])))
 
 
 def plain(arrival):
@@ -87,14 +102,15 @@ def test_messy_arrivals_are_those_of_decoding_one_by_one(tmp_path):
     run = write(tmp_path / 'run', messy())
     found, expected = arrivals(run, ORDER), one_by_one(run, ORDER)
     assert len(found) == len(expected) == 4 * 300 + 6
-    assert found.topics == {'pressure', 'contraction', 'valve_signal', 'controller_state',
-                            'reference_trajectory'}
+    assert {topic for _, topic, _ in found} == {
+        'pressure', 'valve_signal', 'contraction', 'controller_state', 'reference_trajectory'}
     for mine, theirs in zip(found, expected):
         mine, theirs = plain(mine), plain(theirs)
         if theirs[1] == 'controller_state' and theirs[3] is None:
             mine = (*mine[:3], None if math.isnan(mine[3]) else mine[3])
         assert mine == theirs
-    assert [one.time_ns for one in found] == [one.time_ns for one in found]      # again
+    topics = recorded_topics(run, ORDER)
+    assert all(list(one.times()) == list(one.times()) for one in topics.values())      # again
 
 
 def test_arrivals_of_a_recording_are_those_of_decoding_one_by_one():
@@ -111,7 +127,7 @@ def test_a_message_that_is_none_is_refused(tmp_path):
             raw = codecs.encode('pressure', messages.Pressure(START_NS + i, 1e5))
             writer.write('/muscle/pressure', raw[:9] if i == 1 else raw, START_NS, START_NS)
     with pytest.raises(InputError, match='1 messages are not sensor_msgs/msg/FluidPressure'):
-        arrivals(load_run(tmp_path / 'run'), ORDER)
+        recorded_topics(load_run(tmp_path / 'run'), ORDER)
 
 
 def test_only_the_named_values_are_read():

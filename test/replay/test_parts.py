@@ -24,7 +24,8 @@ from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
-from pam_actuation.replay.arrivals import arrivals
+from pam_actuation.loops.bus import Bus
+from pam_actuation.replay.arrivals import recorded_topics
 from pam_actuation.replay.chain import replay_chain
 from pam_actuation.replay.compare import replay_run
 from pam_actuation.replay.difference import difference
@@ -136,10 +137,14 @@ def test_single_settings_change_the_recorded_controller(runs):
 
 
 def test_arrivals_are_in_the_order_of_the_loops(runs):
-    found = arrivals(runs['sofc_hsv'], ('pressure', 'pressure_command', 'valve_signal'))
-    times = [one.time_ns for one in found]
+    bus, found = Bus(), []
+    topics = recorded_topics(runs['sofc_hsv'], {'valve_signal', 'pressure_command', 'pressure'})
+    for topic, messages in topics.items():
+        messages.play(bus, lambda _, now_ns, topic=topic: found.append((now_ns, topic)))
+    bus.run_until()
+    times = [time_ns for time_ns, _ in found]
     assert times == sorted(times)
-    at_start = [one.topic for one in found if one.time_ns == times[0]]
+    at_start = [topic for time_ns, topic in found if time_ns == times[0]]
     assert at_start == ['pressure', 'pressure_command', 'valve_signal']
 
 

@@ -14,11 +14,10 @@
 
 """Jump at random."""
 
-import bisect
 from dataclasses import dataclass
 
-import numpy as np
 from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.random_levels import RandomLevels
 
 
 @dataclass
@@ -35,28 +34,22 @@ class RandomSteps(Primitive):
     duration_s: float
     seed: int = 1
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse values and holds in the wrong order."""
         if not self.low < self.high:
             return 'low must be below high'
         return '' if self.min_hold_s <= self.max_hold_s else (
             'min_hold_s must not be above max_hold_s')
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Draw all steps once, from the seed."""
-        self._times, self._values = [], []
-        if self.problem():
-            return
-        rng = np.random.default_rng(int(self.seed))
-        t = 0.0
-        while t < self.duration_s:
-            self._times.append(t)
-            self._values.append(float(rng.uniform(self.low, self.high)))
-            t += max(float(rng.uniform(self.min_hold_s, self.max_hold_s)), 0.01)
+        if not self.problem():
+            self._levels = RandomLevels(
+                self.low, self.high, self.min_hold_s, self.max_hold_s, self.duration_s, self.seed)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the value of the present step and rate 0."""
-        return self._values[max(bisect.bisect_right(self._times, t_s) - 1, 0)], 0.0
+        return self._levels.at(t_s), 0.0
 
 
 PRIMITIVE = RandomSteps
