@@ -28,7 +28,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'docs')]
 
 from generate import pages                      # noqa: E402
 from generate.mathml import add_mathml          # noqa: E402
-from generate.outside import links_into_site    # noqa: E402
 from pam_actuation import __version__           # noqa: E402
 
 project = 'pam_actuation'
@@ -38,7 +37,7 @@ version = release = __version__
 
 extensions = ['myst_parser']
 root_doc = 'index'
-exclude_patterns = ['generate', 'static', 'figures/*.py']
+exclude_patterns = ['static']
 
 myst_enable_extensions = ['dollarmath', 'colon_fence', 'deflist']
 myst_heading_anchors = 4
@@ -62,7 +61,8 @@ maximum_signature_line_length = 80
 
 
 def setup(app):
-    """Write the generated pages, then let Sphinx read the sources."""
-    pages.write_all(ROOT, Path(app.srcdir))
+    """Put the pages together beside the output: docs/ holds only what is written by hand."""
+    target = Path(app.doctreedir).resolve() / 'source'
+    pages.write_all(ROOT, Path(app.srcdir), target)
+    app.srcdir = target
     add_mathml(app)
-    app.connect('source-read', links_into_site)

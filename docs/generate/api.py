@@ -31,14 +31,14 @@ _SETTINGS = Config(
 _LITERAL = re.compile(r'(``(?! ).+?``)', re.S)
 # What reStructuredText would take for the begin or end of markup in a plain sentence.
 _MARKUP = re.compile(r'[|`]|\*(?=\S)|(?<=\S)\*|(?<=\w)_(?!\w)')
-_INDEX = '''Python interface
+_INDEX = """Python interface
 ================
 
 Every public name of both packages, one page for each folder. ``pam_sim`` is the physics and
 needs no ROS. ``pam_actuation`` is everything around it; only its nodes need ROS. A name with a
 leading underscore is private and not listed.
 
-'''
+"""
 
 
 def pages(root):

@@ -21,7 +21,7 @@ from pam_actuation.cli.main import build_parser
 
 # A bar within a cell of a table.
 BAR = '\\|'
-_INDEX = '''# Command line
+_INDEX = """# Command line
 
 One page for each verb of `pam`, made from its parser. `pam VERB --help` says the same.
 
@@ -29,7 +29,7 @@ Exit codes: 0 done, 1 there is a finding, 2 bad input, 130 interrupted. With `--
 prints its result as JSON. An error is then JSON too:
 `{"error": "one sentence", "exit_code": 2}`.
 
-'''
+"""
 
 
 def verbs():

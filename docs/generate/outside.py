@@ -15,7 +15,6 @@
 """Pages that stand outside of docs/: their copies in the site, and links to and from them."""
 
 import os
-from pathlib import Path
 import re
 
 # Folder or file of the repository -> its place below docs/.
@@ -29,14 +28,15 @@ PLACES = {
 _LINK = re.compile(r'(?<=\]\()([^)#\s:]+)(?=[)#])')
 
 
-def copies(root):
+def copies(root, target):
     """Return the path below docs/ and the text of every page from outside, links changed."""
     sources = [*sorted((root / 'msg_docs').glob('*.md')), root / 'CONTRIBUTING.md']
     made = {}
     for path in sources:
         place = site_place(path.relative_to(root).as_posix())
         made[place] = with_site_links(
-            path.read_text(encoding='utf-8'), path.relative_to(root).as_posix(), place)
+            path.read_text(encoding='utf-8'), path.relative_to(root).as_posix(), place, root,
+            target)
     made['project/changelog.rst'] = (root / 'CHANGELOG.rst').read_text(encoding='utf-8')
     topics = ''.join(f'{path.stem}\n' for path in sources if path.parent.name == 'msg_docs'
                      and path.stem != 'README')
@@ -54,24 +54,16 @@ def site_place(path):
     return path[len('docs/'):] if path.startswith('docs/') else None
 
 
-def with_site_links(text, source, place):
+def with_site_links(text, source, place, root, target):
     """
-    Return a text of the file ``source`` with links that hold at ``place`` below docs/.
+    Return a text of the file ``source`` of the repository with links that hold in the site.
 
-    A file that has no page in the site can be downloaded from it.
+    ``place`` is the page below ``target``. A file that has no page can be downloaded.
     """
     def changed(match):
         path = os.path.normpath(os.path.join(os.path.dirname(source), match[1]))
-        target = site_place(path)
-        folder = os.path.dirname(place)
-        if target is None:
-            return f"path:{os.path.relpath(Path('..') / path, folder or '.')}"
-        return os.path.relpath(target, folder or '.')
+        page = site_place(path)
+        if page is None:
+            return f'path:{os.path.relpath(root / path, (target / place).parent)}'
+        return os.path.relpath(page, os.path.dirname(place) or '.')
     return _LINK.sub(changed, text)
-
-
-def links_into_site(app, docname, source):
-    """Sphinx event: lead links of pages in docs/ to the copies of pages outside of it."""
-    if app.env.doc2path(docname).endswith('.md') and not docname.startswith(
-            ('reference/topics/', 'project/')):
-        source[0] = with_site_links(source[0], f'docs/{docname}.md', f'{docname}.md')

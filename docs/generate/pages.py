@@ -12,23 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Writes all generated pages of the documentation; a page that has not changed is kept."""
+"""Puts together what Sphinx reads: the pages of docs/, those from outside, the generated ones."""
 
 from generate import api, command_line, outside
 
-# What is made anew with every build, below docs/ (not in the repository).
-FOLDERS = ('reference/api', 'reference/cli', 'reference/topics', 'project')
+# What is no page, in docs/.
+_LEFT_OUT = ('generate', 'conf.py', '__pycache__')
 
 
-def write_all(root, target):
-    """Write the generated pages below ``target``, the folder of the sources of the site."""
-    made = {**outside.copies(root), **api.pages(root), **command_line.pages()}
-    for name, text in made.items():
+def write_all(root, source, target):
+    """
+    Write everything that Sphinx reads below ``target``.
+
+    ``source`` is docs/, or a copy of it made by rosdoc2. Files that have not changed are kept, so
+    that Sphinx reads only what is new. Files that are no longer made are removed.
+    """
+    made = {
+        path.relative_to(source).as_posix(): path.read_bytes()
+        for path in source.rglob('*')
+        if path.is_file() and not set(path.relative_to(source).parts) & set(_LEFT_OUT)}
+    for name, data in made.items():
+        if name.endswith('.md'):
+            text = outside.with_site_links(data.decode(), f'docs/{name}', name, root, target)
+            made[name] = text.encode()
+    generated = {
+        **outside.copies(root, target), **api.pages(root), **command_line.pages()}
+    made.update((name, text.encode()) for name, text in generated.items())
+    for name, data in made.items():
         path = target / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        if not path.is_file() or path.read_text(encoding='utf-8') != text:
-            path.write_text(text, encoding='utf-8')
-    for folder in FOLDERS:
-        for path in (target / folder).rglob('*.*'):
-            if path.relative_to(target).as_posix() not in made:
-                path.unlink()
+        if not path.is_file() or path.read_bytes() != data:
+            path.write_bytes(data)
+    for path in target.rglob('*'):
+        if path.is_file() and path.relative_to(target).as_posix() not in made:
+            path.unlink()
