@@ -40,10 +40,11 @@ import time
 
 from numba import njit
 import numpy as np
-from pam_actuation.control import inputs as place
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.sofc import layout, learning
+from pam_actuation.control.inputs import INPUT
+from pam_actuation.control.sofc import learning
 from pam_actuation.control.sofc.membership import locate, memberships, SET_COUNT, SET_NAMES
+from pam_actuation.control.sofc.records import OUTPUT
 from pam_actuation.control.sofc.rule_table import infer_feedback
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim import load_rig
@@ -244,23 +245,30 @@ def _time(seconds):
 
 
 @njit(error_model='numpy')
-def steps(arguments, reference, rate, lead, lead_rate, error):
-    """Run the controller over given references and errors; return the ticks that learned."""
-    inp, out = arguments[-2], arguments[-1]
+def _steps(arguments, inputs, outputs, reference, rate, lead, lead_rate, error):
+    """Run the compiled step over given references and errors; see ``steps``."""
+    inp, out = inputs.view(INPUT)[0], outputs.view(OUTPUT)[0]
     learned = 0
     for n in range(len(reference)):
-        inp[place.IN_CONTRACTION] = reference[n] - error[n]
-        inp[place.IN_REFERENCE] = reference[n]
-        inp[place.IN_REFERENCE_RATE] = rate[n]
-        inp[place.IN_LEAD_REFERENCE] = lead[n]
-        inp[place.IN_LEAD_RATE] = lead_rate[n]
-        inp[place.IN_LEARN] = 1.0
-        inp[place.IN_ELAPSED] = np.nan
-        inp[place.IN_PRESSURE] = np.nan
-        inp[place.IN_FORCE] = np.nan
+        inp.contraction_m = reference[n] - error[n]
+        inp.reference_m = reference[n]
+        inp.reference_rate_m_per_s = rate[n]
+        inp.lead_reference_m = lead[n]
+        inp.lead_rate_m_per_s = lead_rate[n]
+        inp.learning = 1.0
+        inp.elapsed_s = np.nan
+        inp.pressure_pa = np.nan
+        inp.force_n = np.nan
         sofc_step(*arguments)
-        learned += out[layout.O_REASON] == learning.LEARNING
+        learned += out.learning_reason == learning.LEARNING
     return learned
+
+
+def steps(controller, reference, rate, lead, lead_rate, error):
+    """Run a controller over given references and errors; return the ticks that learned."""
+    arguments = controller.compiled_arguments()
+    *_, inputs, outputs = arguments
+    return _steps(arguments, inputs, outputs, reference, rate, lead, lead_rate, error)
 
 
 def motion(count, lead_s):
@@ -279,13 +287,12 @@ def step_times(preset):
     rig = load_rig('dmsp_5_300_realistic', valve=preset.rsplit('_', 1)[-1])
     controller = load_controller(preset, rig)
     given = motion(STEPS, controller.lead_s)
-    arguments = controller.compiled_arguments()
-    steps(arguments, *(column[:2000] for column in given))
+    steps(controller, *(column[:2000] for column in given))
     controller.reset()
     best = np.inf
     for _ in range(5):
         start = time.perf_counter()
-        learned = steps(arguments, *given)
+        learned = steps(controller, *given)
         best = min(best, (time.perf_counter() - start) / STEPS)
     controller.reset()
     spent = np.empty(STEPS // 4)

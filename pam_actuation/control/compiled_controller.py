@@ -17,7 +17,9 @@
 import math
 
 import numpy as np
-from pam_actuation.control.inputs import INPUT_COUNT
+from pam_actuation.control.inputs import INPUT, write_inputs
+from pam_sim.annotations import FloatArray
+from pam_sim.records import zeros
 
 
 class CompiledController:
@@ -31,8 +33,8 @@ class CompiledController:
     ----------
     settings : dict
         Checked settings; has ``rate_hz`` and ``lead_s``.
-    state_size : int
-        Length of the state.
+    state : numpy.dtype
+        Record of the state.
     rig_name : str
         Identity of the rig.
 
@@ -42,27 +44,30 @@ class CompiledController:
     made_for = None         # facts of the rig, see ``made_for``
     other_rig = ''          # how the rig it runs on differs, if that was accepted
 
-    def __init__(self, settings, state_size, rig_name=''):
+    def __init__(self, settings: dict[str, float], state: 'np.dtype[np.record]',
+                 rig_name: str = '') -> None:
         self.settings = settings
         self.rig_name = rig_name
         self.freeze_learning = False
         self.rules_replaced = 0       # times the rules were exchanged from outside
-        self._state = np.zeros(state_size)
-        self._inputs = np.zeros(INPUT_COUNT)
+        self._state = zeros(state)
+        self._inputs = zeros(INPUT)
         self._outputs = np.zeros(len(self.state_names))
 
     @property
-    def rate_hz(self):
+    def rate_hz(self) -> float:
         """Rate [Hz] at which ``step`` is to be called."""
         return self.settings['rate_hz']
 
     @property
-    def lead_s(self):
+    def lead_s(self) -> float:
         """Preview [s]: how far ahead the lead reference is to be taken."""
         return self.settings['lead_s']
 
-    def step(self, x_m, ref_m, ref_vel_m_per_s, ref_lead_m, ref_lead_vel_m_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan, held_back=0.0):
+    def step(self, x_m: float, ref_m: float, ref_vel_m_per_s: float, ref_lead_m: float,
+             ref_lead_vel_m_per_s: float, learn: bool = True, elapsed_s: float = math.nan,
+             pressure_pa: float = math.nan, force_n: float = math.nan,
+             held_back: float = 0.0) -> float:
         """
         Run one tick.
 
@@ -92,38 +97,37 @@ class CompiledController:
             Wanted muscle pressure, absolute Pa, never below atmosphere.
 
         """
-        inputs = self._inputs
-        inputs[0] = x_m
-        inputs[1] = ref_m
-        inputs[2] = ref_vel_m_per_s
-        inputs[3] = ref_lead_m
-        inputs[4] = ref_lead_vel_m_per_s
-        inputs[5] = 1.0 if learn and not self.freeze_learning else 0.0
-        inputs[6] = elapsed_s
-        inputs[7] = pressure_pa
-        inputs[8] = force_n
-        inputs[9] = held_back
+        write_inputs(
+            self._inputs, contraction_m=x_m, reference_m=ref_m,
+            reference_rate_m_per_s=ref_vel_m_per_s, lead_reference_m=ref_lead_m,
+            lead_rate_m_per_s=ref_lead_vel_m_per_s,
+            learning=1.0 if learn and not self.freeze_learning else 0.0, elapsed_s=elapsed_s,
+            pressure_pa=pressure_pa, force_n=force_n, held_back=held_back)
         return self._step(*self._arguments)
 
-    def compiled_arguments(self):
+    def step_on_inputs(self) -> float:
+        """Run one tick on what ``input_array`` holds; return the command, absolute Pa."""
+        return self._step(*self._arguments)
+
+    def compiled_arguments(self) -> tuple[object, ...]:
         """Return the arrays the compiled step takes, for compiled closed loops."""
         return self._arguments
 
     @property
-    def input_array(self):
-        """Return the array of ``compiled_arguments`` that holds the inputs (``inputs.IN_*``)."""
+    def input_array(self) -> FloatArray:
+        """Return the array of ``compiled_arguments`` that holds the inputs (``inputs.INPUT``)."""
         return self._inputs
 
-    def state_values(self):
+    def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
         return tuple(self._outputs.tolist())
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         self._state[:] = 0.0
         self._outputs[:] = 0.0
 
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return YAML text from which ``load_controller`` builds an identical controller."""
         from pam_actuation.control.config import controller_to_yaml
         return controller_to_yaml(self)

@@ -34,7 +34,6 @@ controller instead its ``model`` and ``gains``, see ``lqi_files``.
 
 import os
 
-import numpy as np
 from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, mode_to_mapping, read_mode
@@ -43,7 +42,8 @@ from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import (
     load_rules, rules_from_mapping, rules_to_mapping)
-from pam_actuation.control.static_inverse import tabulate_static_inverse
+from pam_actuation.control.static_inverse import (
+    inverse_to_mapping, static_inverse, tabulate_static_inverse)
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
@@ -169,7 +169,7 @@ def _static_inverse(tree, rig, mode):
             raise table.error('`pressure_pa` needs at least two values', 'pressure_pa')
         values = [nodes.require(i, float, lower=0.0, upper=1e7, unit='Pa')
                   for i in range(len(nodes))]
-        return np.array([lower_m, step_m] + values)
+        return static_inverse(lower_m, step_m, values)
     if mode is not None:
         return mode.blank_inverse()
     if rig is None:
@@ -195,9 +195,7 @@ def controller_to_yaml(controller, rules_file=None):
     if controller.kind == 'lqi':
         data.update(lqi_to_mapping(controller))
     elif tracked_by(controller) != FORCE:       # there the surface says it
-        inverse = controller.static_inverse.tolist()
-        data['static_inverse'] = {
-            'lower_m': inverse[0], 'step_m': inverse[1], 'pressure_pa': inverse[2:]}
+        data['static_inverse'] = inverse_to_mapping(controller.static_inverse)
     if controller.rules is not None and rules_file is not None:
         data['rules'] = os.path.basename(rules_file)
     elif controller.rules is not None:

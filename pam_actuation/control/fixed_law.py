@@ -15,12 +15,16 @@
 """
 What controllers without rules have in common.
 
-A law that learns nothing is a vector of settings, an array of what it knows of the
+A law that learns nothing is a record of settings, an array of what it knows of the
 muscle, a state, and ``step(parameters, knowledge, state, inputs, outputs)``.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_sim.annotations import FloatArray
+from pam_sim.records import values_of
 
 
 class FixedLawController(CompiledController):
@@ -34,29 +38,31 @@ class FixedLawController(CompiledController):
     step : callable
         Compiled: ``step(parameters, knowledge, state, inputs, outputs)`` -> command [Pa].
     settings : dict
-        Checked settings in the order the step function expects; has ``rate_hz`` and ``lead_s``.
+        Checked settings, one for each field of ``parameters``.
     knowledge : numpy.ndarray
         What the law knows of the muscle.
-    state_size : int
-        Length of the state.
+    parameters, state : numpy.dtype
+        Records of the step function.
     rig_name : str
         Identity of the rig, for the record.
 
     """
 
-    def __init__(self, step, settings, knowledge, state_size, rig_name=''):
-        super().__init__(settings, state_size, rig_name)
-        self.parameters = np.array(list(settings.values()), dtype=float)
+    def __init__(self, step: Callable[..., float], settings: dict[str, float],
+                 knowledge: FloatArray, parameters: 'np.dtype[np.record]',
+                 state: 'np.dtype[np.record]', rig_name: str = '') -> None:
+        super().__init__(settings, state, rig_name)
+        self.parameters = values_of(parameters, settings)
         self._step = step
         self._arguments = (
             self.parameters, knowledge, self._state, self._inputs, self._outputs)
         self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
         self.pause()
 
-    def learning_reason(self):
+    def learning_reason(self) -> str:
         """Return why nothing is learned."""
         return 'this controller has no rules'
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget the motion."""
         self.pause()

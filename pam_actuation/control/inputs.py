@@ -13,20 +13,37 @@
 # limitations under the License.
 
 """
-What one controller tick is given, as places in one vector.
+What one controller tick is given: the record of its inputs.
 
-All controllers share it, so that the loop, the replay and the compiled closed
-loop need not know which controller they drive. Optional values are NaN.
+All laws share it, so that the loop, the replay and the compiled closed loops need not know
+which law they drive. Optional values are NaN.
 """
 
-IN_CONTRACTION = 0        # m, measured
-IN_REFERENCE = 1          # m, wanted at the time of that measurement
-IN_REFERENCE_RATE = 2     # m/s
-IN_LEAD_REFERENCE = 3     # m, wanted ``lead_s`` from now (the preview)
-IN_LEAD_RATE = 4          # m/s
-IN_LEARN = 5              # 1 = the rules may change in this tick
-IN_ELAPSED = 6            # s between the measurements of this and the former tick, NaN = period
-IN_PRESSURE = 7           # absolute Pa, measured; NaN = not known
-IN_FORCE = 8              # N, measured; NaN = not known
-IN_HELD_BACK = 9          # 0 = the driver follows the command; else see ``following``
-INPUT_COUNT = 10
+import struct
+
+from pam_sim.annotations import FloatArray
+from pam_sim.records import record
+
+INPUT = record(
+    'contraction_m',                  # measured
+    'reference_m',                    # wanted at the time of that measurement
+    'reference_rate_m_per_s',
+    'lead_reference_m',               # wanted ``lead_s`` from now: the preview
+    'lead_rate_m_per_s',
+    'learning',                       # 1 = the rules may change in this tick
+    'elapsed_s',                      # between this and the former measurement, NaN = period
+    'pressure_pa',                    # absolute, measured; NaN = not known
+    'force_n',                        # measured; NaN = not known
+    'held_back',                      # 0 = the driver follows the command; else see ``following``
+)
+_write = struct.Struct(f'{len(INPUT.names)}d').pack_into
+
+
+def write_inputs(
+        inputs: FloatArray, contraction_m: float, reference_m: float,
+        reference_rate_m_per_s: float, lead_reference_m: float, lead_rate_m_per_s: float,
+        learning: float, elapsed_s: float, pressure_pa: float, force_n: float,
+        held_back: float) -> None:
+    """Write all fields of ``INPUT`` at once, much faster than one by one."""
+    _write(inputs, 0, contraction_m, reference_m, reference_rate_m_per_s, lead_reference_m,
+           lead_rate_m_per_s, learning, elapsed_s, pressure_pa, force_n, held_back)

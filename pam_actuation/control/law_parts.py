@@ -25,7 +25,7 @@ _CHANGE_FLOOR_M_PER_S = 1e-12                    # the same
 
 
 @compiled
-def first_command_pa(pressure_pa, lowest_pa, highest_pa):
+def first_command_pa(pressure_pa: float, lowest_pa: float, highest_pa: float) -> float:
     """Return where a bumpless start begins: at the measured pressure, NaN = atmosphere."""
     if not math.isfinite(pressure_pa):
         return P_ATM_PA
@@ -33,7 +33,7 @@ def first_command_pa(pressure_pa, lowest_pa, highest_pa):
 
 
 @compiled
-def faded_offset(offset_m, time_s, period_s):
+def faded_offset(offset_m: float, time_s: float, period_s: float) -> float:
     """Return the offset of a bumpless start one period later."""
     if abs(offset_m) > _OFFSET_FLOOR_M:
         return offset_m * (time_s / (time_s + period_s))
@@ -41,7 +41,9 @@ def faded_offset(offset_m, time_s, period_s):
 
 
 @compiled
-def filtered_change(change, filter_s, reference_rate, moved_m, elapsed_s, period_s, known):
+def filtered_change(
+        change: float, filter_s: float, reference_rate: float, moved_m: float, elapsed_s: float,
+        period_s: float, known: bool) -> float:
     """
     Return the filtered change of error [m/s], from the contraction alone.
 
@@ -59,7 +61,9 @@ def filtered_change(change, filter_s, reference_rate, moved_m, elapsed_s, period
 
 
 @compiled
-def held_offset(offset_m, held_back, away_m, error_m, time_s, period_s):
+def held_offset(
+        offset_m: float, held_back: float, away_m: float, error_m: float, time_s: float,
+        period_s: float) -> float:
     """
     Return the offset of a bumpless start while the driver does not follow the command.
 
@@ -86,7 +90,7 @@ def held_offset(offset_m, held_back, away_m, error_m, time_s, period_s):
 
 
 @compiled
-def integral_growth(by_error, by_limits, held_back):
+def integral_growth(by_error: float, by_limits: float, held_back: float) -> float:
     """
     Return the rate at which an integral grows, by the error and by the limits of the law.
 
@@ -103,7 +107,9 @@ def integral_growth(by_error, by_limits, held_back):
 
 
 @compiled
-def limited(wanted_pa, former_pa, lowest_pa, highest_pa, reach_pa):
+def limited(
+        wanted_pa: float, former_pa: float, lowest_pa: float, highest_pa: float,
+        reach_pa: float) -> tuple[float, float]:
     """Return a command within its limits, and the same within reach of the former command."""
     inside = min(max(wanted_pa, lowest_pa), highest_pa)
     return inside, min(max(inside, former_pa - reach_pa), former_pa + reach_pa)

@@ -23,16 +23,20 @@ limits and bumpless start as the PID's, and the same interface; there are no
 rules to learn.
 """
 
-from numba import njit
-from pam_actuation.control import inputs as place
+from collections.abc import Callable, Mapping
+
+import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.lqi_gains import (
-    M_CONTRACTION, M_DELAY, M_HEAD, M_INTEGRAL_GAIN, M_ORDER, M_PA_PER_M, M_PRESSURE, pack)
-from pam_actuation.control.settings import checked_settings, Setting
-from pam_sim.compiled import compiled, source_key
+from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack
+from pam_actuation.control.lqi_model import LinearModel
+from pam_actuation.control.settings import checked_settings, parameter_record, Setting
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.errors import InputError
+from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
@@ -50,151 +54,170 @@ SETTINGS = (
     Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
     Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
-STATE_NAMES = (
+PARAMETERS = parameter_record(SETTINGS)
+STATE = record(
+    'started',                        # 1 after the first tick
+    'offset_m',                       # of the reference, from the bumpless start
+    'integral_pa',
+    'command_pa',                     # of the tick before
+    'error_m',                        # of the tick before
+    ('estimate_m', MAX_ORDER),        # state of the model
+    ('acting_pa', MAX_DELAY_TICKS),   # commands on their way, oldest first
+    ('feedforward_pa', MAX_DELAY_TICKS),    # what they contain of it
+)
+# The names on topic ``controller_state``.
+OUTPUT = record(
     'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'feedforward_pa',
     'state_feedback_pa', 'integral_pa', 'unlimited_command_pa', 'saturated_low',
     'saturated_high', 'slew_limited', 'start_offset_m')
-
-(P_RATE, P_LEAD, P_FEEDFORWARD, P_INTEGRAL_WEIGHT, P_COMMAND_WEIGHT, P_DISTURBANCE, P_NOISE,
- P_ANTI_WINDUP_TIME, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
-# State: these, then the estimate (order), commands on their way (delay) and the feed-forward
-# they contained (delay), oldest first.
-(S_STARTED, S_OFFSET, S_INTEGRAL, S_OUTPUT, S_ERROR, S_HEAD) = range(6)
 _STALE_S = 0.1              # a longer gap between measurements restarts the estimate
 
 
 @compiled
-def _rest(model, st, contraction_m):
+def _rest(model: np.record, st: np.record, contraction_m: float) -> None:
     """Set the estimate to rest at a deviation [m] from the operating point."""
-    n = int(model[M_ORDER])
+    n = int(model.order)
     for i in range(n):
-        st[S_HEAD + i] = model[M_HEAD + 3 * n + i] * contraction_m
+        st.estimate_m[i] = model.rest[i] * contraction_m
 
 
 @compiled
-def _state_feedback(model, st, target_m):
+def _state_feedback(model: np.record, st: np.record, target_m: float) -> float:
     """Return the feedback [Pa] of estimate and commands on their way about a target [m]."""
-    n, d = int(model[M_ORDER]), int(model[M_DELAY])
+    n, d = int(model.order), int(model.delay_ticks)
     total = 0.0
     for i in range(n):
-        wanted = model[M_HEAD + 3 * n + i] * target_m
-        total -= model[M_HEAD + 4 * n + i] * (st[S_HEAD + i] - wanted)
+        wanted = model.rest[i] * target_m
+        total -= model.state_gain_pa_per_m[i] * (st.estimate_m[i] - wanted)
     for i in range(d):
-        total -= model[M_HEAD + 5 * n + i] * (st[S_HEAD + n + i] - st[S_HEAD + n + d + i])
+        total -= model.delay_gain[i] * (st.acting_pa[i] - st.feedforward_pa[i])
     return total
 
 
 @compiled
-def _predict(model, st, command, feedforward):
+def _predict(model: np.record, st: np.record, command: float, feedforward: float) -> None:
     """Advance the estimate by one tick and put a command (deviation [Pa]) on its way."""
-    n, d = int(model[M_ORDER]), int(model[M_DELAY])
+    n, d = int(model.order), int(model.delay_ticks)
     acting = command
     if d > 0:
-        acting = st[S_HEAD + n]
+        acting = st.acting_pa[0]
         for i in range(d - 1):
-            st[S_HEAD + n + i] = st[S_HEAD + n + i + 1]
-            st[S_HEAD + n + d + i] = st[S_HEAD + n + d + i + 1]
-        st[S_HEAD + n + d - 1] = command
-        st[S_HEAD + n + 2 * d - 1] = feedforward
-    first = st[S_HEAD]
+            st.acting_pa[i] = st.acting_pa[i + 1]
+            st.feedforward_pa[i] = st.feedforward_pa[i + 1]
+        st.acting_pa[d - 1] = command
+        st.feedforward_pa[d - 1] = feedforward
+    first = st.estimate_m[0]
     for i in range(n):
-        following = st[S_HEAD + i + 1] if i + 1 < n else 0.0
-        st[S_HEAD + i] = (
-            following - model[M_HEAD + i] * first + model[M_HEAD + n + i] * acting)
+        following = st.estimate_m[i + 1] if i + 1 < n else 0.0
+        st.estimate_m[i] = (
+            following - model.denominator[i] * first + model.numerator_m_per_pa[i] * acting)
 
 
 @compiled
-def _start(par, model, st, inp, feedforward):
+def _start(par: np.record, model: np.record, st: np.record, inp: np.record,
+           feedforward: float) -> None:
     """Begin so that the reference starts where the muscle is and the command where it is."""
-    n, d = int(model[M_ORDER]), int(model[M_DELAY])
-    y = inp[place.IN_CONTRACTION] - model[M_CONTRACTION]
-    st[S_STARTED] = 1.0
+    d = int(model.delay_ticks)
+    y = inp.contraction_m - model.contraction_m
+    st.started = 1.0
     _rest(model, st, y)
-    st[S_OUTPUT] = first_command_pa(
-        inp[place.IN_PRESSURE], P_ATM_PA + par[P_MIN], P_ATM_PA + par[P_MAX])
-    deviation = st[S_OUTPUT] - model[M_PRESSURE]
+    st.command_pa = first_command_pa(
+        inp.pressure_pa, P_ATM_PA + par.min_pressure_gauge_pa,
+        P_ATM_PA + par.max_pressure_gauge_pa)
+    deviation = st.command_pa - model.pressure_pa
     for i in range(d):
-        st[S_HEAD + n + i] = deviation
-        st[S_HEAD + n + d + i] = feedforward
-    st[S_INTEGRAL] = deviation - feedforward - _state_feedback(
-        model, st, par[P_FEEDFORWARD] * y)
+        st.acting_pa[i] = deviation
+        st.feedforward_pa[i] = feedforward
+    st.integral_pa = deviation - feedforward - _state_feedback(
+        model, st, par.reference_feedforward * y)
 
 
 @compiled
-def _tick(par, model, st, inp, out):
+def _tick(par: np.record, model: np.record, st: np.record, inp: np.record,
+          out: np.record) -> float:
     """Run one tick; see ``lqi_step``."""
-    period = 1.0 / par[P_RATE]
-    n = int(model[M_ORDER])
-    x = inp[place.IN_CONTRACTION]
-    y = x - model[M_CONTRACTION]
-    begins = st[S_STARTED] < 0.5
+    period = 1.0 / par.rate_hz
+    n = int(model.order)
+    x = inp.contraction_m
+    y = x - model.contraction_m
+    begins = st.started < 0.5
     if begins:
-        st[S_OFFSET] = inp[place.IN_REFERENCE] - x
-    held_back = inp[place.IN_HELD_BACK]
-    offset = held_offset(st[S_OFFSET], held_back, inp[place.IN_REFERENCE] - x, st[S_ERROR],
-                         par[P_START_TIME], period)
-    feedforward = par[P_FEEDFORWARD] * model[M_PA_PER_M] * (
-        inp[place.IN_LEAD_REFERENCE] - offset - model[M_CONTRACTION])
+        st.offset_m = inp.reference_m - x
+    held_back = inp.held_back
+    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
+                         par.start_time_s, period)
+    feedforward = par.reference_feedforward * model.pa_per_m * (
+        inp.lead_reference_m - offset - model.contraction_m)
     if begins:
         _start(par, model, st, inp, feedforward)
-    st[S_OFFSET] = faded_offset(offset, par[P_START_TIME], period)
+    st.offset_m = faded_offset(offset, par.start_time_s, period)
 
     # Correct the estimate; the same measurement once more tells nothing new.
-    elapsed = inp[place.IN_ELAPSED]
-    innovation = y - st[S_HEAD]
+    elapsed = inp.elapsed_s
+    innovation = y - st.estimate_m[0]
     if held_back != 0.0 or elapsed > _STALE_S:    # False for NaN: one period
         _rest(model, st, y)                # what moved it is not known
     elif not elapsed <= 0.0:
         for i in range(n):
-            st[S_HEAD + i] += model[M_HEAD + 2 * n + i] * innovation
+            st.estimate_m[i] += model.observer_gain[i] * innovation
 
-    error = inp[place.IN_REFERENCE] - offset - x
-    st[S_ERROR] = error
-    target = par[P_FEEDFORWARD] * (inp[place.IN_REFERENCE] - offset - model[M_CONTRACTION])
+    error = inp.reference_m - offset - x
+    st.error_m = error
+    target = par.reference_feedforward * (inp.reference_m - offset - model.contraction_m)
     feedback = _state_feedback(model, st, target)
-    integral = st[S_INTEGRAL]
-    estimate = st[S_HEAD] + model[M_CONTRACTION]
-    wanted = model[M_PRESSURE] + feedforward + feedback + integral
-    lowest = P_ATM_PA + par[P_MIN]
-    highest = P_ATM_PA + par[P_MAX]
-    inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
-    st[S_OUTPUT] = command
-    st[S_INTEGRAL] = integral + period * integral_growth(
-        model[M_INTEGRAL_GAIN] * error, (command - wanted) / par[P_ANTI_WINDUP_TIME], held_back)
-    _predict(model, st, command - model[M_PRESSURE], feedforward)
-    out[0] = command
-    out[1] = error
-    out[2] = estimate
-    out[3] = innovation
-    out[4] = feedforward
-    out[5] = feedback
-    out[6] = integral
-    out[7] = wanted
-    out[8] = 1.0 if wanted < lowest else 0.0
-    out[9] = 1.0 if wanted > highest else 0.0
-    out[10] = 1.0 if command != inside else 0.0
-    out[11] = offset
+    integral = st.integral_pa
+    estimate = st.estimate_m[0] + model.contraction_m
+    wanted = model.pressure_pa + feedforward + feedback + integral
+    lowest = P_ATM_PA + par.min_pressure_gauge_pa
+    highest = P_ATM_PA + par.max_pressure_gauge_pa
+    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
+    st.command_pa = command
+    st.integral_pa = integral + period * integral_growth(
+        model.integral_gain_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s,
+        held_back)
+    _predict(model, st, command - model.pressure_pa, feedforward)
+    out.command_pa = command
+    out.error_m = error
+    out.estimated_contraction_m = estimate
+    out.innovation_m = innovation
+    out.feedforward_pa = feedforward
+    out.state_feedback_pa = feedback
+    out.integral_pa = integral
+    out.unlimited_command_pa = wanted
+    out.saturated_low = 1.0 if wanted < lowest else 0.0
+    out.saturated_high = 1.0 if wanted > highest else 0.0
+    out.slew_limited = 1.0 if command != inside else 0.0
+    out.start_offset_m = offset
     return command
 
 
-def _entry(key):
+@compiled
+def _step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
+          out: FloatArray) -> float:
+    """Run one tick on arrays; see ``lqi_step``."""
+    return _tick(part(par, 0, PARAMETERS), part(model, 0, MODEL), part(st, 0, STATE),
+                 part(inp, 0, INPUT), part(out, 0, OUTPUT))
+
+
+def _entry(key: int) -> Callable[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-    def lqi_step(par, model, st, inp, out):
+    @entry_point
+    def lqi_step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
+                 out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
-        ``par`` holds ``SETTINGS`` in order, ``model`` what ``lqi_gains.pack`` returns, ``st``
-        the state, ``inp`` the inputs (``inputs.IN_*``), ``out`` receives ``STATE_NAMES``.
+        Arrays of ``PARAMETERS``, ``lqi_gains.MODEL``, ``STATE``, ``inputs.INPUT`` and
+        ``OUTPUT``; ``st`` and ``out`` are written.
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _tick(par, model, st, inp, out)
+        return _step(par, model, st, inp, out)
 
     return lqi_step
 
 
-lqi_step = _entry(source_key(_tick))
+lqi_step = _entry(source_key(_step))
 
 
 class LqiController(FixedLawController):
@@ -215,22 +238,21 @@ class LqiController(FixedLawController):
     Raises
     ------
     InputError
-        A setting is unknown or out of range, the model is of another rate, or the Riccati
-        equation has no solution.
+        A setting is unknown or out of range, the model is of another rate or too long, or the
+        Riccati equation has no solution.
 
     """
 
     kind = 'lqi'
-    state_names = STATE_NAMES
+    state_names = OUTPUT.names
 
-    def __init__(self, model, settings=None, rig_name='', where=None):
-        settings = checked_settings(SETTINGS, settings or {}, where)
-        if model.rate_hz != settings['rate_hz']:
+    def __init__(self, model: LinearModel, settings: Mapping[str, object] | None = None,
+                 rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
+        checked = checked_settings(SETTINGS, settings or {}, where)
+        if model.rate_hz != checked['rate_hz']:
             raise InputError(
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '
-                f'{settings["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
+                f'{checked["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
         self.model = model
-        self.gains = pack(model, settings)
-        super().__init__(
-            lqi_step, settings, self.gains,
-            S_HEAD + len(model.numerator) + 2 * model.delay_ticks, rig_name)
+        self.gains = pack(model, checked)
+        super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name)

@@ -31,20 +31,26 @@ A recording also keeps ``gains``, what the Riccati equations gave, so that a rep
 another machine has the same bits.
 """
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
-from pam_actuation.control.lqi import LqiController
+from pam_actuation.control.lqi import LqiController, SETTINGS
+from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, used_numbers
 from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
 from pam_actuation.control.settings import checked_settings
 from pam_sim.errors import InputError
+from pam_sim.located_yaml import Located
+from pam_sim.records import fields
+from pam_sim.rig import Rig
 
 _NUMBERS = (
     ('rate_hz', 20.0, 1000.0, 'Hz'), ('contraction_m', -0.1, 0.3, 'm'),
     ('pressure_pa', 0.0, 1e7, 'Pa'))
 _LISTS = (('denominator', -1e3, 1e3, '-'), ('numerator', -1.0, 1.0, 'm/Pa'))
-_MOST = 10
 
 
-def lqi_from_tree(tree, rig, settings, rig_name, where):
+def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object], rig_name: str,
+                  where: Callable[[str], str]) -> LqiController:
     """
     Return the LqiController of a ``Located`` mapping.
 
@@ -60,16 +66,19 @@ def lqi_from_tree(tree, rig, settings, rig_name, where):
     elif rig is None:
         raise InputError('without a rig the controller text must bring its `model`', tree.where())
     else:
-        from pam_actuation.control.lqi import SETTINGS
         model = identify_on_rig(rig, checked_settings(SETTINGS, settings, where)['rate_hz'])
     controller = LqiController(model, settings, rig_name, where)
     if 'gains' in tree:
-        controller.gains[:] = _floats(
-            tree, 'gains', -1e12, 1e12, '', len(controller.gains))
+        used = used_numbers(controller.gains)
+        kept = controller.gains.copy()
+        controller.gains[used] = _floats(tree, 'gains', -1e12, 1e12, '', int(used.sum()))
+        before, now = fields(kept, MODEL), fields(controller.gains, MODEL)
+        if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
+            raise tree.error('`gains` are of a model of another order or delay', 'gains')
     return controller
 
 
-def lqi_to_mapping(controller):
+def lqi_to_mapping(controller: LqiController) -> dict[str, object]:
     """Return what ``controller_to_yaml`` adds for an LQI controller."""
     model = controller.model
     return {
@@ -77,17 +86,18 @@ def lqi_to_mapping(controller):
             'rate_hz': model.rate_hz, 'delay_ticks': model.delay_ticks,
             'denominator': list(model.denominator), 'numerator': list(model.numerator),
             'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa},
-        'gains': controller.gains.tolist()}
+        'gains': controller.gains[used_numbers(controller.gains)].tolist()}
 
 
-def _model(table):
+def _model(table: Located) -> LinearModel:
+    """Return the model of a file."""
     table.check_keys(('delay_ticks', *(name for name, *_ in _NUMBERS + _LISTS)))
     values = {name: table.require(name, float, lower=lower, upper=upper, unit=unit)
               for name, lower, upper, unit in _NUMBERS}
-    values['delay_ticks'] = table.require('delay_ticks', int, lower=0, upper=200)
+    values['delay_ticks'] = table.require('delay_ticks', int, lower=0, upper=MAX_DELAY_TICKS)
     order = len(table.require('denominator', list))
-    if not 1 <= order <= _MOST:
-        raise table.error(f'`denominator` has {order} numbers; allowed 1 to {_MOST}',
+    if not 1 <= order <= MAX_ORDER:
+        raise table.error(f'`denominator` has {order} numbers; allowed 1 to {MAX_ORDER}',
                           'denominator')
     for name, lower, upper, unit in _LISTS:
         values[name] = tuple(_floats(table, name, lower, upper, unit, order))
@@ -99,7 +109,8 @@ def _model(table):
     return model
 
 
-def _floats(tree, key, lower, upper, unit, count):
+def _floats(tree: Located, key: str, lower: float, upper: float, unit: str,
+            count: int) -> list[float]:
     """Return a list of exactly ``count`` numbers within bounds."""
     table = tree.require(key, list)
     if len(table) != count:

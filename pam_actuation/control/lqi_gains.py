@@ -28,17 +28,37 @@ observer is the stationary Kalman filter of the model with a disturbance of the
 command and noise of the sensor.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_actuation.control.lqi_model import LinearModel
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
+from pam_sim.records import fields, record, values_of, zeros
 from scipy.linalg import solve_discrete_are
 
-# Places in the vector ``pack`` returns; what follows the head are a, b, observer gains, rest
-# state per contraction, state gains (order each), delay gains (delay).
-(M_ORDER, M_DELAY, M_CONTRACTION, M_PRESSURE, M_PA_PER_M, M_INTEGRAL_GAIN, M_HEAD) = range(7)
+MAX_ORDER = 10
+MAX_DELAY_TICKS = 200
+# Model and gains for the compiled step, in SI; arrays are used up to order or delay.
+MODEL = record(
+    'order',
+    'delay_ticks',
+    'contraction_m',                          # operating point
+    'pressure_pa',                            # of it, absolute
+    'pa_per_m',                               # pressure per contraction at rest
+    'integral_gain_pa_per_m_s',
+    ('denominator', MAX_ORDER),
+    ('numerator_m_per_pa', MAX_ORDER),
+    ('observer_gain', MAX_ORDER),
+    ('rest', MAX_ORDER),                      # state at rest per contraction
+    ('state_gain_pa_per_m', MAX_ORDER),
+    ('delay_gain', MAX_DELAY_TICKS),          # of commands on their way, oldest first
+)
 _MM, _KPA = 1e3, 1e-3           # what a metre and a pascal are in the units of the weights
 
 
-def state_matrices(model):
+def state_matrices(model: LinearModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (A, B, C) of a model without its delay, observer form, in mm and kPa."""
     n = len(model.denominator)
     a = np.zeros((n, n))
@@ -50,7 +70,8 @@ def state_matrices(model):
     return a, b, c
 
 
-def feedback_gains(model, integral_weight, command_weight):
+def feedback_gains(model: LinearModel, integral_weight: float,
+                   command_weight: float) -> tuple[FloatArray, FloatArray, float]:
     """
     Return (state gains [kPa/mm], delay gains [-], integral gain [kPa/(mm s)]).
 
@@ -75,7 +96,7 @@ def feedback_gains(model, integral_weight, command_weight):
     return gains[:n], delay, -gains[-1]
 
 
-def observer_gains(model, disturbance_pa, noise_m):
+def observer_gains(model: LinearModel, disturbance_pa: float, noise_m: float) -> FloatArray:
     """Return the gains [-] by which a measured difference corrects the estimated state."""
     a, b, c = state_matrices(model)
     noise = (noise_m * _MM) ** 2
@@ -84,7 +105,8 @@ def observer_gains(model, disturbance_pa, noise_m):
     return p @ c / (c @ p @ c + noise)
 
 
-def _riccati(a, b, q, r):
+def _riccati(a: FloatArray, b: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
+    """Return the solution of the discrete algebraic Riccati equation."""
     try:
         return solve_discrete_are(a, b, q, r)
     except np.linalg.LinAlgError:
@@ -92,18 +114,55 @@ def _riccati(a, b, q, r):
                          'weights') from None
 
 
-def pack(model, settings):
-    """Return model and gains as one vector in SI for the compiled step."""
+def pack(model: LinearModel, settings: Mapping[str, float]) -> FloatArray:
+    """
+    Return model and gains as an array of ``MODEL``.
+
+    Raises
+    ------
+    InputError
+        Order or delay are beyond ``MAX_ORDER`` and ``MAX_DELAY_TICKS``, or the Riccati
+        equation has no solution.
+
+    """
     a, b, _ = state_matrices(model)
+    if len(b) > MAX_ORDER or model.delay_ticks > MAX_DELAY_TICKS:
+        raise InputError(
+            f'the linear model has order {len(b)} and {model.delay_ticks} ticks of delay; at most '
+            f'{MAX_ORDER} and {MAX_DELAY_TICKS} are allowed')
     state, delay, integral = feedback_gains(
         model, settings['integral_weight'], settings['command_weight'])
     observer = observer_gains(model, settings['disturbance_pa'], settings['noise_m'])
     per_pa = model.gain_m_per_pa
     rest = np.linalg.solve(np.eye(len(b)) - a, b) / (per_pa * _MM / _KPA)
     si = _MM / _KPA             # kPa/mm to Pa/m
-    head = np.zeros(M_HEAD)
-    head[M_ORDER], head[M_DELAY] = len(b), model.delay_ticks
-    head[M_CONTRACTION], head[M_PRESSURE] = model.contraction_m, model.pressure_pa
-    head[M_PA_PER_M], head[M_INTEGRAL_GAIN] = 1.0 / per_pa, integral * si
-    return np.concatenate([
-        head, model.denominator, model.numerator, observer, rest, state * si, delay])
+    return values_of(MODEL, {
+        'order': len(b), 'delay_ticks': model.delay_ticks,
+        'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa,
+        'pa_per_m': 1.0 / per_pa, 'integral_gain_pa_per_m_s': integral * si,
+        'denominator': _padded(model.denominator, MAX_ORDER),
+        'numerator_m_per_pa': _padded(model.numerator, MAX_ORDER),
+        'observer_gain': _padded(observer, MAX_ORDER), 'rest': _padded(rest, MAX_ORDER),
+        'state_gain_pa_per_m': _padded(state * si, MAX_ORDER),
+        'delay_gain': _padded(delay, MAX_DELAY_TICKS)})
+
+
+def _padded(values: ArrayLike, size: int) -> FloatArray:
+    """Return values with zeros behind them."""
+    padded = np.zeros(size)
+    padded[:np.size(values)] = values
+    return padded
+
+
+def used_numbers(gains: FloatArray) -> BoolArray:
+    """Return where an array of ``MODEL`` holds numbers of its order and delay, in order."""
+    model, used = fields(gains, MODEL), zeros(MODEL)
+    marked = fields(used, MODEL)
+    lengths = {(MAX_ORDER,): int(model.order), (MAX_DELAY_TICKS,): int(model.delay_ticks)}
+    for name in MODEL.names:
+        shape = MODEL[name].shape
+        if shape:
+            marked[name][:lengths[shape]] = 1.0
+        else:
+            marked[name] = 1.0
+    return used > 0.0

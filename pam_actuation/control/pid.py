@@ -20,15 +20,18 @@ limits of pressure and of its rate, bumpless start. Same interface as the
 self-organizing controller; it has no rules to learn.
 """
 
-from numba import njit
+from collections.abc import Callable, Mapping
+
 import numpy as np
-from pam_actuation.control import inputs as place
 from pam_actuation.control.fixed_law import FixedLawController
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.settings import checked_settings, Setting
+from pam_actuation.control.settings import checked_settings, parameter_record, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
-from pam_sim.compiled import compiled, source_key
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
@@ -46,94 +49,114 @@ SETTINGS = (
     Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
 
-(P_RATE, P_LEAD, P_INVERSE, P_PROPORTIONAL, P_INTEGRAL, P_DERIVATIVE, P_ANTI_WINDUP_TIME,
- P_CHANGE_FILTER, P_MIN, P_MAX, P_SLEW, P_START_TIME) = range(len(SETTINGS))
-(S_STARTED, S_OFFSET, S_CONTRACTION, S_RATE, S_INTEGRAL, S_OUTPUT, S_HISTORY, S_ERROR) = range(8)
-STATE_COUNT = 8
-STATE_NAMES = (
+PARAMETERS = parameter_record(SETTINGS)
+STATE = record(
+    'started',                        # 1 after the first tick
+    'offset_m',                       # of the reference, from the bumpless start
+    'contraction_m',                  # measured before
+    'change_m_per_s',                 # of the error, filtered
+    'integral_pa',
+    'command_pa',                     # of the tick before
+    'history_ticks',                  # ticks since the start
+    'error_m',                        # of the tick before
+)
+# The names on topic ``controller_state``.
+OUTPUT = record(
     'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
     'integral_pa', 'derivative_pa', 'unlimited_command_pa', 'saturated_low', 'saturated_high',
     'slew_limited', 'start_offset_m')
 
 
 @compiled
-def _start(par, inverse, st, inp):
+def _start(par: np.record, st: np.record, inp: np.record) -> None:
     """Begin so that the reference starts where the muscle is and the command where it is."""
-    st[S_STARTED] = 1.0
-    st[S_OFFSET] = inp[place.IN_REFERENCE] - inp[place.IN_CONTRACTION]
-    st[S_RATE] = 0.0
-    st[S_HISTORY] = 0.0
-    st[S_OUTPUT] = first_command_pa(
-        inp[place.IN_PRESSURE], P_ATM_PA + par[P_MIN], P_ATM_PA + par[P_MAX])
-    st[S_INTEGRAL] = 0.0
-    if par[P_INVERSE] < 0.5:
-        st[S_INTEGRAL] = st[S_OUTPUT] - P_ATM_PA
+    st.started = 1.0
+    st.offset_m = inp.reference_m - inp.contraction_m
+    st.change_m_per_s = 0.0
+    st.history_ticks = 0.0
+    st.command_pa = first_command_pa(
+        inp.pressure_pa, P_ATM_PA + par.min_pressure_gauge_pa,
+        P_ATM_PA + par.max_pressure_gauge_pa)
+    st.integral_pa = 0.0
+    if par.use_static_inverse < 0.5:
+        st.integral_pa = st.command_pa - P_ATM_PA
 
 
 @compiled
-def _tick(par, inverse, st, inp, out):
+def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
+          out: np.record) -> float:
     """Run one tick; see ``pid_step``."""
-    period = 1.0 / par[P_RATE]
-    if st[S_STARTED] < 0.5:
-        _start(par, inverse, st, inp)
-    x = inp[place.IN_CONTRACTION]
-    st[S_RATE] = filtered_change(
-        st[S_RATE], par[P_CHANGE_FILTER], inp[place.IN_REFERENCE_RATE],
-        x - st[S_CONTRACTION], inp[place.IN_ELAPSED], period, st[S_HISTORY] > 0.0)
-    st[S_CONTRACTION] = x
-    st[S_HISTORY] += 1.0
-    held_back = inp[place.IN_HELD_BACK]
-    offset = held_offset(st[S_OFFSET], held_back, inp[place.IN_REFERENCE] - x, st[S_ERROR],
-                         par[P_START_TIME], period)
-    st[S_OFFSET] = faded_offset(offset, par[P_START_TIME], period)
-    error = inp[place.IN_REFERENCE] - offset - x
-    st[S_ERROR] = error
+    period = 1.0 / par.rate_hz
+    if st.started < 0.5:
+        _start(par, st, inp)
+    x = inp.contraction_m
+    st.change_m_per_s = filtered_change(
+        st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s,
+        x - st.contraction_m, inp.elapsed_s, period, st.history_ticks > 0.0)
+    st.contraction_m = x
+    st.history_ticks += 1.0
+    held_back = inp.held_back
+    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
+                         par.start_time_s, period)
+    st.offset_m = faded_offset(offset, par.start_time_s, period)
+    error = inp.reference_m - offset - x
+    st.error_m = error
     base = P_ATM_PA
-    if par[P_INVERSE] > 0.5:
-        base = inverse_pressure_pa(inverse, inp[place.IN_LEAD_REFERENCE] - offset)
-    proportional = par[P_PROPORTIONAL] * error
-    derivative = par[P_DERIVATIVE] * st[S_RATE]
-    integral = st[S_INTEGRAL]
+    if par.use_static_inverse > 0.5:
+        base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
+    proportional = par.proportional_pa_per_m * error
+    derivative = par.derivative_pa_s_per_m * st.change_m_per_s
+    integral = st.integral_pa
     wanted = base + proportional + integral + derivative
-    lowest = P_ATM_PA + par[P_MIN]
-    highest = P_ATM_PA + par[P_MAX]
-    inside, command = limited(wanted, st[S_OUTPUT], lowest, highest, par[P_SLEW] * period)
-    st[S_OUTPUT] = command
-    st[S_INTEGRAL] = integral + period * integral_growth(
-        par[P_INTEGRAL] * error, (command - wanted) / par[P_ANTI_WINDUP_TIME], held_back)
-    out[0] = command
-    out[1] = error
-    out[2] = st[S_RATE]
-    out[3] = base
-    out[4] = proportional
-    out[5] = integral
-    out[6] = derivative
-    out[7] = wanted
-    out[8] = 1.0 if wanted < lowest else 0.0
-    out[9] = 1.0 if wanted > highest else 0.0
-    out[10] = 1.0 if command != inside else 0.0
-    out[11] = offset
+    lowest = P_ATM_PA + par.min_pressure_gauge_pa
+    highest = P_ATM_PA + par.max_pressure_gauge_pa
+    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
+    st.command_pa = command
+    st.integral_pa = integral + period * integral_growth(
+        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s, held_back)
+    out.command_pa = command
+    out.error_m = error
+    out.change_of_error_m_per_s = st.change_m_per_s
+    out.inverse_pa = base
+    out.proportional_pa = proportional
+    out.integral_pa = integral
+    out.derivative_pa = derivative
+    out.unlimited_command_pa = wanted
+    out.saturated_low = 1.0 if wanted < lowest else 0.0
+    out.saturated_high = 1.0 if wanted > highest else 0.0
+    out.slew_limited = 1.0 if command != inside else 0.0
+    out.start_offset_m = offset
     return command
 
 
-def _entry(key):
+@compiled
+def _step(par: FloatArray, inverse: FloatArray, st: FloatArray, inp: FloatArray,
+          out: FloatArray) -> float:
+    """Run one tick on arrays; see ``pid_step``."""
+    return _tick(part(par, 0, PARAMETERS), inverse, part(st, 0, STATE), part(inp, 0, INPUT),
+                 part(out, 0, OUTPUT))
+
+
+def _entry(key: int) -> Callable[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-    def pid_step(par, inverse, st, inp, out):
+    @entry_point
+    def pid_step(par: FloatArray, inverse: FloatArray, st: FloatArray, inp: FloatArray,
+                 out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
-        ``par`` holds ``SETTINGS`` in order, ``inverse`` the static inverse table, ``st`` the
-        state, ``inp`` the inputs (``inputs.IN_*``), ``out`` receives ``STATE_NAMES``.
+        ``par``, ``st``, ``inp`` and ``out`` are arrays of ``PARAMETERS``, ``STATE``,
+        ``inputs.INPUT`` and ``OUTPUT``; ``st`` and ``out`` are written. ``inverse`` is the
+        static inverse table.
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _tick(par, inverse, st, inp, out)
+        return _step(par, inverse, st, inp, out)
 
     return pid_step
 
 
-pid_step = _entry(source_key(_tick))
+pid_step = _entry(source_key(_step))
 
 
 class PidController(FixedLawController):
@@ -159,10 +182,11 @@ class PidController(FixedLawController):
     """
 
     kind = 'pid'
-    state_names = STATE_NAMES
+    state_names = OUTPUT.names
 
-    def __init__(self, static_inverse, settings=None, rig_name='', where=None):
+    def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
+                 rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         super().__init__(
             pid_step, checked_settings(SETTINGS, settings or {}, where), self.static_inverse,
-            STATE_COUNT, rig_name)
+            PARAMETERS, STATE, rig_name)

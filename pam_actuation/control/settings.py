@@ -14,9 +14,12 @@
 
 """Settings of a controller: named numbers with unit, default and allowed range."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.records import record
 
 
 @dataclass(frozen=True)
@@ -31,13 +34,31 @@ class Setting:
     description: str
 
 
-def checked_settings(specification, given, where=None):
+def parameter_record(
+        specification: Sequence[Setting], *derived: str) -> 'np.dtype[np.record]':
+    """
+    Return the record of a law's compiled parameters.
+
+    Parameters
+    ----------
+    specification : sequence of Setting
+        Each is a field of its name.
+    derived : str
+        Further fields, computed from the settings.
+
+    """
+    return record(*(setting.name for setting in specification), *derived)
+
+
+def checked_settings(
+        specification: Sequence[Setting], given: Mapping[str, object],
+        where: Callable[[str], str] | None = None) -> dict[str, float]:
     """
     Return every setting of a specification as floats, the given ones checked.
 
     Parameters
     ----------
-    specification : tuple of Setting
+    specification : sequence of Setting
         What the controller knows.
     given : mapping of str -> number
         What differs from the defaults.
@@ -74,14 +95,14 @@ def checked_settings(specification, given, where=None):
     return values
 
 
-def _as_gauge(setting):
+def _as_gauge(setting: Setting) -> str:
     """Return the range of a gauge pressure in kPa, '' of anything else."""
     if setting.unit != 'Pa' or 'gauge' not in setting.name:
         return ''
     return f' ({1e-3 * setting.lower:g} to {1e-3 * setting.upper:g} kPa gauge)'
 
 
-def _short(value):
+def _short(value: object) -> str:
     """Return a value of any size as a short piece of one sentence."""
     text = repr(value)
     return text if len(text) <= 60 else f'{text[:60]}...'

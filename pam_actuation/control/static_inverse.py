@@ -15,32 +15,61 @@
 """
 Static inverse of the muscle at nominal load: contraction -> pressure, as a table.
 
-The table is one vector ``[lowest contraction m, step m, Pa, Pa, ...]`` so that
-it can be handed to compiled code and written to a file exactly.
+The table is one vector so that it can be handed to compiled code and written to a file
+exactly: a ``GRID``, then the pressure [absolute Pa] of every node.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
+from pam_sim.records import fields, part, record, size_of, values_of
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
-_HEAD = 2       # entries before the pressures
+GRID = record(
+    'lower_m',                        # contraction of the first node
+    'step_m',                         # from node to node
+)
+GRID_SIZE = size_of(GRID)
 
 
 @compiled
-def inverse_pressure_pa(table, contraction_m):
+def grid_of(table: FloatArray) -> np.record:
+    """Return the ``GRID`` of a table."""
+    return part(table, 0, GRID)
+
+
+@compiled
+def inverse_pressure_pa(table: FloatArray, contraction_m: float) -> float:
     """Return the tabulated absolute pressure [Pa] at a contraction [m], linear between nodes."""
-    last = table.shape[0] - _HEAD - 1
-    place = (contraction_m - table[0]) / table[1]
+    grid = grid_of(table)
+    pressure_pa = table[GRID_SIZE:]
+    last = pressure_pa.shape[0] - 1
+    place = (contraction_m - grid.lower_m) / grid.step_m
     if place <= 0.0:
-        return table[_HEAD]
+        return pressure_pa[0]
     if place >= last:
-        return table[_HEAD + last]
+        return pressure_pa[last]
     i = int(place)
-    part = place - i
-    return table[_HEAD + i] * (1.0 - part) + table[_HEAD + i + 1] * part
+    share = place - i
+    return pressure_pa[i] * (1.0 - share) + pressure_pa[i + 1] * share
 
 
-def tabulate_static_inverse(rig, upper_m=0.035, nodes=141):
+def static_inverse(lower_m: float, step_m: float, pressure_pa: ArrayLike) -> FloatArray:
+    """Return the table of pressures [absolute Pa] at equidistant contractions."""
+    return np.concatenate([values_of(GRID, {'lower_m': lower_m, 'step_m': step_m}), pressure_pa])
+
+
+def inverse_to_mapping(table: FloatArray) -> dict[str, object]:
+    """Return a table as plain data for a controller file."""
+    grid = fields(table, GRID)
+    return {'lower_m': float(grid.lower_m), 'step_m': float(grid.step_m),
+            'pressure_pa': table[GRID_SIZE:].tolist()}
+
+
+def tabulate_static_inverse(
+        rig: Rig, upper_m: float = 0.035, nodes: int = 141) -> FloatArray:
     """
     Tabulate the pressure that holds each contraction of a rig at its nominal load.
 
@@ -56,8 +85,8 @@ def tabulate_static_inverse(rig, upper_m=0.035, nodes=141):
     Returns
     -------
     numpy.ndarray
-        ``[0, step, pressures...]``, absolute Pa. Nodes that no finite pressure
-        can hold repeat the last one that can be held.
+        Table of this module. Nodes that no finite pressure can hold repeat the last one
+        that can be held.
 
     """
     contraction_m = np.linspace(0.0, upper_m, nodes)
@@ -66,4 +95,4 @@ def tabulate_static_inverse(rig, upper_m=0.035, nodes=141):
         if not np.isfinite(pressure_pa[i]):
             pressure_pa[i] = pressure_pa[i - 1] if i else P_ATM_PA
     pressure_pa = np.maximum(pressure_pa, P_ATM_PA)
-    return np.concatenate([[0.0, upper_m / (nodes - 1)], pressure_pa])
+    return static_inverse(0.0, upper_m / (nodes - 1), pressure_pa)

@@ -30,10 +30,12 @@ from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.loop_module import load_loops
+from pam_actuation.tuning.loop_parts import DISTURBANCE
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.tracking_errors import TrackingErrors
 from pam_sim.errors import InputError
+from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.short_repr import short_repr
 
@@ -130,17 +132,17 @@ class ClosedLoop:
         self.experiment = experiment
         self.hsv = rig.valve == 'hsv'
         self._state, self._par = rig.pack()
-        if self._par[layout.PAR_DT] != PHYSICS_S:
-            raise InputError(
-                f'the rig is packed for {self._par[layout.PAR_DT]} s, not {PHYSICS_S} s')
+        dt_s = fields(self._par, layout.PARAMETERS).dt_s
+        if dt_s != PHYSICS_S:
+            raise InputError(f'the rig is packed for {dt_s} s, not {PHYSICS_S} s')
         self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
         self._noise, self._quantum = sensor_noise(rig, self.ticks, seed)
-        self._disturbance = np.zeros((self.ticks, 2))
-        self._disturbance[:, 1] = rig.parameters['supply_pa']
-        for column, course in enumerate((external_force_n, supply_pa)):
+        self._disturbance = np.zeros(self.ticks * size_of(DISTURBANCE))
+        disturbances = self._disturbance.view(DISTURBANCE)
+        disturbances['supply_pa'] = rig.parameters['supply_pa']
+        for name, course in (('external_force_n', external_force_n), ('supply_pa', supply_pa)):
             if course is not None:
-                self._disturbance[:, column] = [
-                    course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
+                disturbances[name] = [course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, self._driver.every, latency)
@@ -188,29 +190,30 @@ class ClosedLoop:
         log = self.run_raw(controller, learn)
         n = self.ticks
         return LoopResult(
-            np.arange(n) / self.rate_hz, self._position[:n], log[:, 0], log[:, 1], log[:, 3],
-            log[:, 2], log[:, 4:6] if self.hsv else log[:, 4:5], self.experiment.cycles,
-            controller)
+            np.arange(n) / self.rate_hz, self._position[:n], log['contraction_m'],
+            log['pressure_pa'], log['command_pa'], log['force_n'],
+            np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
+            self.experiment.cycles, controller)
 
     def run_raw(self, controller, learn=True):
-        """Return the log (ticks, LOG_SIZE) of ``rollout_template`` for a controller."""
+        """Return a ``LOG`` of ``rollout_template`` for every tick, shape (ticks,)."""
         module = compiled_rollouts()
         controller.pause()
-        log = np.empty((self.ticks, module.LOG_SIZE))
+        log = np.empty(self.ticks * size_of(module.LOG))
         rollout = getattr(module, f'{controller.kind}_rollout')
         rollout(
             self._fresh_plant(), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
             self._noise, self._quantum, self._disturbance,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
-            controller.compiled_arguments(), log)
-        return log
+            controller.compiled_arguments(), controller.input_array, log)
+        return log.view(module.LOG)
 
     def _fresh_plant(self, contraction_m=0.0):
         """Return new state, par, inp, out of the plant at its start."""
         from pam_sim.rollout.kernel import look
-        plant = (self._state.copy(), self._par.copy(), np.zeros(layout.INP_SIZE),
-                 np.zeros(layout.OUT_SIZE))
-        plant[2][layout.INP_CONTRACTION] = contraction_m
+        inputs = zeros(layout.INPUT)
+        fields(inputs, layout.INPUT).contraction_m = contraction_m
+        plant = (self._state.copy(), self._par.copy(), inputs, zeros(layout.OUTPUT))
         look(*plant)
         return plant

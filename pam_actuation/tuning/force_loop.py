@@ -26,6 +26,7 @@ from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.records import size_of
 
 
 class ForceLoop(ClosedLoop):
@@ -73,7 +74,8 @@ class ForceLoop(ClosedLoop):
         if not ((self._way_m >= 0.0) & (self._way_m <= stroke_m)).all():
             raise InputError(f'leaves 0 to {stroke_m:g} m, the stroke of {rig.muscle.name}',
                              'contraction_m')
-        self._state, self._par = rig.pack(initial_contraction_m=float(self._way_m[0]))
+        self._start_m = float(self._way_m[0])
+        self._state, self._par = rig.pack(initial_contraction_m=self._start_m)
 
     def __reduce__(self):
         """Pickle what it is made of."""
@@ -102,28 +104,26 @@ class ForceLoop(ClosedLoop):
 
         """
         log = self.run_raw(controller, learn)
-        module = compiled_modes()
         return ModeResult(
             'n', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
-            log[:, module.FORCE_LOG_FORCE],
-            {'contraction_m': log[:, module.FORCE_LOG_CONTRACTION],
-             'pressure_pa': log[:, module.FORCE_LOG_PRESSURE],
-             'command_pa': log[:, module.FORCE_LOG_COMMAND]}, self.experiment.cycles)
+            log['force_n'],
+            {name: log[name] for name in ('contraction_m', 'pressure_pa', 'command_pa')},
+            self.experiment.cycles)
 
     def run_raw(self, controller, learn=True):
-        """Return the log (ticks, FORCE_LOG_SIZE) of ``modes_template`` for a controller."""
+        """Return a ``FORCE_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
         check_controller(controller, FORCE, self.rate_hz)
         module = compiled_modes()
         controller.pause()
-        log = np.empty((self.ticks, module.FORCE_LOG_SIZE))
+        log = np.empty(self.ticks * size_of(module.FORCE_LOG))
         mode, law = controller.compiled_arguments()
         module.force_rollout(
-            self._fresh_plant(self._way_m[0]), self.hsv, self._driver.fresh(),
+            self._fresh_plant(self._start_m), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
             self._noise, self._quantum, self._way_m,
-            learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
-            controller.law.input_array, log)
-        return log
+            learning_mask(controller, learn, self.ticks, self.rate_hz), mode,
+            controller.static_inverse, law, controller.law.input_array, log)
+        return log.view(module.FORCE_LOG)
 
 
 def _made_of(rig, experiment, contraction_m, others):

@@ -23,11 +23,13 @@ from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.joint_plant_loop import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
 from pam_actuation.tuning.force_loop import check_controller
+from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
+from pam_sim.records import fields, size_of, zeros
 
 
 class JointLoop:
@@ -73,25 +75,30 @@ class JointLoop:
         steps = steps_per_tick(rate_hz)
         self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
         self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
-        sides = (joint.flexor, joint.extensor)
-        noises = [sensor_noise(rig, self.ticks, (seed, k)) for k, rig in enumerate(sides)]
+        sides = {'flexor': joint.flexor, 'extensor': joint.extensor}
         angle = np.random.default_rng((seed, len(sides))).standard_normal(self.ticks)
-        self._noise = np.column_stack(
-            [angle * angle_noise_rad, *(noise[:, 0] for noise, _ in noises),
-             *(noise[:, 2] for noise, _ in noises)])
-        self._quantum = np.array(
-            [angle_step_rad, *(step[0] for _, step in noises), *(step[2] for _, step in noises)])
+        self._noise = np.empty(self.ticks * size_of(JOINT_READINGS))
+        self._quantum = zeros(JOINT_READINGS)
+        noises, steps_of = self._noise.view(JOINT_READINGS), fields(self._quantum, JOINT_READINGS)
+        noises['angle_rad'], steps_of.angle_rad = angle * angle_noise_rad, angle_step_rad
+        for k, (side, rig) in enumerate(sides.items()):
+            noise, step = sensor_noise(rig, self.ticks, (seed, k))
+            for name in ('pressure_pa', 'force_n'):
+                noises[f'{side}_{name}'] = noise.view(READINGS)[name]
+                steps_of[f'{side}_{name}'] = fields(step, READINGS)[name]
         self._torque = np.zeros(self.ticks)
         if external_torque_n_m is not None:
             self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
-        configs = drivers or [driver_config(rig) for rig in sides]
-        self._drivers = [DriverLaw(rig, config, rate_hz) for rig, config in zip(sides, configs)]
-        if self._drivers[0].every != self._drivers[1].every:
+        configs = drivers or [driver_config(rig) for rig in sides.values()]
+        self._drivers = [DriverLaw(rig, config, rate_hz)
+                         for rig, config in zip(sides.values(), configs)]
+        every, *others = {driver.every for driver in self._drivers}
+        if others:
             raise InputError('flexor and extensor need valves of one kind and period',
                              f'joint {joint.name}')
         self._plant = joint.plant(dt_s=PHYSICS_S)
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
-        self._timing = (steps, self._drivers[0].every, latency)
+        self._timing = (steps, every, latency)
 
     def run(self, controller, learn=True):
         """
@@ -117,25 +124,18 @@ class JointLoop:
 
         """
         log = self.run_raw(controller, learn)
-        module = compiled_modes()
         return ModeResult(
             'rad', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
-            log[:, module.JOINT_LOG_ANGLE],
-            {'flexor_pressure_pa': log[:, module.JOINT_LOG_FLEXOR_PRESSURE],
-             'extensor_pressure_pa': log[:, module.JOINT_LOG_EXTENSOR_PRESSURE],
-             'flexor_command_pa': log[:, module.JOINT_LOG_FLEXOR_COMMAND],
-             'extensor_command_pa': log[:, module.JOINT_LOG_EXTENSOR_COMMAND],
-             'flexor_force_n': log[:, module.JOINT_LOG_FLEXOR_FORCE],
-             'extensor_force_n': log[:, module.JOINT_LOG_EXTENSOR_FORCE]},
+            log['angle_rad'], {name: log[name] for name in log.dtype.names if name != 'angle_rad'},
             self.experiment.cycles)
 
     def run_raw(self, controller, learn=True):
-        """Return the log (ticks, JOINT_LOG_SIZE) of ``modes_template`` for a controller."""
+        """Return a ``JOINT_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
         check_controller(controller, JOINT, self.rate_hz)
         module = compiled_modes()
         controller.pause()
         self._plant.reset()
-        log = np.empty((self.ticks, module.JOINT_LOG_SIZE))
+        log = np.empty(self.ticks * size_of(module.JOINT_LOG))
         mode, law = controller.compiled_arguments()
         module.joint_rollout(
             self._plant.arrays, tuple(driver.hsv for driver in self._drivers),
@@ -144,4 +144,4 @@ class JointLoop:
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
             controller.law.input_array, log)
-        return log
+        return log.view(module.JOINT_LOG)

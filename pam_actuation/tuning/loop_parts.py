@@ -14,16 +14,33 @@
 
 """What the compiled closed loops share: sensor, reference, driver law."""
 
+from typing import TypeAlias
+
 import numpy as np
-from pam_actuation.control import inputs as place
 from pam_actuation.drivers import hsv_kernel, hsv_model, ppr
 from pam_actuation.drivers.hsv_kernel import hsv_step
 from pam_actuation.drivers.ppr import ppr_step
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
+from pam_sim.records import part, record
+
+
+# state, par, inp, out of a plant; state, par, out of a driver law; rows of a record.
+Plant: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+Driver: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+Rows: TypeAlias = 'np.ndarray[tuple[int], np.dtype[np.record]]'
+
+# Readings of a muscle and of a joint: their noise, and their steps.
+READINGS = record('pressure_pa', 'contraction_m', 'force_n')
+JOINT_READINGS = record(
+    'angle_rad', 'flexor_pressure_pa', 'extensor_pressure_pa', 'flexor_force_n',
+    'extensor_force_n')
+# What acts on a muscle from outside.
+DISTURBANCE = record('external_force_n', 'supply_pa')
 
 
 @compiled
-def read(value, step_size):
+def read(value: float, step_size: float) -> float:
     """Quantise a reading, 0 = no quantisation."""
     if step_size > 0.0:
         return np.rint(value / step_size) * step_size
@@ -31,34 +48,31 @@ def read(value, step_size):
 
 
 @compiled
-def look_up(values, place):
+def look_up(values: FloatArray, place: float) -> float:
     """Return values at a fractional place, linear in between, the last one beyond the end."""
     whole = min(int(place), values.shape[0] - 2)
-    part = min(place - whole, 1.0)
-    return (1.0 - part) * values[whole] + part * values[whole + 1]
+    share = min(place - whole, 1.0)
+    return (1.0 - share) * values[whole] + share * values[whole + 1]
 
 
 @compiled
-def want(tick, position, rate, lead_ticks, learn, inp):
+def wanted(tick: int, position: FloatArray, rate: FloatArray,
+           lead_ticks: float) -> tuple[float, float, float, float]:
     """
-    Fill what is wanted of a controller at a tick.
+    Return reference and rate at a tick, and the same one preview ahead.
 
-    ``position``, ``rate`` per tick, longer than the run by the preview of ``lead_ticks``;
-    ``learn`` is 1 where the rules may change.
+    ``position``, ``rate`` per tick, longer than the run by the preview of ``lead_ticks``.
     """
-    inp[place.IN_REFERENCE] = position[tick]
-    inp[place.IN_REFERENCE_RATE] = rate[tick]
     whole = int(lead_ticks)
-    part = lead_ticks - whole
+    share = lead_ticks - whole
     at = min(tick + whole, position.shape[0] - 2)
-    inp[place.IN_LEAD_REFERENCE] = (1.0 - part) * position[at] + part * position[at + 1]
-    inp[place.IN_LEAD_RATE] = (1.0 - part) * rate[at] + part * rate[at + 1]
-    inp[place.IN_LEARN] = learn[tick]
-    inp[place.IN_ELAPSED] = np.nan
+    return (position[tick], rate[tick], (1.0 - share) * position[at] + share * position[at + 1],
+            (1.0 - share) * rate[at] + share * rate[at + 1])
 
 
 @compiled
-def drive(driver, hsv, command_pa, measured_pa, supply_pa=np.nan):
+def drive(driver: Driver, hsv: bool, command_pa: float,
+          measured_pa: float, supply_pa: float = np.nan) -> tuple[float, float]:
     """
     Run a driver law once and return its two valve signals.
 
@@ -76,9 +90,9 @@ def drive(driver, hsv, command_pa, measured_pa, supply_pa=np.nan):
     """
     state, par, out = driver
     if hsv:
-        state.view(hsv_model.STATE)[0].age_s = 0.0
+        part(state, 0, hsv_model.STATE).age_s = 0.0
         hsv_step(state, par, command_pa, measured_pa, supply_pa, out)
-        duties = out.view(hsv_kernel.OUTPUT)[0]
+        duties = part(out, 0, hsv_kernel.OUTPUT)
         return duties.fill_duty, duties.vent_duty
     ppr_step(state, par, command_pa, measured_pa, np.nan, out)
-    return out.view(ppr.OUTPUT)[0].signal_v, 0.0
+    return part(out, 0, ppr.OUTPUT).signal_v, 0.0

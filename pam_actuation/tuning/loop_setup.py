@@ -20,13 +20,16 @@ import math
 import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.hsv import initial_state
+from pam_actuation.tuning.loop_parts import READINGS
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
 
 PHYSICS_S = 0.001
 _MAX_LEAD_S = 0.5
-_SENSORS = (('pressure_noise_pa', 'pressure_step_pa'),
-            ('contraction_noise_m', 'contraction_step_m'), ('force_noise_n', 'force_step_n'))
+# Noise and step of a sensor, by what it reads.
+_SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
+            'contraction_m': ('contraction_noise_m', 'contraction_step_m'),
+            'force_n': ('force_noise_n', 'force_step_n')}
 
 
 def steps_per_tick(rate_hz):
@@ -56,11 +59,17 @@ def sampled_reference(experiment, rate_hz):
 
 
 def sensor_noise(rig, ticks, seed):
-    """Return noise (ticks, 3) and steps (3) of a rig's pressure, contraction and force."""
+    """
+    Return the noise and the steps of a rig's sensors as arrays of ``READINGS``.
+
+    One for every tick, one behind the other, and one.
+    """
     sensors = dict(rig.sensors)
-    sigma = np.array([sensors.get(noise, 0.0) for noise, _ in _SENSORS])
-    steps = np.array([float(sensors.get(step, 0.0)) for _, step in _SENSORS])
-    return np.random.default_rng(seed).standard_normal((ticks, 3)) * sigma, steps
+    names = [_SENSORS[reading] for reading in READINGS.names]
+    sigma = np.array([sensors.get(noise, 0.0) for noise, _ in names])
+    steps = np.array([float(sensors.get(step, 0.0)) for _, step in names])
+    noise = np.random.default_rng(seed).standard_normal((ticks, len(names))) * sigma
+    return noise.ravel(), steps
 
 
 def learning_mask(controller, learn, ticks, rate_hz):

@@ -20,37 +20,38 @@ named after the hash of everything it is compiled from. Timing of a tick as in
 ``rollout_template``.
 """
 
-from numba import njit
+from typing import Any
+
 import numpy as np
-from pam_actuation.control import inputs as place
-from pam_actuation.control.modes.force import force_inputs
-from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR, joint_inputs, joint_outputs
+from pam_actuation.control.modes.force import FORCE_INPUT, force_inputs
+from pam_actuation.control.modes.joint import (
+    COMMANDS, JOINT_INPUT, joint_inputs, joint_outputs)
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.tuning.loop_parts import drive, look_up, read, want
+from pam_actuation.tuning.loop_parts import (
+    drive, Driver, JOINT_READINGS, look_up, Plant, read, READINGS, wanted)
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import allocating_entry_point
 from pam_sim.joint import layout as joint_layout
 from pam_sim.joint.kernel import joint_step
+from pam_sim.records import part, record, size_of
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
 
-FORCE_LOG_FORCE = 0             # N, true, at the tick
-FORCE_LOG_CONTRACTION = 1       # m
-FORCE_LOG_PRESSURE = 2          # Pa absolute
-FORCE_LOG_COMMAND = 3           # Pa absolute
-FORCE_LOG_SIZE = 4
-
-JOINT_LOG_ANGLE = 0             # rad, true, at the tick
-JOINT_LOG_FLEXOR_PRESSURE = 1   # Pa absolute
-JOINT_LOG_EXTENSOR_PRESSURE = 2
-JOINT_LOG_FLEXOR_COMMAND = 3    # Pa absolute
-JOINT_LOG_EXTENSOR_COMMAND = 4
-JOINT_LOG_FLEXOR_FORCE = 5      # N
-JOINT_LOG_EXTENSOR_FORCE = 6
-JOINT_LOG_SIZE = 7
+# What is kept of a tick; pressures absolute, what is measured true and at the tick.
+FORCE_LOG = record('force_n', 'contraction_m', 'pressure_pa', 'command_pa')
+JOINT_LOG = record(
+    'angle_rad', 'flexor_pressure_pa', 'extensor_pressure_pa', 'flexor_command_pa',
+    'extensor_command_pa', 'flexor_force_n', 'extensor_force_n')
+_FORCE_INPUT_SIZE, _JOINT_INPUT_SIZE = size_of(FORCE_INPUT), size_of(JOINT_INPUT)
+_COMMANDS_SIZE = size_of(COMMANDS)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
-def force_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, way_m,
-                  learn, mode, law, inp, log):
+@allocating_entry_point
+def force_rollout(
+        plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int], lead_ticks: float,
+        reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+        way_m: FloatArray, learn: FloatArray, mode: tuple[FloatArray, FloatArray, FloatArray],
+        inverse: FloatArray, law: Any, inputs: FloatArray, log: FloatArray) -> None:
     """
     Track a force; the rules of the law change in place.
 
@@ -63,45 +64,60 @@ def force_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quan
         linear in between.
     mode : tuple
         par, surface and state of ``force_inputs``.
-    law, inp : tuple, float64[:]
+    inverse : float64[:]
+        Static inverse of the law.
+    law, inputs : tuple, float64[:]
         Arguments of ``sofc_step``; the one that holds its inputs.
-    log : float64[:, :]
-        (N, FORCE_LOG_SIZE), written.
+    log : float64[:]
+        N ``FORCE_LOG``, written.
 
     """
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    raw = np.zeros(inp.shape[0])
-    signal_0 = plant_inp[layout.INP_SIGNAL_0]
-    signal_1 = plant_inp[layout.INP_SIGNAL_1]
-    for tick in range(log.shape[0]):
-        row = log[tick]
-        row[FORCE_LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
-        row[FORCE_LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
-        row[FORCE_LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
-        raw[place.IN_PRESSURE] = read(
-            plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
-        raw[place.IN_CONTRACTION] = read(
-            plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
-        raw[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
-        want(tick, position, rate, lead_ticks, learn, raw)
-        force_inputs(mode[0], mode[1], mode[2], raw, law[1], inp)
+    par, surface, state = mode
+    acting, seen = part(plant_inp, 0, layout.INPUT), part(plant_out, 0, layout.OUTPUT)
+    noises, steps_of, rows = noise.view(READINGS), part(quantum, 0, READINGS), log.view(FORCE_LOG)
+    raw_array = np.zeros(_FORCE_INPUT_SIZE)
+    raw = part(raw_array, 0, FORCE_INPUT)
+    signal_0, signal_1 = acting.signal_0, acting.signal_1
+    for tick in range(rows.shape[0]):
+        row, off = rows[tick], noises[tick]
+        row.force_n = seen.true_force_n
+        row.contraction_m = seen.true_contraction_m
+        row.pressure_pa = seen.true_pressure_pa
+        raw.pressure_pa = read(
+            seen.pressure_pa + off.pressure_pa, steps_of.pressure_pa)
+        raw.contraction_m = read(
+            seen.contraction_m + off.contraction_m, steps_of.contraction_m)
+        raw.force_n = read(seen.force_n + off.force_n, steps_of.force_n)
+        wanted_n, rate_n_per_s, lead_n, lead_rate = wanted(tick, position, rate, lead_ticks)
+        raw.reference_n = wanted_n
+        raw.reference_rate_n_per_s = rate_n_per_s
+        raw.lead_reference_n = lead_n
+        raw.lead_rate_n_per_s = lead_rate
+        raw.learning = learn[tick]
+        raw.elapsed_s = np.nan
+        force_inputs(par, surface, state, raw_array, inverse, inputs)
         command_pa = sofc_step(*law)
-        row[FORCE_LOG_COMMAND] = command_pa
+        row.command_pa = command_pa
         if tick % driver_every == 0:
-            signal_0, signal_1 = drive(driver, hsv, command_pa, raw[place.IN_PRESSURE])
+            signal_0, signal_1 = drive(driver, hsv, command_pa, raw.pressure_pa)
         for j in range(steps):
             if j == latency_steps:
-                plant_inp[layout.INP_SIGNAL_0] = signal_0
-                plant_inp[layout.INP_SIGNAL_1] = signal_1
-            plant_inp[layout.INP_CONTRACTION] = look_up(way_m, tick + (j + 1.0) / steps)
+                acting.signal_0 = signal_0
+                acting.signal_1 = signal_1
+            acting.contraction_m = look_up(way_m, tick + (j + 1.0) / steps)
             step(plant_state, plant_par, plant_inp, plant_out)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
-def joint_rollout(plant, hsv, drivers, timing, lead_ticks, reference, noise, quantum, torque_n_m,
-                  learn, mode, law, inp, log):
+@allocating_entry_point
+def joint_rollout(
+        plant: tuple[Plant, Plant, Plant], hsv: tuple[bool, bool], drivers: tuple[Driver, Driver],
+        timing: tuple[int, int, int], lead_ticks: float,
+        reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+        torque_n_m: FloatArray, learn: FloatArray, mode: tuple[FloatArray, FloatArray],
+        law: Any, inputs: FloatArray, log: FloatArray) -> None:
     """
     Track an angle; the rules of the law change in place.
 
@@ -113,58 +129,78 @@ def joint_rollout(plant, hsv, drivers, timing, lead_ticks, reference, noise, qua
         Driver law of flexor and extensor, its state, par and out.
     timing, lead_ticks, reference, learn
         As of ``rollout_template.sofc_rollout``, the reference in rad and rad/s.
-    noise, quantum : float64 arrays
-        (N, 5) and (5): angle, pressures and forces of flexor and extensor.
+    noise, quantum : float64[:]
+        N ``JOINT_READINGS`` of sensor noise, one behind the other, and those of the steps.
     torque_n_m : float64[:]
         External torque on the limb (N).
     mode : tuple
         par and state of ``joint_inputs`` and ``joint_outputs``.
-    law, inp : tuple, float64[:]
+    law, inputs : tuple, float64[:]
         Arguments of ``sofc_step``; the one that holds its inputs.
-    log : float64[:, :]
-        (N, JOINT_LOG_SIZE), written.
+    log : float64[:]
+        N ``JOINT_LOG``, written.
 
     """
     joint, flexor, extensor = plant
+    joint_inp, _, _, joint_out = joint
+    _, _, _, flexor_out = flexor
+    _, _, _, extensor_out = extensor
+    flexor_seen = part(flexor_out, 0, layout.OUTPUT)
+    extensor_seen = part(extensor_out, 0, layout.OUTPUT)
+    flexor_hsv, extensor_hsv = hsv
+    flexor_driver, extensor_driver = drivers
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    raw = np.zeros(inp.shape[0])
-    pressures_pa = np.zeros(2)
-    forces_n = np.zeros(2)
-    commands_pa = np.zeros(2)
-    signals = np.zeros(4)
-    for tick in range(log.shape[0]):
-        row = log[tick]
-        row[JOINT_LOG_ANGLE] = joint[3][joint_layout.OUT_ANGLE]
-        row[JOINT_LOG_FLEXOR_PRESSURE] = flexor[3][layout.OUT_TRUE_PRESSURE]
-        row[JOINT_LOG_EXTENSOR_PRESSURE] = extensor[3][layout.OUT_TRUE_PRESSURE]
-        row[JOINT_LOG_FLEXOR_FORCE] = flexor[3][layout.OUT_TRUE_FORCE]
-        row[JOINT_LOG_EXTENSOR_FORCE] = extensor[3][layout.OUT_TRUE_FORCE]
-        raw[place.IN_CONTRACTION] = read(
-            joint[3][joint_layout.OUT_ANGLE] + noise[tick, 0], quantum[0])
-        raw[place.IN_PRESSURE] = raw[place.IN_FORCE] = np.nan
-        pressures_pa[FLEXOR] = read(
-            flexor[3][layout.OUT_PRESSURE] + noise[tick, 1], quantum[1])
-        pressures_pa[EXTENSOR] = read(
-            extensor[3][layout.OUT_PRESSURE] + noise[tick, 2], quantum[2])
-        forces_n[FLEXOR] = read(flexor[3][layout.OUT_FORCE] + noise[tick, 3], quantum[3])
-        forces_n[EXTENSOR] = read(extensor[3][layout.OUT_FORCE] + noise[tick, 4], quantum[4])
-        want(tick, position, rate, lead_ticks, learn, raw)
-        joint_inputs(mode[0], raw, pressures_pa, forces_n, inp)
+    par, state = mode
+    noises, rows = noise.view(JOINT_READINGS), log.view(JOINT_LOG)
+    steps_of = part(quantum, 0, JOINT_READINGS)
+    raw_array = np.zeros(_JOINT_INPUT_SIZE)
+    raw = part(raw_array, 0, JOINT_INPUT)
+    command_array = np.zeros(_COMMANDS_SIZE)
+    commands = part(command_array, 0, COMMANDS)
+    flexor_0 = flexor_1 = extensor_0 = extensor_1 = 0.0
+    for tick in range(rows.shape[0]):
+        row, off = rows[tick], noises[tick]
+        row.angle_rad = joint_out[joint_layout.OUT_ANGLE]
+        row.flexor_pressure_pa = flexor_seen.true_pressure_pa
+        row.extensor_pressure_pa = extensor_seen.true_pressure_pa
+        row.flexor_force_n = flexor_seen.true_force_n
+        row.extensor_force_n = extensor_seen.true_force_n
+        raw.angle_rad = read(
+            joint_out[joint_layout.OUT_ANGLE] + off.angle_rad, steps_of.angle_rad)
+        raw.flexor_pressure_pa = read(
+            flexor_seen.pressure_pa + off.flexor_pressure_pa,
+            steps_of.flexor_pressure_pa)
+        raw.extensor_pressure_pa = read(
+            extensor_seen.pressure_pa + off.extensor_pressure_pa,
+            steps_of.extensor_pressure_pa)
+        raw.flexor_force_n = read(
+            flexor_seen.force_n + off.flexor_force_n, steps_of.flexor_force_n)
+        raw.extensor_force_n = read(
+            extensor_seen.force_n + off.extensor_force_n, steps_of.extensor_force_n)
+        wanted_rad, rate_rad_per_s, lead_rad, lead_rate = wanted(
+            tick, position, rate, lead_ticks)
+        raw.reference_rad = wanted_rad
+        raw.reference_rate_rad_per_s = rate_rad_per_s
+        raw.lead_reference_rad = lead_rad
+        raw.lead_rate_rad_per_s = lead_rate
+        raw.learning = learn[tick]
+        raw.elapsed_s = np.nan
+        joint_inputs(par, raw_array, inputs)
         u_pa = sofc_step(*law)
-        joint_outputs(mode[0], mode[1], u_pa, pressures_pa, commands_pa)
-        row[JOINT_LOG_FLEXOR_COMMAND] = commands_pa[FLEXOR]
-        row[JOINT_LOG_EXTENSOR_COMMAND] = commands_pa[EXTENSOR]
+        joint_outputs(par, state, u_pa, raw_array, command_array)
+        row.flexor_command_pa = commands.flexor_pa
+        row.extensor_command_pa = commands.extensor_pa
         if tick % driver_every == 0:
-            signals[0], signals[1] = drive(
-                drivers[0], hsv[0], commands_pa[FLEXOR], pressures_pa[FLEXOR])
-            signals[2], signals[3] = drive(
-                drivers[1], hsv[1], commands_pa[EXTENSOR], pressures_pa[EXTENSOR])
-        joint[0][joint_layout.IN_TORQUE] = torque_n_m[tick]
+            flexor_0, flexor_1 = drive(
+                flexor_driver, flexor_hsv, commands.flexor_pa, raw.flexor_pressure_pa)
+            extensor_0, extensor_1 = drive(
+                extensor_driver, extensor_hsv, commands.extensor_pa, raw.extensor_pressure_pa)
+        joint_inp[joint_layout.IN_TORQUE] = torque_n_m[tick]
         for j in range(steps):
             if j == latency_steps:
-                joint[0][joint_layout.IN_FLEXOR_0] = signals[0]
-                joint[0][joint_layout.IN_FLEXOR_1] = signals[1]
-                joint[0][joint_layout.IN_EXTENSOR_0] = signals[2]
-                joint[0][joint_layout.IN_EXTENSOR_1] = signals[3]
+                joint_inp[joint_layout.IN_FLEXOR_0] = flexor_0
+                joint_inp[joint_layout.IN_FLEXOR_1] = flexor_1
+                joint_inp[joint_layout.IN_EXTENSOR_0] = extensor_0
+                joint_inp[joint_layout.IN_EXTENSOR_1] = extensor_1
             joint_step(joint, flexor, extensor)

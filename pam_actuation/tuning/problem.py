@@ -54,7 +54,7 @@ class Problem:
             if i and controller.rules is not None:
                 controller = rebuild(self.controller, settings)      # none of what it learned
             log = loop.run_raw(controller)
-            costs[i] = tracking_cost_mm(loop.reference_m - log[:, 0], loop.start_tick)
+            costs[i] = tracking_cost_mm(loop.reference_m - log['contraction_m'], loop.start_tick)
         return costs
 
     def cost_mm(self, settings):

@@ -24,64 +24,85 @@ Timing of one controller tick: measure, controller, driver (every
 signal arrives after ``latency_steps`` of them.
 """
 
-from numba import njit
-from pam_actuation.control import inputs as place
+from typing import Any
+
+import numpy as np
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.tuning.loop_parts import drive, read, want
-from pam_sim.compiled import compiled
+from pam_actuation.tuning.loop_parts import (
+    DISTURBANCE, drive, Driver, Plant, read, READINGS, Rows, wanted)
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point
+from pam_sim.records import part, record
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
 
-LOG_CONTRACTION = 0       # m, true, at the tick
-LOG_PRESSURE = 1          # Pa absolute, true
-LOG_FORCE = 2             # N
-LOG_COMMAND = 3           # Pa absolute
-LOG_SIGNAL_0 = 4          # V or fill duty
-LOG_SIGNAL_1 = 5          # vent duty
-LOG_MEASURED = 6          # m
-LOG_SIZE = 7
+# What is kept of a tick.
+LOG = record(
+    'contraction_m',                  # true, at the tick
+    'pressure_pa',                    # absolute, true
+    'force_n',
+    'command_pa',                     # absolute
+    'signal_0',                       # V or fill duty
+    'signal_1',                       # vent duty
+    'measured_m',
+)
 
 
 @compiled
-def _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log):
+def _sense(tick: int, plant_out: np.record, noise: np.record, quantum: np.record,
+           position: FloatArray, rate: FloatArray, lead_ticks: float, learn: FloatArray,
+           inp: np.record, log: np.record) -> None:
     """Fill the inputs of the controller and the measured part of the log."""
-    inp[place.IN_CONTRACTION] = read(
-        plant_out[layout.OUT_CONTRACTION] + noise[tick, 1], quantum[1])
-    inp[place.IN_PRESSURE] = read(plant_out[layout.OUT_PRESSURE] + noise[tick, 0], quantum[0])
-    inp[place.IN_FORCE] = read(plant_out[layout.OUT_FORCE] + noise[tick, 2], quantum[2])
-    want(tick, position, rate, lead_ticks, learn, inp)
-    log[tick, LOG_CONTRACTION] = plant_out[layout.OUT_TRUE_CONTRACTION]
-    log[tick, LOG_PRESSURE] = plant_out[layout.OUT_TRUE_PRESSURE]
-    log[tick, LOG_FORCE] = plant_out[layout.OUT_TRUE_FORCE]
-    log[tick, LOG_MEASURED] = inp[place.IN_CONTRACTION]
+    inp.contraction_m = read(
+        plant_out.contraction_m + noise.contraction_m, quantum.contraction_m)
+    inp.pressure_pa = read(plant_out.pressure_pa + noise.pressure_pa,
+                           quantum.pressure_pa)
+    inp.force_n = read(plant_out.force_n + noise.force_n, quantum.force_n)
+    reference, reference_rate, lead, lead_rate = wanted(tick, position, rate, lead_ticks)
+    inp.reference_m = reference
+    inp.reference_rate_m_per_s = reference_rate
+    inp.lead_reference_m = lead
+    inp.lead_rate_m_per_s = lead_rate
+    inp.learning = learn[tick]
+    inp.elapsed_s = np.nan
+    log.contraction_m = plant_out.true_contraction_m
+    log.pressure_pa = plant_out.true_pressure_pa
+    log.force_n = plant_out.true_force_n
+    log.measured_m = inp.contraction_m
 
 
 @compiled
-def _actuate(tick, command_pa, measured_pa, hsv, driver, driver_every, steps, latency_steps,
-             disturbance, plant_state, plant_par, plant_inp, plant_out, log):
+def _actuate(tick: int, command_pa: float, measured_pa: float, hsv: bool, driver: Driver,
+             driver_every: int, steps: int, latency_steps: int, disturbances: Rows,
+             plant: Plant, log: np.record) -> None:
     """Run the driver law where it is due and the physics of one controller period."""
-    signal_0 = plant_inp[layout.INP_SIGNAL_0]
-    signal_1 = plant_inp[layout.INP_SIGNAL_1]
+    plant_state, plant_par, plant_inp, plant_out = plant
+    acting = part(plant_inp, 0, layout.INPUT)
+    signal_0, signal_1 = acting.signal_0, acting.signal_1
     if tick % driver_every == 0:
-        supply_pa = disturbance[max(tick - 1, 0), 1]
+        supply_pa = disturbances[max(tick - 1, 0)].supply_pa
         signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa, supply_pa)
-    plant_inp[layout.INP_EXTERNAL_FORCE] = disturbance[tick, 0]
-    plant_par[layout.PAR_SUPPLY] = disturbance[tick, 1]
+    acting.external_force_n = disturbances[tick].external_force_n
+    part(plant_par, 0, layout.PARAMETERS).supply_pa = disturbances[tick].supply_pa
     for j in range(steps):
         if j == latency_steps:
-            plant_inp[layout.INP_SIGNAL_0] = signal_0
-            plant_inp[layout.INP_SIGNAL_1] = signal_1
+            acting.signal_0 = signal_0
+            acting.signal_1 = signal_1
         step(plant_state, plant_par, plant_inp, plant_out)
-    log[tick, LOG_COMMAND] = command_pa
-    log[tick, LOG_SIGNAL_0] = signal_0
-    log[tick, LOG_SIGNAL_1] = signal_1
+    log.command_pa = command_pa
+    log.signal_0 = signal_0
+    log.signal_1 = signal_1
 
 
-@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
-                 learn, controller, log):
+@entry_point
+def sofc_rollout(
+        plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int], lead_ticks: float,
+        reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+        disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+        log: FloatArray) -> None:
     """
     Track a reference with the self-organizing controller; its rules change in place.
 
@@ -99,51 +120,69 @@ def sofc_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quant
         Preview in ticks.
     reference : tuple
         Position [m] and rate [m/s] per tick, longer than ``log`` by the preview.
-    noise, quantum, disturbance, learn : float64 arrays
-        Sensor noise (N, 3) and steps (3) of pressure, contraction, force; external force [N]
-        and supply pressure [Pa] (N, 2); 1 where the rules may change (N).
-    controller : tuple
-        Arguments of ``sofc_step``.
-    log : float64[:, :]
-        (N, LOG_SIZE), written.
+    noise, quantum : float64[:]
+        N ``READINGS`` of sensor noise, one behind the other, and those of the sensors' steps.
+    disturbance : float64[:]
+        N ``DISTURBANCE``.
+    learn : float64[:]
+        1 where the rules may change (N).
+    controller, inputs : tuple, float64[:]
+        Arguments of ``sofc_step``; the one that holds its inputs.
+    log : float64[:]
+        N ``LOG``, written.
 
     """
-    plant_state, plant_par, plant_inp, plant_out = plant
+    _, _, _, plant_out = plant
+    seen = part(plant_out, 0, layout.OUTPUT)
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    inp = controller[8]
-    for tick in range(log.shape[0]):
-        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
+    noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+    inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
+    for tick in range(log_rows.shape[0]):
+        _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
+               log_rows[tick])
         command_pa = sofc_step(*controller)
-        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
+        _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                 latency_steps, disturbances, plant, log_rows[tick])
 
 
-@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-def pid_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
-                learn, controller, log):
+@entry_point
+def pid_rollout(
+        plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int], lead_ticks: float,
+        reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+        disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+        log: FloatArray) -> None:
     """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
-    plant_state, plant_par, plant_inp, plant_out = plant
+    _, _, _, plant_out = plant
+    seen = part(plant_out, 0, layout.OUTPUT)
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    inp = controller[3]
-    for tick in range(log.shape[0]):
-        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
+    noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+    inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
+    for tick in range(log_rows.shape[0]):
+        _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
+               log_rows[tick])
         command_pa = pid_step(*controller)
-        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
+        _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                 latency_steps, disturbances, plant, log_rows[tick])
 
 
-@njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-def lqi_rollout(plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, disturbance,
-                learn, controller, log):
+@entry_point
+def lqi_rollout(
+        plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int], lead_ticks: float,
+        reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+        disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+        log: FloatArray) -> None:
     """Track a reference with the LQI; arguments as ``sofc_rollout``, of ``lqi_step``."""
-    plant_state, plant_par, plant_inp, plant_out = plant
+    _, _, _, plant_out = plant
+    seen = part(plant_out, 0, layout.OUTPUT)
     steps, driver_every, latency_steps = timing
     position, rate = reference
-    inp = controller[3]
-    for tick in range(log.shape[0]):
-        _sense(tick, plant_out, noise, quantum, position, rate, lead_ticks, learn, inp, log)
+    noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+    inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
+    for tick in range(log_rows.shape[0]):
+        _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
+               log_rows[tick])
         command_pa = lqi_step(*controller)
-        _actuate(tick, command_pa, inp[place.IN_PRESSURE], hsv, driver, driver_every, steps,
-                 latency_steps, disturbance, plant_state, plant_par, plant_inp, plant_out, log)
+        _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                 latency_steps, disturbances, plant, log_rows[tick])

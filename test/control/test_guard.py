@@ -15,7 +15,10 @@
 """The guard over learning: slower at the floor, full for a changed plant, roll-back if worse."""
 
 import numpy as np
-from pam_actuation.control.sofc import guard, layout as at
+from pam_actuation.control.sofc import guard
+from pam_actuation.control.sofc.records import STATE
+from pam_actuation.control.sofc.settings import PARAMETERS
+from pam_sim.records import fields, zeros
 import pytest
 from straight_rig import sofc
 
@@ -27,10 +30,9 @@ class Watched:
 
     def __init__(self, **settings):
         self.controller = sofc(settings)
-        arguments = self.controller.compiled_arguments()
-        self.parameters, self.values, self.kept = arguments[0], arguments[2], arguments[5]
-        self.state = np.zeros(at.STATE_COUNT)
-        self.state[at.S_RATE_FACTOR] = self.state[at.S_RATE_CEILING] = 1.0
+        par, _, self.values, _, _, self.kept, *_ = self.controller.compiled_arguments()
+        self.parameters, self.state = fields(par, PARAMETERS), fields(zeros(STATE), STATE)
+        self.state.rate_factor = self.state.rate_ceiling = 1.0
         self.window(1.0)             # up to the first turn the window is not a whole one
 
     def window(self, error_m, speed=0.02):
@@ -44,7 +46,7 @@ class Watched:
 
     def learn(self, change_pa):
         """Change a rule as learning would."""
-        self.values[1][0, 3] += change_pa
+        self.controller.rules.feedforward[0, 3] += change_pa
 
 
 def test_growing_error_brings_the_rules_of_the_best_window_back():
@@ -57,9 +59,9 @@ def test_growing_error_brings_the_rules_of_the_best_window_back():
     assert not any(watched.window(0.8e-4) for _ in range(2))
     outcome = [watched.window(error) for error in (3e-4, 6e-4, 1.2e-3)]
     assert any(outcome)
-    assert watched.values[1][0, 3] == pytest.approx(1700.0)
-    assert watched.state[at.S_ROLLED_BACK] == 1.0
-    assert watched.state[at.S_RATE_CEILING] == 0.5
+    assert watched.controller.rules.feedforward[0, 3] == pytest.approx(1700.0)
+    assert watched.state.times_rolled_back == 1.0
+    assert watched.state.rate_ceiling == 0.5
 
 
 def test_error_that_creeps_up_is_rolled_back_too():
@@ -68,39 +70,39 @@ def test_error_that_creeps_up_is_rolled_back_too():
         watched.window(1e-4)
     watched.learn(500.0)
     assert any(watched.window(2e-4 * 1.05 ** k) for k in range(8))
-    assert watched.values[1][0, 3] == 0.0
+    assert watched.controller.rules.feedforward[0, 3] == 0.0
 
 
 def test_a_new_best_window_gives_the_learning_rate_back():
     watched = Watched()
     for error in (1e-4, 1e-4, 1e-4, 3e-4, 6e-4, 1.2e-3):
         watched.window(error)
-    assert watched.state[at.S_RATE_CEILING] == 0.5
+    assert watched.state.rate_ceiling == 0.5
     for error in (4e-4, 3e-4, 2e-4, 1e-4):
         watched.window(error)
-    assert watched.state[at.S_RATE_CEILING] == 1.0
+    assert watched.state.rate_ceiling == 1.0
 
 
 def test_an_error_that_falls_after_a_jump_is_a_changed_plant():
     watched = Watched()
     for _ in range(4):
         watched.window(1e-4)
-    before = watched.state[at.S_RATE_FACTOR]
+    before = watched.state.rate_factor
     watched.learn(500.0)
     assert not any(watched.window(error) for error in (2e-3, 1e-3, 5e-4, 3e-4, 2.5e-4))
-    assert watched.values[1][0, 3] == 500.0
+    assert watched.controller.rules.feedforward[0, 3] == 500.0
     assert before < 1.0
-    assert watched.state[at.S_RATE_FACTOR] == 1.0
+    assert watched.state.rate_factor == 1.0
     for _ in range(6):                         # the new floor is higher and becomes the normal
         assert not watched.window(2.4e-4)
-    assert watched.state[at.S_BEST] == pytest.approx(2.4e-4)
+    assert watched.state.best_rms_m == pytest.approx(2.4e-4)
 
 
 def test_rate_falls_to_its_floor_while_the_error_stays():
     watched = Watched(anneal=0.5, anneal_floor=0.2)
     for _ in range(8):
         watched.window(1e-4)
-    assert watched.state[at.S_RATE_FACTOR] == 0.2
+    assert watched.state.rate_factor == 0.2
 
 
 def test_another_movement_is_another_comparison():
@@ -108,8 +110,8 @@ def test_another_movement_is_another_comparison():
     for _ in range(3):
         watched.window(1e-4, speed=0.005)
     assert not any(watched.window(1e-3, speed=0.05) for _ in range(4))
-    assert watched.state[at.S_ROLLED_BACK] == 0.0
-    assert watched.state[at.S_BEST] == pytest.approx(1e-3)
+    assert watched.state.times_rolled_back == 0.0
+    assert watched.state.best_rms_m == pytest.approx(1e-3)
 
 
 def spoiled(guard_ratio):

@@ -15,7 +15,10 @@
 """The integral trim: its growth with contraction, disturbances, and what does not wind it up."""
 
 import numpy as np
-from pam_actuation.control.sofc import dynamics, layout as at
+from pam_actuation.control.sofc import dynamics
+from pam_actuation.control.sofc.records import STATE
+from pam_actuation.control.sofc.settings import PARAMETERS
+from pam_sim.records import fields
 from pam_sim.units import P_ATM_PA
 import pytest
 from straight_rig import SlowMuscle, sofc
@@ -29,13 +32,18 @@ def named(controller):
     return dict(zip(controller.state_names, controller.state_values()))
 
 
+def parameters(controller):
+    """Return the compiled parameters of a controller by name."""
+    return fields(controller.parameters, PARAMETERS)
+
+
 def test_the_integral_grows_with_contraction_within_bounds():
-    par = sofc({'integral_growth_per_m': 12.0}).parameters
+    par = parameters(sofc({'integral_growth_per_m': 12.0}))
     assert dynamics.load_shape(par, 0.015) == 1.0
     assert dynamics.load_shape(par, 0.025) == pytest.approx(1.12)
     assert dynamics.load_shape(par, 0.005) == pytest.approx(0.88)
     assert dynamics.load_shape(par, 1.0) == 2.0 and dynamics.load_shape(par, -1.0) == 0.5
-    assert dynamics.load_shape(sofc().parameters, 0.025) == 1.0
+    assert dynamics.load_shape(parameters(sofc()), 0.025) == 1.0
 
 
 def test_what_the_integral_holds_counts_by_its_growth():
@@ -71,7 +79,7 @@ def test_the_way_up_from_atmosphere_does_not_wind_the_integral(growth):
         controller.step(0.02, 0.02, 0.0, 0.02, 0.0, False, pressure_pa=P_ATM_PA)
         slewed.append(named(controller)['slew_limited'])
         # The trim a start takes over from the measured pressure is all there is.
-        assert -1.01e4 * dynamics.load_shape(controller.parameters, 0.02) <= (
+        assert -1.01e4 * dynamics.load_shape(parameters(controller), 0.02) <= (
             named(controller)['integral_pa'])
     assert sum(slewed) > 50.0 and slewed[-1] == 0.0
 
@@ -109,10 +117,10 @@ def test_standing_still_for_long_leaves_no_denormal_number():
     controller = sofc({**BARE, 'acceleration_feedforward_pa_s2_per_m': 2e4})
     for k in range(60):
         controller.step(0.01, 0.01, 0.002 * k, 0.01, 0.002 * k, False)
-    assert abs(controller.compiled_arguments()[7][at.S_ACCELERATION]) > 0.1
+    *_, state, _, _ = controller.compiled_arguments()
+    assert abs(fields(state, STATE).acceleration_m_per_s2) > 0.1
     for _ in range(20000):
         controller.step(0.01, 0.01, 0.0, 0.01, 0.0, False)
-        state = controller.compiled_arguments()[7]
         small = np.abs(state[state != 0.0])
         assert small.min() > np.finfo(float).tiny
-    assert state[at.S_ACCELERATION] == 0.0
+    assert fields(state, STATE).acceleration_m_per_s2 == 0.0

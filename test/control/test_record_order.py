@@ -12,129 +12,100 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Places in the vectors of the controllers belong to the names they are given elsewhere."""
+"""Numbers of the compiled laws belong to their names, wherever they lie in memory."""
 
-from pam_actuation.control.sofc import layout
-from pam_actuation.control.sofc.settings import parameter_vector, SETTINGS
+import numpy as np
+from pam_actuation.control import lqi, pid
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.inputs import INPUT, write_inputs
+from pam_actuation.control.settings import checked_settings, parameter_record, Setting
+from pam_actuation.control.sofc import records, settings, step
+from pam_sim.compiled import sources
+from pam_sim.records import fields, values_of, zeros
+import pytest
 
-PARAMETERS = {
-    'P_RATE': 'rate_hz',
-    'P_LEAD': 'lead_s',
-    'P_ERROR_UNIVERSE': 'error_universe_m',
-    'P_CHANGE_UNIVERSE': 'change_universe_m_per_s',
-    'P_FEEDBACK_GAIN': 'feedback_gain_pa',
-    'P_PROPORTIONAL': 'proportional_pa_per_m',
-    'P_INTEGRAL': 'integral_pa_per_m_s',
-    'P_DERIVATIVE': 'derivative_pa_s_per_m',
-    'P_INTEGRAL_LIMIT': 'integral_limit_pa',
-    'P_INTEGRAL_GROWTH': 'integral_growth_per_m',
-    'P_ANTI_WINDUP_TIME': 'anti_windup_time_s',
-    'P_CHANGE_FILTER': 'change_filter_s',
-    'P_DIRECTION_BLEND': 'direction_blend_m',
-    'P_INDEX_FORM': 'index_form',
-    'P_INDEX_TAU': 'index_tau_s',
-    'P_INDEX_LIMIT': 'index_limit_m',
-    'P_DEAD_ZONE': 'dead_zone_m',
-    'P_CREDIT_DELAY': 'credit_delay_s',
-    'P_CREDIT_SPREAD': 'credit_spread_s',
-    'P_LEARNING_RATE': 'learning_rate',
-    'P_FEEDBACK_LEARNING': 'feedback_learning_per_m_s',
-    'P_FEEDFORWARD_LEARNING': 'feedforward_learning',
-    'P_FEEDBACK_STEP_LIMIT': 'feedback_step_limit',
-    'P_FEEDFORWARD_STEP_LIMIT': 'feedforward_step_limit_pa',
-    'P_FEEDFORWARD_LIMIT': 'feedforward_limit_pa',
-    'P_FEEDBACK_LEAK': 'feedback_leak_per_m_s',
-    'P_FEEDFORWARD_LEAK': 'feedforward_leak_per_m_s',
-    'P_REFERENCE_LOWER': 'reference_lower_m',
-    'P_REFERENCE_UPPER': 'reference_upper_m',
-    'P_REFERENCE_KNOTS': 'reference_knots',
-    'P_MIN_PRESSURE_GAUGE': 'min_pressure_gauge_pa',
-    'P_MAX_PRESSURE_GAUGE': 'max_pressure_gauge_pa',
-    'P_MOTION_LEARNING': 'motion_learning',
-    'P_PASS_TIME': 'pass_time_s',
-    'P_TAKEOVER': 'takeover',
-    'P_TAKEOVER_TIME': 'takeover_time_s',
-    'P_CORRECTION': 'correction_pa_per_m',
-    'P_MOTION_POSITION_KNOTS': 'motion_position_knots',
-    'P_MOTION_RATE_KNOTS': 'motion_rate_knots',
-    'P_MOTION_RATE_UPPER': 'motion_rate_upper_m_per_s',
-    'P_MOTION_RATE_FINE': 'motion_rate_fine_m_per_s',
-    'P_MEMBERSHIP_FORM': 'membership_form',
-    'P_MEMBERSHIP_WIDTH': 'membership_width',
-    'P_VALVE_LAG': 'valve_lag_s',
-    'P_RATE_FEEDFORWARD': 'rate_feedforward_pa_s_per_m',
-    'P_ACCELERATION_FEEDFORWARD': 'acceleration_feedforward_pa_s2_per_m',
-    'P_ACCELERATION_FILTER': 'acceleration_filter_s',
-    'P_JUMP_TIME': 'jump_time_s',
-    'P_GUARD_RATIO': 'guard_ratio',
-    'P_SURPRISE': 'surprise_ratio',
-    'P_SURPRISE_INTEGRAL': 'surprise_integral',
-    'P_ANNEAL': 'anneal',
-    'P_ANNEAL_FLOOR': 'anneal_floor',
-    'P_GUARD_WINDOW': 'guard_window_s',
-    'P_SLEW': 'slew_pa_per_s',
-    'P_START_TIME': 'start_time_s',
-    'P_JUMP': 'jump_m',
-    'P_JUMP_FREEZE': 'jump_freeze_s',
-    'P_SLACK_FORCE': 'slack_force_n',
-    'P_VALVE_GAP': 'valve_gap_pa',
-    'P_JUMP_FORM': 'jump_form',
-    'P_SETTLING_PASSES': 'settling_passes',
-    'P_SETTLING_TIME': 'settling_time_s',
-    'P_MOTION_AT_REST': 'motion_at_rest',
-    'P_JUMP_MOTION_LEARNING': 'jump_motion_learning',
-}
+LAWS = {'sofc': (settings.SETTINGS, settings.PARAMETERS, records.OUTPUT, step.sofc_step),
+        'pid': (pid.SETTINGS, pid.PARAMETERS, pid.OUTPUT, pid.pid_step),
+        'lqi': (lqi.SETTINGS, lqi.PARAMETERS, lqi.OUTPUT, lqi.lqi_step)}
 OUTPUTS = {
-    'O_COMMAND': 'command_pa',
-    'O_ERROR': 'error_m',
-    'O_CHANGE': 'change_of_error_m_per_s',
-    'O_INVERSE': 'inverse_pa',
-    'O_DYNAMIC': 'dynamic_feedforward_pa',
-    'O_FEEDBACK': 'feedback_rules_pa',
-    'O_FEEDFORWARD': 'feedforward_rules_pa',
-    'O_MOTION': 'motion_rules_pa',
-    'O_PROPORTIONAL': 'proportional_pa',
-    'O_INTEGRAL': 'integral_pa',
-    'O_DERIVATIVE': 'derivative_pa',
-    'O_UNLIMITED': 'unlimited_command_pa',
-    'O_SAT_LOW': 'saturated_low',
-    'O_SAT_HIGH': 'saturated_high',
-    'O_SAT_SLEW': 'slew_limited',
-    'O_SHARE': 'contracting_share',
-    'O_ERROR_SET': 'error_set',
-    'O_ERROR_DEGREE': 'error_degree',
-    'O_CHANGE_SET': 'change_set',
-    'O_CHANGE_DEGREE': 'change_degree',
-    'O_KNOT': 'reference_knot',
-    'O_KNOT_DEGREE': 'reference_knot_degree',
-    'O_MOTION_KNOT': 'motion_knot',
-    'O_MOTION_KNOT_DEGREE': 'motion_knot_degree',
-    'O_RATE_KNOT': 'motion_rate_knot',
-    'O_RATE_KNOT_DEGREE': 'motion_rate_knot_degree',
-    'O_INDEX': 'performance_index_m',
-    'O_REASON': 'learning_reason',
-    'O_CREDIT': 'credited_tick_valid',
-    'O_FEEDBACK_NORM': 'feedback_rule_change_norm_pa',
-    'O_FEEDFORWARD_NORM': 'feedforward_rule_change_norm_pa',
-    'O_MOTION_NORM': 'motion_rule_change_norm_pa',
-    'O_OFFSET': 'start_offset_m',
-    'O_JUMP': 'jump_to_go_m',
-    'O_WINDOW': 'window_rms_error_m',
-    'O_BEST': 'best_window_rms_error_m',
-    'O_RATE_FACTOR': 'learning_rate_factor',
-    'O_ROLLED_BACK': 'times_rolled_back',
-}
+    'pid': (
+        'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
+        'integral_pa', 'derivative_pa', 'unlimited_command_pa', 'saturated_low',
+        'saturated_high', 'slew_limited', 'start_offset_m'),
+    'lqi': (
+        'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'feedforward_pa',
+        'state_feedback_pa', 'integral_pa', 'unlimited_command_pa', 'saturated_low',
+        'saturated_high', 'slew_limited', 'start_offset_m'),
+    'sofc': (
+        'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa',
+        'dynamic_feedforward_pa', 'feedback_rules_pa', 'feedforward_rules_pa', 'motion_rules_pa',
+        'proportional_pa', 'integral_pa', 'derivative_pa', 'unlimited_command_pa',
+        'saturated_low', 'saturated_high', 'slew_limited', 'contracting_share', 'error_set',
+        'error_degree', 'change_set', 'change_degree', 'reference_knot', 'reference_knot_degree',
+        'motion_knot', 'motion_knot_degree', 'motion_rate_knot', 'motion_rate_knot_degree',
+        'performance_index_m', 'learning_reason', 'credited_tick_valid',
+        'feedback_rule_change_norm_pa', 'feedforward_rule_change_norm_pa',
+        'motion_rule_change_norm_pa', 'start_offset_m', 'jump_to_go_m', 'window_rms_error_m',
+        'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back')}
 
 
-def test_every_setting_reaches_the_place_of_its_own_name():
-    values = {setting.name: 1.0 + i for i, setting in enumerate(SETTINGS)}
-    vector = parameter_vector(values)
-    assert sorted(PARAMETERS.values()) == sorted(values)
-    for place, name in PARAMETERS.items():
-        assert vector[getattr(layout, place)] == values[name], place
+@pytest.mark.parametrize('law', LAWS)
+def test_every_setting_is_the_compiled_parameter_of_its_name(law):
+    specification, parameters, _, _ = LAWS[law]
+    values = {setting.name: 1.0 + i for i, setting in enumerate(specification)}
+    array = settings.parameter_array(values) if law == 'sofc' else values_of(parameters, values)
+    compiled = fields(array, parameters)
+    assert {name: compiled[name] for name in values} == values
 
 
-def test_every_output_is_published_under_its_own_name():
-    assert sorted(OUTPUTS.values()) == sorted(layout.STATE_NAMES)
-    for place, name in OUTPUTS.items():
-        assert layout.STATE_NAMES[getattr(layout, place)] == name, place
+@pytest.mark.parametrize('law', LAWS)
+def test_outputs_keep_the_names_recordings_have(law):
+    _, _, output, _ = LAWS[law]
+    assert output.names == OUTPUTS[law]
+
+
+def test_every_input_of_a_tick_gets_into_the_field_of_its_name():
+    values = {name: 1.0 + i for i, name in enumerate(INPUT.names)}
+    array = zeros(INPUT)
+    write_inputs(array, **values)
+    assert {name: fields(array, INPUT)[name] for name in values} == values
+
+
+def test_the_arguments_of_a_step_are_its_inputs():
+    class Recorded(CompiledController):
+        state_names = ('command_pa',)
+
+        def __init__(self):
+            super().__init__({}, records.STATE)
+            self._step, self._arguments = (lambda: 0.0), ()
+
+    controller = Recorded()
+    controller.step(1.0, 2.0, 3.0, 4.0, 5.0, True, 6.0, 7.0, 8.0, 9.0)
+    seen = fields(controller.input_array, INPUT)
+    assert {name: seen[name] for name in INPUT.names} == {
+        'contraction_m': 1.0, 'reference_m': 2.0, 'reference_rate_m_per_s': 3.0,
+        'lead_reference_m': 4.0, 'lead_rate_m_per_s': 5.0, 'learning': 1.0, 'elapsed_s': 6.0,
+        'pressure_pa': 7.0, 'force_n': 8.0, 'held_back': 9.0}
+
+
+@pytest.mark.parametrize('law', LAWS)
+def test_a_changed_record_is_another_program(law):
+    """Machine code on disk is found by a key; the records it reads are part of it."""
+    _, parameters, output, compiled_step = LAWS[law]
+    _, constants = sources(compiled_step)
+    for name, record in (('PARAMETERS', parameters), ('OUTPUT', output), ('INPUT', INPUT)):
+        assert f'{name} = {record!r}' in constants
+
+
+def test_a_declared_setting_is_read_checked_and_compiled_without_more():
+    """One line: name, unit, default, range, sentence."""
+    added = Setting('damping_pa_s_per_m', 'Pa s/m', 2.0, 0.0, 9.0, 'damping, for this test')
+    first, *others = pid.SETTINGS
+    specification = (first, added, *others)
+    parameters = parameter_record(specification)
+    read = checked_settings(specification, {'damping_pa_s_per_m': 3.0})
+    compiled = fields(values_of(parameters, read), parameters)
+    assert compiled.damping_pa_s_per_m == 3.0
+    assert fields(values_of(parameters, checked_settings(specification, {})),
+                  parameters).damping_pa_s_per_m == 2.0
+    assert np.isclose(compiled.start_time_s, read['start_time_s'])

@@ -15,9 +15,10 @@
 """Inference by hand, performance index, credit and rule modification."""
 
 import numpy as np
-from pam_actuation.control.sofc import credit, layout, learning
+from pam_actuation.control.sofc import credit, learning
 from pam_actuation.control.sofc.membership import locate
 from pam_actuation.control.sofc.performance_index import index_linear, index_table, TABLE
+from pam_actuation.control.sofc.records import ENTRY
 from pam_actuation.control.sofc.rule_table import (
     contracting_share, infer_feedback, infer_feedforward, linear_feedback_table)
 import pytest
@@ -78,20 +79,20 @@ def test_tabulated_index_is_antisymmetric_and_reads_the_published_entries():
 
 
 def test_credit_goes_to_the_rules_active_the_delay_ago():
-    ring = np.zeros((credit.ring_rows(5, 0), credit.ENTRY_SIZE))
+    ring = np.zeros(credit.ring_rows(5, 0), ENTRY)
     for tick in range(23):
-        row = credit.row_of(ring, tick, 0)
-        credit.push_feedback(ring, row, tick % 6, 0.1, 0, 0.0, 1.0)
-        credit.push_feedforward(ring, row, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
-        credit.push_outcome(ring, row, 0.5, 0.25, 1e7, 0.0, 1.0, 1e5 + tick)
+        entry = ring[credit.row_of(ring, tick, 0)]
+        credit.push_feedback(entry, tick % 6, 0.1, 0, 0.0, 1.0)
+        credit.push_feedforward(entry, tick % 9, 0.2, tick % 3, 0.3, tick % 4, 0.4)
+        credit.push_outcome(entry, 0.5, 0.25, 1e7, 0.0, 1.0, 1e5 + tick)
         if tick >= 5:
-            row = credit.row_of(ring, tick, 5)
-            assert ring[row, credit.ENTRY_ERROR_SET] == (tick - 5) % 6
-            assert ring[row, credit.ENTRY_KNOT] == (tick - 5) % 9
-            assert ring[row, credit.ENTRY_MOTION_KNOT] == (tick - 5) % 3
-            assert ring[row, credit.ENTRY_RATE_KNOT] == (tick - 5) % 4
-            assert ring[row, credit.ENTRY_MOTION_PASS] == 0.25
-            assert ring[row, credit.ENTRY_OUTPUT] == 1e5 + tick - 5
+            entry = ring[credit.row_of(ring, tick, 5)]
+            assert entry.error_set == (tick - 5) % 6
+            assert entry.reference_knot == (tick - 5) % 9
+            assert entry.motion_knot == (tick - 5) % 3
+            assert entry.motion_rate_knot == (tick - 5) % 4
+            assert entry.motion_pass == 0.25
+            assert entry.command_pa == 1e5 + tick - 5
 
 
 def test_credit_kernel_sums_to_one_and_peaks_in_the_middle():
@@ -292,8 +293,3 @@ def test_exchange_of_rules_makes_no_step_in_the_command():
     after = controller.step(0.0098, 0.01, 0.0, 0.01, 0.0, learn=False)
     assert abs(after - before) < 500.0
     assert controller.rules_replaced == 1
-
-
-def test_every_output_has_a_name():
-    assert len(layout.STATE_NAMES) == layout.OUTPUT_COUNT
-    assert len(set(layout.STATE_NAMES)) == layout.OUTPUT_COUNT

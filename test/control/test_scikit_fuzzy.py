@@ -55,5 +55,5 @@ def test_the_measured_steps_learn(benchmark):
         'sofc_untuned', benchmark.load_rig('dmsp_5_300_hanging_mass'))
     before = controller.rules.digest()
     given = benchmark.motion(3000, controller.lead_s)
-    learned = benchmark.steps(controller.compiled_arguments(), *given)
+    learned = benchmark.steps(controller, *given)
     assert learned > 1500 and controller.rules.digest() != before

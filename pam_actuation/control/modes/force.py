@@ -22,30 +22,50 @@ command arrives: measured, and carried on with its rate over the preview. A smal
 force is no fault; a tendon that hangs loose where a force is wanted is, and freezes learning.
 """
 
+from collections.abc import Callable
 import math
 
-from numba import njit
 import numpy as np
-from pam_actuation.control import inputs as place
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.modes.force_surface import (
-    fill_inverse, nominal_stiffness_n_per_m, surface_from_tree, surface_to_mapping,
+    fill_inverse, nominal_stiffness_n_per_m, surface_from_tree, surface_head, surface_to_mapping,
     tabulate_force_surface)
 from pam_actuation.control.modes.tracked import FORCE
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
-from pam_sim.compiled import compiled, source_key
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
+from pam_sim.located_yaml import Located
+from pam_sim.records import cells, part, record, values_of, zeros
+from pam_sim.rig import Rig
 
-P_STIFFNESS = 0         # N/m
-P_LEAD = 1              # s
-P_PERIOD = 2            # s
-P_FADING = 3            # what a measurement of one tick ago still counts in the filter
-P_SLACK_FORCE = 4       # N
-PARAMETER_COUNT = 5
-S_KNOWN = 0             # 1 once a contraction was measured
-S_CONTRACTION = 1       # m, filtered
-S_RATE = 2              # m/s
-S_AHEAD = 3             # m, for which the inverse is taken
-STATE_COUNT = 4
+# What a tick is given: as ``inputs.INPUT``, but references in newtons.
+FORCE_INPUT = record(
+    'contraction_m',                  # measured; NaN = not known
+    'reference_n',
+    'reference_rate_n_per_s',
+    'lead_reference_n',
+    'lead_rate_n_per_s',
+    'learning',
+    'elapsed_s',
+    'pressure_pa',
+    'force_n',                        # measured
+    'held_back',
+)
+PARAMETERS = record(
+    'stiffness_n_per_m',              # so many newtons count as one metre
+    'lead_s',
+    'period_s',
+    'fading',                         # what a measurement of one tick ago still counts
+    'slack_force_n',
+)
+STATE = record(
+    'known',                          # 1 once a contraction was measured
+    'contraction_m',                  # filtered
+    'rate_m_per_s',
+    'ahead_m',                        # for which the inverse is taken
+)
 
 _FILTER_S = 0.05        # memory of the filter of the contraction
 _STALE_S = 0.1          # a longer gap between measurements restarts the rate
@@ -53,65 +73,78 @@ KEYS = ('stiffness_n_per_m', 'contraction_m', 'surface')
 
 
 @compiled
-def look_ahead(par, st, contraction_m, elapsed_s):
+def look_ahead(par: np.record, st: np.record, contraction_m: float, elapsed_s: float) -> float:
     """
     Take a contraction (NaN = none) into the state; return that of one preview ahead [m].
 
     Critically damped g-h filter: no lag at constant speed, little noise in the rate.
     """
     if not math.isfinite(elapsed_s):
-        elapsed_s = par[P_PERIOD]
+        elapsed_s = par.period_s
     if not math.isfinite(contraction_m):
-        st[S_RATE] = 0.0
-    elif st[S_KNOWN] < 0.5 or elapsed_s > _STALE_S:
-        st[S_CONTRACTION] = contraction_m
-        st[S_RATE] = 0.0
-        st[S_KNOWN] = 1.0
+        st.rate_m_per_s = 0.0
+    elif st.known < 0.5 or elapsed_s > _STALE_S:
+        st.contraction_m = contraction_m
+        st.rate_m_per_s = 0.0
+        st.known = 1.0
     elif elapsed_s > 0.0:
-        fading = par[P_FADING]
-        st[S_CONTRACTION] += st[S_RATE] * elapsed_s
-        residual = contraction_m - st[S_CONTRACTION]
-        st[S_CONTRACTION] += (1.0 - fading * fading) * residual
-        st[S_RATE] += (1.0 - fading) * (1.0 - fading) * residual / elapsed_s
-    st[S_AHEAD] = st[S_CONTRACTION] + par[P_LEAD] * st[S_RATE]
-    return st[S_AHEAD]
+        fading = par.fading
+        st.contraction_m += st.rate_m_per_s * elapsed_s
+        residual = contraction_m - st.contraction_m
+        st.contraction_m += (1.0 - fading * fading) * residual
+        st.rate_m_per_s += (1.0 - fading) * (1.0 - fading) * residual / elapsed_s
+    st.ahead_m = st.contraction_m + par.lead_s * st.rate_m_per_s
+    return st.ahead_m
 
 
 @compiled
-def force_inputs(par, surface, st, raw, table, inp):
+def force_inputs(par: FloatArray, surface: FloatArray, st: FloatArray, raw: FloatArray,
+                 table: FloatArray, inp: FloatArray) -> None:
     """
     Turn the inputs of one tick in newtons into those of the law.
 
     Parameters
     ----------
     par, surface, st : float64[:]
-        ``P_*``, the force surface, ``S_*``.
+        Arrays of ``PARAMETERS``, the force surface, ``STATE``.
     raw : float64[:]
-        ``inputs.IN_*`` with references in N and N/s and the measured contraction.
+        Array of ``FORCE_INPUT``.
     table : float64[:]
         Static inverse of the law, written.
     inp : float64[:]
-        Inputs of the law, written.
+        Inputs of the law (``inputs.INPUT``), written.
 
     """
-    stiffness = par[P_STIFFNESS]
-    ahead = look_ahead(par, st, raw[place.IN_CONTRACTION], raw[place.IN_ELAPSED])
+    _law_inputs(part(par, 0, PARAMETERS), surface, part(st, 0, STATE), part(raw, 0, FORCE_INPUT),
+                table, part(inp, 0, INPUT))
+
+
+@compiled
+def _law_inputs(par: np.record, surface: FloatArray, st: np.record, raw: np.record,
+                table: FloatArray, inp: np.record) -> None:
+    """Do as ``force_inputs``, on records."""
+    stiffness = par.stiffness_n_per_m
+    ahead = look_ahead(par, st, raw.contraction_m, raw.elapsed_s)
     fill_inverse(surface, stiffness, ahead, table)
-    for i in range(inp.shape[0]):
-        inp[i] = raw[i]
-    inp[place.IN_CONTRACTION] = raw[place.IN_FORCE] / stiffness
-    inp[place.IN_REFERENCE] = raw[place.IN_REFERENCE] / stiffness
-    inp[place.IN_REFERENCE_RATE] = raw[place.IN_REFERENCE_RATE] / stiffness
-    inp[place.IN_LEAD_REFERENCE] = raw[place.IN_LEAD_REFERENCE] / stiffness
-    inp[place.IN_LEAD_RATE] = raw[place.IN_LEAD_RATE] / stiffness
-    if raw[place.IN_REFERENCE] < 2.0 * par[P_SLACK_FORCE]:
-        inp[place.IN_FORCE] = math.nan
+    inp.contraction_m = raw.force_n / stiffness
+    inp.reference_m = raw.reference_n / stiffness
+    inp.reference_rate_m_per_s = raw.reference_rate_n_per_s / stiffness
+    inp.lead_reference_m = raw.lead_reference_n / stiffness
+    inp.lead_rate_m_per_s = raw.lead_rate_n_per_s / stiffness
+    inp.learning = raw.learning
+    inp.elapsed_s = raw.elapsed_s
+    inp.pressure_pa = raw.pressure_pa
+    inp.held_back = raw.held_back
+    inp.force_n = raw.force_n
+    if raw.reference_n < 2.0 * par.slack_force_n:
+        inp.force_n = math.nan
 
 
-def _entry(key):
+def _entry(key: int) -> Callable[..., None]:
     """Return ``force_inputs`` as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True)
-    def entry(par, surface, st, raw, table, inp):
+    @allocating_entry_point
+    def entry(par: FloatArray, surface: FloatArray, st: FloatArray, raw: FloatArray,
+              table: FloatArray, inp: FloatArray) -> None:
         """Do as ``force_inputs``."""
         if key >= 0:      # always; makes the key part of what is stored
             force_inputs(par, surface, st, raw, table, inp)
@@ -142,36 +175,39 @@ class ForceController(WrappedLaw):
 
     tracked = FORCE
 
-    def __init__(self, law, surface, stiffness_n_per_m, contraction_m=0.0):
+    def __init__(self, law: CompiledController, surface: FloatArray, stiffness_n_per_m: float,
+                 contraction_m: float = 0.0) -> None:
         super().__init__(law)
         self.surface = np.ascontiguousarray(surface, dtype=float)
         self.stiffness_n_per_m = float(stiffness_n_per_m)
         self.contraction_m = float(contraction_m)
         self.state_names = (*law.state_names, 'force_error_n', 'contraction_ahead_m')
-        self._par = np.zeros(PARAMETER_COUNT)
-        self._par[P_STIFFNESS] = stiffness_n_per_m
-        self._par[P_LEAD] = law.lead_s
-        self._par[P_PERIOD] = 1.0 / law.rate_hz
-        self._par[P_FADING] = math.exp(-1.0 / (law.rate_hz * _FILTER_S))
-        self._par[P_SLACK_FORCE] = law.settings.get('slack_force_n', 0.0)
-        self._st = np.zeros(STATE_COUNT)
-        self._raw = np.zeros(place.INPUT_COUNT)
-        self._inp = np.zeros(place.INPUT_COUNT)
+        self._par = values_of(PARAMETERS, {
+            'stiffness_n_per_m': stiffness_n_per_m, 'lead_s': law.lead_s,
+            'period_s': 1.0 / law.rate_hz,
+            'fading': math.exp(-1.0 / (law.rate_hz * _FILTER_S)),
+            'slack_force_n': law.settings.get('slack_force_n', 0.0)})
+        self._st, self._raw = zeros(STATE), zeros(FORCE_INPUT)
+        self._state, self._inputs = cells(self._st, STATE), cells(self._raw, FORCE_INPUT)
         self._error_n = math.nan
-        self._convert(np.zeros(place.INPUT_COUNT))      # compiled before time counts
+        self._convert(np.zeros_like(law.input_array))      # compiled before time counts
         self.pause()
 
     @property
-    def upper_force_n(self):
+    def upper_force_n(self) -> float:
         """Largest force [N] of the surface."""
-        return float(self.surface[0] * (self.surface[1] - 1.0))
+        head = surface_head(self.surface)
+        return float(head.force_step_n * (head.forces - 1.0))
 
-    def _convert(self, raw):
+    def _convert(self, inputs: FloatArray) -> None:
+        """Write the inputs of the law for those at hand."""
         _force_inputs(
-            self._par, self.surface, self._st, raw, self.law.static_inverse, self._inp)
+            self._par, self.surface, self._st, self._raw, self.law.static_inverse, inputs)
 
-    def step(self, x_m, ref_n, ref_rate_n_per_s, ref_lead_n, ref_lead_rate_n_per_s, learn=True,
-             elapsed_s=math.nan, pressure_pa=math.nan, force_n=math.nan, held_back=0.0):
+    def step(self, x_m: float, ref_n: float, ref_rate_n_per_s: float, ref_lead_n: float,
+             ref_lead_rate_n_per_s: float, learn: bool = True, elapsed_s: float = math.nan,
+             pressure_pa: float = math.nan, force_n: float = math.nan,
+             held_back: float = 0.0) -> float:
         """
         Run one tick; arguments as of the law, references in N and N/s.
 
@@ -198,26 +234,34 @@ class ForceController(WrappedLaw):
             Wanted muscle pressure, absolute Pa.
 
         """
-        self._raw[:] = (x_m, ref_n, ref_rate_n_per_s, ref_lead_n, ref_lead_rate_n_per_s, 0.0,
-                        elapsed_s, pressure_pa, force_n, held_back)
-        self._convert(self._raw)
-        inp = self._inp.tolist()
+        raw = self._inputs
+        raw.contraction_m[...] = x_m
+        raw.reference_n[...] = ref_n
+        raw.reference_rate_n_per_s[...] = ref_rate_n_per_s
+        raw.lead_reference_n[...] = ref_lead_n
+        raw.lead_rate_n_per_s[...] = ref_lead_rate_n_per_s
+        raw.learning[...] = 1.0 if learn and not self.law.freeze_learning else 0.0
+        raw.elapsed_s[...] = elapsed_s
+        raw.pressure_pa[...] = pressure_pa
+        raw.force_n[...] = force_n
+        raw.held_back[...] = held_back
+        self._convert(self.law.input_array)
         self._error_n = ref_n - force_n
-        return self.law.step(*inp[:place.IN_LEARN], learn, *inp[place.IN_LEARN + 1:])
+        return self.law.step_on_inputs()
 
-    def compiled_arguments(self):
+    def compiled_arguments(self) -> tuple[tuple[FloatArray, ...], tuple[object, ...]]:
         """Return (par, surface, state) of ``force_inputs`` and the arguments of the law."""
         return (self._par, self.surface, self._st), self.law.compiled_arguments()
 
-    def state_values(self):
+    def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return (*self.law.state_values(), self._error_n, float(self._st[S_AHEAD]))
+        return (*self.law.state_values(), self._error_n, self._state.ahead_m.item())
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         super().pause()
         self._st[:] = 0.0
-        self._st[S_CONTRACTION] = self._st[S_AHEAD] = self.contraction_m
+        self._state.contraction_m[...] = self._state.ahead_m[...] = self.contraction_m
         self._error_n = math.nan
 
 
@@ -226,7 +270,7 @@ class ForceMode:
 
     tracked = FORCE
 
-    def __init__(self, tree, rig):
+    def __init__(self, tree: Located, rig: Rig | None) -> None:
         """
         Read the block ``force`` of a controller file; what it lacks comes from the rig.
 
@@ -261,25 +305,25 @@ class ForceMode:
             contraction = 0.0 if rig is None else rig.parameters.get('contraction_m', 0.0)
         self.contraction_m = contraction
 
-    def identity(self, rig_name):
+    def identity(self, rig_name: str) -> str:
         """Return what rules learned in this mode are tied to."""
         return in_mode(rig_name, f'force at {self.stiffness_n_per_m:.12g} N/m')
 
-    def blank_inverse(self):
+    def blank_inverse(self) -> FloatArray:
         """Return a table of the right size; every tick fills it."""
-        return blank_inverse(int(self.surface[1]))
+        return blank_inverse(int(surface_head(self.surface).forces))
 
-    def rule_scaling(self):
+    def rule_scaling(self) -> dict[str, str | float]:
         """Return what turns the metres of the rules into newtons, as part of their scaling."""
         return {'tracked_unit': 'N', 'tracked_per_m': self.stiffness_n_per_m,
                 'tracked_zero_m': 0.0}
 
-    def wrap(self, law):
+    def wrap(self, law: CompiledController) -> ForceController:
         """Return the law in this mode."""
         return ForceController(law, self.surface, self.stiffness_n_per_m, self.contraction_m)
 
 
-def force_to_mapping(controller):
+def force_to_mapping(controller: ForceController) -> dict[str, object]:
     """Return what ``ForceMode`` reads, as plain data."""
     return {'force': {
         'stiffness_n_per_m': controller.stiffness_n_per_m,

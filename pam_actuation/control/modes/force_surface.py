@@ -15,24 +15,36 @@
 """
 Pressure that gives a force at a contraction, at rest, as a table in one vector.
 
-``[force step N, number of forces, contraction step m, number of contractions, Pa, Pa, ...]``,
-both from 0, absolute pressures, the forces of one contraction together: the form compiled
-code takes and a file keeps exactly.
+A ``SURFACE``, then the absolute pressures, the forces of one contraction together. Forces and
+contractions begin at 0. Compiled code takes this form and a file keeps it exactly.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_actuation.control.static_inverse import grid_of, GRID_SIZE
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
+from pam_sim.located_yaml import Located
+from pam_sim.records import fields, part, record, size_of, values_of
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
-HEAD = 4                # entries before the pressures
+SURFACE = record(
+    'force_step_n',
+    'forces',                         # how many
+    'contraction_step_m',
+    'contractions',                   # how many
+)
+SURFACE_SIZE = size_of(SURFACE)
 _FORCES = 25
 _CONTRACTIONS = 51
 _HIGHEST_GAUGE_PA = 1.2e6      # instead of a pressure that no valve of this kind gives
 
 
 @compiled
-def fill_inverse(surface, stiffness_n_per_m, contraction_m, table):
+def fill_inverse(surface: FloatArray, stiffness_n_per_m: float, contraction_m: float,
+                 table: FloatArray) -> None:
     """
     Write the static inverse of the present contraction into ``table``.
 
@@ -47,23 +59,52 @@ def fill_inverse(surface, stiffness_n_per_m, contraction_m, table):
     contraction_m : float
         Contraction [m] for which pressures are wanted; beyond the table its edge.
     table : float64[:]
-        Two entries and one per force, written.
+        A node for each force, written.
 
     """
-    forces = int(surface[1])
-    last = int(surface[3]) - 1
-    place = min(max(contraction_m / surface[2], 0.0), last)
+    head = part(surface, 0, SURFACE)
+    pressure_pa = surface[SURFACE_SIZE:]
+    forces = int(head.forces)
+    last = int(head.contractions) - 1
+    place = min(max(contraction_m / head.contraction_step_m, 0.0), last)
     row = min(int(place), last - 1)
-    part = place - row
-    below = HEAD + row * forces
+    share = place - row
+    below = row * forces
     above = below + forces
-    table[0] = 0.0
-    table[1] = surface[0] / stiffness_n_per_m
+    grid = grid_of(table)
+    grid.lower_m = 0.0
+    grid.step_m = head.force_step_n / stiffness_n_per_m
+    nodes_pa = table[GRID_SIZE:]
     for i in range(forces):
-        table[2 + i] = (1.0 - part) * surface[below + i] + part * surface[above + i]
+        nodes_pa[i] = (1.0 - share) * pressure_pa[below + i] + share * pressure_pa[above + i]
 
 
-def tabulate_force_surface(rig, upper_force_n=None):
+def force_surface(
+        force_step_n: float, contraction_step_m: float, pressure_pa: ArrayLike) -> FloatArray:
+    """
+    Return the surface of a table of pressures.
+
+    Parameters
+    ----------
+    force_step_n, contraction_step_m : float
+        Between columns and between rows.
+    pressure_pa : array_like, shape (contractions, forces)
+        Absolute pressures.
+
+    """
+    table = np.asarray(pressure_pa, dtype=float)
+    contractions, forces = table.shape
+    return np.concatenate([values_of(SURFACE, {
+        'force_step_n': force_step_n, 'forces': forces,
+        'contraction_step_m': contraction_step_m, 'contractions': contractions}), table.ravel()])
+
+
+def surface_head(surface: FloatArray) -> np.record:
+    """Return the ``SURFACE`` at the head of a surface."""
+    return fields(surface, SURFACE)
+
+
+def tabulate_force_surface(rig: Rig, upper_force_n: float | None = None) -> FloatArray:
     """
     Tabulate the pressure at rest over force and contraction of a rig's nominal muscle.
 
@@ -77,7 +118,7 @@ def tabulate_force_surface(rig, upper_force_n=None):
     Returns
     -------
     numpy.ndarray
-        The vector of this module. Contractions reach to the stroke of the muscle.
+        Surface of this module. Contractions reach to the stroke of the muscle.
 
     """
     if upper_force_n is None:
@@ -86,18 +127,17 @@ def tabulate_force_surface(rig, upper_force_n=None):
     contraction_m = np.linspace(0.0, rig.muscle.stroke_m, _CONTRACTIONS)
     pressure_pa = rig.static_pressure_pa(contraction_m[:, None], force_n[None, :])
     pressure_pa = np.clip(pressure_pa, P_ATM_PA, P_ATM_PA + _HIGHEST_GAUGE_PA)
-    return np.concatenate([
-        [force_n[1], _FORCES, contraction_m[1], _CONTRACTIONS], pressure_pa.ravel()])
+    return force_surface(force_n[1], contraction_m[1], pressure_pa)
 
 
-def highest_force_n(rig, gauge_pa=6e5, contraction_m=0.0):
+def highest_force_n(rig: Rig, gauge_pa: float = 6e5, contraction_m: float = 0.0) -> float:
     """Return the force [N] of the nominal muscle at a gauge pressure and contraction."""
     strain = contraction_m / rig.muscle.length_m
     return float(rig.muscle.law.law.force_n(gauge_pa, strain, 'allow')
                  * rig.parameters['force_map_gain'])
 
 
-def nominal_stiffness_n_per_m(rig, gauge_pa=3e5):
+def nominal_stiffness_n_per_m(rig: Rig, gauge_pa: float = 3e5) -> float:
     """
     Return how much the force falls with contraction at constant pressure [N/m].
 
@@ -111,15 +151,16 @@ def nominal_stiffness_n_per_m(rig, gauge_pa=3e5):
     return float(fall) / length_m * rig.parameters['force_map_gain']
 
 
-def surface_to_mapping(surface):
+def surface_to_mapping(surface: FloatArray) -> dict[str, object]:
     """Return a surface as plain data for a controller file."""
-    forces, contractions = int(surface[1]), int(surface[3])
-    rows = np.asarray(surface[HEAD:]).reshape(contractions, forces)
-    return {'force_step_n': float(surface[0]), 'contraction_step_m': float(surface[2]),
+    head = surface_head(surface)
+    rows = surface[SURFACE_SIZE:].reshape(int(head.contractions), int(head.forces))
+    return {'force_step_n': float(head.force_step_n),
+            'contraction_step_m': float(head.contraction_step_m),
             'pressure_pa': [' '.join(map(repr, row)) for row in rows.tolist()]}
 
 
-def surface_from_tree(tree):
+def surface_from_tree(tree: Located) -> FloatArray:
     """
     Return the surface of a ``Located`` mapping.
 
@@ -138,11 +179,10 @@ def surface_from_tree(tree):
     if len(rows) < 2 or len(rows[0]) < 2 or len({len(row) for row in rows}) != 1:
         raise tree.error(
             '`pressure_pa` needs two rows or more of equally many pressures', 'pressure_pa')
-    return np.concatenate([
-        [force_step_n, len(rows[0]), contraction_step_m, len(rows)], np.concatenate(rows)])
+    return force_surface(force_step_n, contraction_step_m, rows)
 
 
-def _row(text, where):
+def _row(text: str, where: str) -> FloatArray:
     """Return the pressures [Pa] of one line of text."""
     try:
         row = np.array([float(word) for word in text.split()])

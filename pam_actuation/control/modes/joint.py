@@ -21,29 +21,52 @@ two pressures about a co-contraction, written as one pressure with the limits of
 (``joint_statics``): its limits, and with them the anti-windup, are those of the real pair.
 """
 
+from collections.abc import Callable, Mapping, Sequence
 import math
 
-from numba import njit
 import numpy as np
-from pam_actuation.control import inputs as place
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
-from pam_sim.compiled import compiled, source_key
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
+from pam_sim.joint import JointRig
+from pam_sim.located_yaml import Located
+from pam_sim.records import cells, part, record, size_of, values_of, zeros
 from pam_sim.units import P_ATM_PA
 
-P_RADIUS = 0            # m, of the flexor's pulley
-P_ZERO = 1              # m, contraction of the flexor at angle 0
-P_CO_CONTRACTION = 2    # Pa absolute
-P_LOWEST = 3            # Pa absolute
-P_HIGHEST = 4           # Pa absolute
-P_REACH = 5             # Pa, change of the co-contraction per tick
-PARAMETER_COUNT = 6
-S_KNOWN = 0             # 1 after the first tick
-S_CO_CONTRACTION = 1    # Pa absolute, on its way to the wanted one
-STATE_COUNT = 2
+# What a tick is given; NaN where a pressure or a force is not known.
+JOINT_INPUT = record(
+    'angle_rad',                      # measured, flexion positive
+    'reference_rad',
+    'reference_rate_rad_per_s',
+    'lead_reference_rad',
+    'lead_rate_rad_per_s',
+    'learning',
+    'elapsed_s',
+    'held_back',
+    'flexor_pressure_pa',
+    'extensor_pressure_pa',
+    'flexor_force_n',
+    'extensor_force_n',
+)
+PARAMETERS = record(
+    'radius_m',                       # of the flexor's pulley
+    'zero_m',                         # contraction of the flexor at angle 0
+    'co_contraction_pa',              # wanted, absolute
+    'lowest_pa',                      # absolute
+    'highest_pa',                     # absolute
+    'reach_pa',                       # change of the co-contraction per tick
+)
+STATE = record(
+    'known',                          # 1 after the first tick
+    'co_contraction_pa',              # absolute, on its way to the wanted one
+)
+COMMANDS = record('flexor_pa', 'extensor_pa')           # absolute
 FLEXOR, EXTENSOR = 0, 1         # places in pairs
 
 CO_CONTRACTION_GAUGE_PA = 3e5
@@ -52,70 +75,94 @@ KEYS = ('flexor_radius_m', 'flexor_contraction_at_zero_m', 'co_contraction_gauge
 
 
 @compiled
-def joint_inputs(par, raw, pressures_pa, forces_n, inp):
+def joint_inputs(par: FloatArray, raw: FloatArray, inp: FloatArray) -> None:
     """
     Turn the inputs of one tick in radians into those of the law.
 
     Parameters
     ----------
-    par : float64[:]
-        ``P_*``.
-    raw : float64[:]
-        ``inputs.IN_*`` with the angle in place of the contraction, references in rad and rad/s.
-    pressures_pa, forces_n : float64[:]
-        Measured at flexor and extensor, NaN where not known.
+    par, raw : float64[:]
+        Arrays of ``PARAMETERS`` and ``JOINT_INPUT``.
     inp : float64[:]
-        Inputs of the law, written.
+        Inputs of the law (``inputs.INPUT``), written.
 
     """
-    radius, zero = par[P_RADIUS], par[P_ZERO]
-    for i in range(inp.shape[0]):
-        inp[i] = raw[i]
-    inp[place.IN_CONTRACTION] = zero + radius * raw[place.IN_CONTRACTION]
-    inp[place.IN_REFERENCE] = zero + radius * raw[place.IN_REFERENCE]
-    inp[place.IN_REFERENCE_RATE] = radius * raw[place.IN_REFERENCE_RATE]
-    inp[place.IN_LEAD_REFERENCE] = zero + radius * raw[place.IN_LEAD_REFERENCE]
-    inp[place.IN_LEAD_RATE] = radius * raw[place.IN_LEAD_RATE]
-    inp[place.IN_PRESSURE] = as_one(
-        pressures_pa[FLEXOR], pressures_pa[EXTENSOR], par[P_LOWEST], par[P_HIGHEST])
-    # The weaker muscle tells whether a tendon is slack; a force that is not known tells nothing.
-    inp[place.IN_FORCE] = forces_n[FLEXOR]
-    if not forces_n[EXTENSOR] >= forces_n[FLEXOR]:
-        inp[place.IN_FORCE] = forces_n[EXTENSOR]
+    _law_inputs(part(par, 0, PARAMETERS), part(raw, 0, JOINT_INPUT), part(inp, 0, INPUT))
 
 
 @compiled
-def joint_outputs(par, st, u_pa, pressures_pa, commands_pa):
+def _law_inputs(par: np.record, raw: np.record, inp: np.record) -> None:
+    """Do as ``joint_inputs``, on records."""
+    radius, zero = par.radius_m, par.zero_m
+    inp.contraction_m = zero + radius * raw.angle_rad
+    inp.reference_m = zero + radius * raw.reference_rad
+    inp.reference_rate_m_per_s = radius * raw.reference_rate_rad_per_s
+    inp.lead_reference_m = zero + radius * raw.lead_reference_rad
+    inp.lead_rate_m_per_s = radius * raw.lead_rate_rad_per_s
+    inp.learning = raw.learning
+    inp.elapsed_s = raw.elapsed_s
+    inp.held_back = raw.held_back
+    inp.pressure_pa = as_one(
+        raw.flexor_pressure_pa, raw.extensor_pressure_pa, par.lowest_pa, par.highest_pa)
+    # The weaker muscle tells whether a tendon is slack; a force that is not known tells nothing.
+    inp.force_n = raw.flexor_force_n
+    if not raw.extensor_force_n >= raw.flexor_force_n:
+        inp.force_n = raw.extensor_force_n
+
+
+@compiled
+def joint_outputs(par: FloatArray, st: FloatArray, u_pa: float, raw: FloatArray,
+                  commands: FloatArray) -> None:
     """
-    Write the commands of both muscles [absolute Pa] for what the law commands.
+    Write the commands of both muscles for what the law commands.
 
     The co-contraction begins where the muscles are and moves to the wanted one.
+
+    Parameters
+    ----------
+    par, st, raw : float64[:]
+        Arrays of ``PARAMETERS``, ``STATE``, written, and ``JOINT_INPUT``.
+    u_pa : float
+        Command of the law, absolute.
+    commands : float64[:]
+        Array of ``COMMANDS``, written.
+
     """
-    if st[S_KNOWN] < 0.5:
-        st[S_KNOWN] = 1.0
-        mean = 0.5 * (pressures_pa[FLEXOR] + pressures_pa[EXTENSOR])
+    _commands(part(par, 0, PARAMETERS), part(st, 0, STATE), u_pa, part(raw, 0, JOINT_INPUT),
+              part(commands, 0, COMMANDS))
+
+
+@compiled
+def _commands(par: np.record, st: np.record, u_pa: float, raw: np.record,
+              commands: np.record) -> None:
+    """Do as ``joint_outputs``, on records."""
+    if st.known < 0.5:
+        st.known = 1.0
+        mean = 0.5 * (raw.flexor_pressure_pa + raw.extensor_pressure_pa)
         if not math.isfinite(mean):
-            mean = par[P_LOWEST]
-        st[S_CO_CONTRACTION] = min(max(mean, par[P_LOWEST]), par[P_HIGHEST])
-    step = par[P_CO_CONTRACTION] - st[S_CO_CONTRACTION]
-    st[S_CO_CONTRACTION] += min(max(step, -par[P_REACH]), par[P_REACH])
-    commands_pa[FLEXOR], commands_pa[EXTENSOR] = pair_of(
-        u_pa, st[S_CO_CONTRACTION], par[P_LOWEST], par[P_HIGHEST])
+            mean = par.lowest_pa
+        st.co_contraction_pa = min(max(mean, par.lowest_pa), par.highest_pa)
+    step = par.co_contraction_pa - st.co_contraction_pa
+    st.co_contraction_pa += min(max(step, -par.reach_pa), par.reach_pa)
+    flexor_pa, extensor_pa = pair_of(u_pa, st.co_contraction_pa, par.lowest_pa, par.highest_pa)
+    commands.flexor_pa = flexor_pa
+    commands.extensor_pa = extensor_pa
 
 
-def _entries(key):
+def _entries(key: int) -> tuple[Callable[..., None], Callable[..., None]]:
     """Return both functions as units of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True)
-    def inputs(par, raw, pressures_pa, forces_n, inp):
+    @allocating_entry_point
+    def inputs(par: FloatArray, raw: FloatArray, inp: FloatArray) -> None:
         """Do as ``joint_inputs``."""
         if key >= 0:      # always; makes the key part of what is stored
-            joint_inputs(par, raw, pressures_pa, forces_n, inp)
+            joint_inputs(par, raw, inp)
 
-    @njit(cache=True, error_model='numpy', nogil=True)
-    def outputs(par, st, u_pa, pressures_pa, commands_pa):
+    @allocating_entry_point
+    def outputs(par: FloatArray, st: FloatArray, u_pa: float, raw: FloatArray,
+                commands: FloatArray) -> None:
         """Do as ``joint_outputs``."""
         if key >= 0:
-            joint_outputs(par, st, u_pa, pressures_pa, commands_pa)
+            joint_outputs(par, st, u_pa, raw, commands)
 
     return inputs, outputs
 
@@ -146,8 +193,9 @@ class JointController(WrappedLaw):
 
     tracked = JOINT
 
-    def __init__(self, law, flexor_radius_m, flexor_contraction_at_zero_m,
-                 co_contraction_gauge_pa, where='co_contraction_gauge_pa'):
+    def __init__(self, law: CompiledController, flexor_radius_m: float,
+                 flexor_contraction_at_zero_m: float, co_contraction_gauge_pa: float,
+                 where: str = 'co_contraction_gauge_pa') -> None:
         super().__init__(law)
         self.flexor_radius_m = float(flexor_radius_m)
         self.flexor_contraction_at_zero_m = float(flexor_contraction_at_zero_m)
@@ -160,26 +208,26 @@ class JointController(WrappedLaw):
         self.state_names = (
             *law.state_names, 'angle_error_rad', 'co_contraction_pa', 'flexor_command_pa',
             'extensor_command_pa')
-        self._par = np.array([
-            flexor_radius_m, flexor_contraction_at_zero_m, P_ATM_PA + co_contraction_gauge_pa,
-            P_ATM_PA + lowest, P_ATM_PA + highest,
-            _CO_CONTRACTION_SLEW_PA_PER_S / law.rate_hz])
-        self._st = np.zeros(STATE_COUNT)
-        self._raw = np.zeros(place.INPUT_COUNT)
-        self._inp = np.zeros(place.INPUT_COUNT)
-        self._pressures = np.full(2, math.nan)
-        self._forces = np.full(2, math.nan)
-        self._commands = np.full(2, P_ATM_PA)
+        self._par = values_of(PARAMETERS, {
+            'radius_m': flexor_radius_m, 'zero_m': flexor_contraction_at_zero_m,
+            'co_contraction_pa': P_ATM_PA + co_contraction_gauge_pa,
+            'lowest_pa': P_ATM_PA + lowest, 'highest_pa': P_ATM_PA + highest,
+            'reach_pa': _CO_CONTRACTION_SLEW_PA_PER_S / law.rate_hz})
+        self._st, self._raw = zeros(STATE), np.full(size_of(JOINT_INPUT), math.nan)
+        self._commands = np.full(size_of(COMMANDS), P_ATM_PA)
+        self._parameters, self._state = cells(self._par, PARAMETERS), cells(self._st, STATE)
+        self._inputs = cells(self._raw, JOINT_INPUT)
         self._error_rad = math.nan
         # Compiled before time counts.
-        _joint_inputs(self._par, self._raw, self._pressures, self._forces, self._inp)
-        _joint_outputs(self._par, self._st, P_ATM_PA, self._pressures, self._commands)
+        _joint_inputs(self._par, self._raw, np.zeros_like(law.input_array))
+        _joint_outputs(self._par, self._st, P_ATM_PA, self._raw, self._commands)
         self.pause()
 
-    def step(self, angle_rad, ref_rad, ref_rate_rad_per_s, ref_lead_rad,
-             ref_lead_rate_rad_per_s, learn=True, elapsed_s=math.nan,
-             pressures_pa=(math.nan, math.nan), forces_n=(math.nan, math.nan),
-             held_back=0.0):
+    def step(self, angle_rad: float, ref_rad: float, ref_rate_rad_per_s: float,
+             ref_lead_rad: float, ref_lead_rate_rad_per_s: float, learn: bool = True,
+             elapsed_s: float = math.nan, pressures_pa: Sequence[float] = (math.nan, math.nan),
+             forces_n: Sequence[float] = (math.nan, math.nan),
+             held_back: float = 0.0) -> tuple[float, ...]:
         """
         Run one tick.
 
@@ -205,39 +253,45 @@ class JointController(WrappedLaw):
             Wanted pressures of flexor and extensor, absolute Pa.
 
         """
-        self._raw[:] = (angle_rad, ref_rad, ref_rate_rad_per_s, ref_lead_rad,
-                        ref_lead_rate_rad_per_s, 0.0, elapsed_s, math.nan, math.nan, held_back)
-        self._pressures[:] = pressures_pa
-        self._forces[:] = forces_n
-        _joint_inputs(self._par, self._raw, self._pressures, self._forces, self._inp)
-        inp = self._inp.tolist()
-        u_pa = self.law.step(*inp[:place.IN_LEARN], learn, *inp[place.IN_LEARN + 1:])
-        _joint_outputs(self._par, self._st, u_pa, self._pressures, self._commands)
+        raw = self._inputs
+        raw.angle_rad[...] = angle_rad
+        raw.reference_rad[...] = ref_rad
+        raw.reference_rate_rad_per_s[...] = ref_rate_rad_per_s
+        raw.lead_reference_rad[...] = ref_lead_rad
+        raw.lead_rate_rad_per_s[...] = ref_lead_rate_rad_per_s
+        raw.learning[...] = 1.0 if learn and not self.law.freeze_learning else 0.0
+        raw.elapsed_s[...] = elapsed_s
+        raw.held_back[...] = held_back
+        raw.flexor_pressure_pa[...], raw.extensor_pressure_pa[...] = pressures_pa
+        raw.flexor_force_n[...], raw.extensor_force_n[...] = forces_n
+        _joint_inputs(self._par, self._raw, self.law.input_array)
+        u_pa = self.law.step_on_inputs()
+        _joint_outputs(self._par, self._st, u_pa, self._raw, self._commands)
         self._error_rad = ref_rad - angle_rad
         return tuple(self._commands.tolist())
 
-    def want_co_contraction(self, gauge_pa):
+    def want_co_contraction(self, gauge_pa: float) -> None:
         """
         Ask for another mean pressure [Pa gauge]; it is approached at a limited rate.
 
         Kept within the pressure limits. The static inverse stays the one of the co-contraction
         the controller was made for: what that misses is left to rules and integral.
         """
-        par = self._par
-        self._par[P_CO_CONTRACTION] = min(
-            max(P_ATM_PA + gauge_pa, par[P_LOWEST]), par[P_HIGHEST])
+        par = self._parameters
+        par.co_contraction_pa[...] = min(
+            max(P_ATM_PA + gauge_pa, par.lowest_pa.item()), par.highest_pa.item())
 
     @property
-    def wanted_co_contraction_pa(self):
+    def wanted_co_contraction_pa(self) -> float:
         """Mean pressure of both muscles asked for [Pa absolute]."""
-        return float(self._par[P_CO_CONTRACTION])
+        return float(self._parameters.co_contraction_pa)
 
     @property
-    def co_contraction_reach_pa(self):
+    def co_contraction_reach_pa(self) -> float:
         """How far the co-contraction may move in one tick [Pa]."""
-        return float(self._par[P_REACH])
+        return float(self._parameters.reach_pa)
 
-    def stand_aside(self, commands_pa):
+    def stand_aside(self, commands_pa: Sequence[float]) -> None:
         """
         Take note of what another law commands in place of this one.
 
@@ -246,19 +300,19 @@ class JointController(WrappedLaw):
         """
         self.pause()
         self._commands[:] = commands_pa
-        self._st[S_KNOWN] = 1.0
-        self._st[S_CO_CONTRACTION] = self._commands.mean()
+        self._state.known[...] = 1.0
+        self._state.co_contraction_pa[...] = self._commands.mean()
 
-    def compiled_arguments(self):
+    def compiled_arguments(self) -> tuple[tuple[FloatArray, ...], tuple[object, ...]]:
         """Return (par, state) of this module's functions and the arguments of the law."""
         return (self._par, self._st), self.law.compiled_arguments()
 
-    def state_values(self):
+    def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return (*self.law.state_values(), self._error_rad, float(self._st[S_CO_CONTRACTION]),
+        return (*self.law.state_values(), self._error_rad, self._state.co_contraction_pa.item(),
                 *self._commands.tolist())
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         super().pause()
         self._st[:] = 0.0
@@ -266,7 +320,7 @@ class JointController(WrappedLaw):
         self._error_rad = math.nan
 
 
-def limits_gauge_pa(settings):
+def limits_gauge_pa(settings: Mapping[str, float]) -> tuple[float, float]:
     """Return the lowest and highest gauge pressure [Pa] of a law's settings."""
     return settings['min_pressure_gauge_pa'], settings['max_pressure_gauge_pa']
 
@@ -276,7 +330,7 @@ class JointMode:
 
     tracked = JOINT
 
-    def __init__(self, tree, rig):
+    def __init__(self, tree: Located, rig: JointRig | None) -> None:
         """
         Read the block ``joint`` of a controller file; what it lacks comes from the joint.
 
@@ -314,24 +368,24 @@ class JointMode:
         self._joint = rig
         self._own_inverse = 'static_inverse' in tree
 
-    def identity(self, rig_name):
+    def identity(self, rig_name: str) -> str:
         """Return what rules learned in this mode are tied to."""
         return in_mode(
             rig_name, f'joint at {self.values["co_contraction_gauge_pa"] * 1e-3:.12g} kPa')
 
-    def blank_inverse(self):
+    def blank_inverse(self) -> FloatArray:
         """Return a table of the right size; ``wrap`` fills it."""
         if self._joint is None:
             raise InputError('without a joint the text must bring its `static_inverse`',
                              self._where)
         return blank_inverse(NODES)
 
-    def rule_scaling(self):
+    def rule_scaling(self) -> dict[str, str | float]:
         """Return what turns the metres of the rules into radians, as part of their scaling."""
         return {'tracked_unit': 'rad', 'tracked_per_m': 1.0 / self.values['flexor_radius_m'],
                 'tracked_zero_m': self.values['flexor_contraction_at_zero_m']}
 
-    def wrap(self, law):
+    def wrap(self, law: CompiledController) -> JointController:
         """Return the law in this mode, with the static inverse of the joint if it had none."""
         controller = JointController(law, *(self.values[key] for key in KEYS), self._where)
         if not self._own_inverse:
@@ -342,6 +396,6 @@ class JointMode:
         return controller
 
 
-def joint_to_mapping(controller):
+def joint_to_mapping(controller: JointController) -> dict[str, object]:
     """Return what ``JointMode`` reads, as plain data."""
     return {'joint': {key: getattr(controller, key) for key in KEYS}}

@@ -23,7 +23,11 @@ could not be kept within limits otherwise.
 """
 
 import numpy as np
+from pam_actuation.control.static_inverse import static_inverse
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
+from pam_sim.joint import JointRig
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
 NODES = 141
@@ -31,14 +35,16 @@ _BISECTIONS = 40
 
 
 @compiled
-def room_for(co_contraction_pa, difference_pa, lowest_pa, highest_pa):
+def room_for(co_contraction_pa: float, difference_pa: float, lowest_pa: float,
+             highest_pa: float) -> float:
     """Return the co-contraction [Pa] that leaves room for a difference, nearest to the wanted."""
     size = abs(difference_pa)
     return min(max(co_contraction_pa, lowest_pa + size), highest_pa - size)
 
 
 @compiled
-def pair_of(u_pa, co_contraction_pa, lowest_pa, highest_pa):
+def pair_of(u_pa: float, co_contraction_pa: float, lowest_pa: float,
+            highest_pa: float) -> tuple[float, float]:
     """
     Return the pressures of flexor and extensor [absolute Pa].
 
@@ -58,12 +64,13 @@ def pair_of(u_pa, co_contraction_pa, lowest_pa, highest_pa):
 
 
 @compiled
-def as_one(flexor_pa, extensor_pa, lowest_pa, highest_pa):
+def as_one(flexor_pa: float, extensor_pa: float, lowest_pa: float, highest_pa: float) -> float:
     """Return a pair of pressures [absolute Pa] as one, NaN where one of them is."""
     return 0.5 * (lowest_pa + highest_pa) + 0.5 * (flexor_pa - extensor_pa)
 
 
-def tabulate_joint_inverse(joint, co_contraction_pa, lowest_pa, highest_pa, nodes=NODES):
+def tabulate_joint_inverse(joint: JointRig, co_contraction_pa: float, lowest_pa: float,
+                           highest_pa: float, nodes: int = NODES) -> FloatArray:
     """
     Tabulate the pair, as one pressure, that holds each angle of a joint at rest.
 
@@ -81,8 +88,8 @@ def tabulate_joint_inverse(joint, co_contraction_pa, lowest_pa, highest_pa, node
     Returns
     -------
     numpy.ndarray
-        ``[lowest flexor contraction m, step m, pressures...]``, as ``static_inverse`` has it;
-        an angle out of reach gets the limit.
+        Table of ``static_inverse`` over the flexor's contraction; an angle out of reach gets
+        the limit.
 
     """
     angle = np.linspace(*joint.range_rad, nodes)
@@ -92,12 +99,13 @@ def tabulate_joint_inverse(joint, co_contraction_pa, lowest_pa, highest_pa, node
         middle = 0.5 * (low + high)
         short = _torque_n_m(joint, angle, middle, co_contraction_pa, lowest_pa, highest_pa) < 0.0
         low, high = np.where(short, middle, low), np.where(short, high, middle)
-    contraction_m = joint.contractions_m(angle)[0]
+    contraction_m, _ = joint.contractions_m(angle)
     step_m = (contraction_m[-1] - contraction_m[0]) / (nodes - 1)
-    return np.concatenate([[contraction_m[0], step_m], 0.5 * (low + high)])
+    return static_inverse(contraction_m[0], step_m, 0.5 * (low + high))
 
 
-def _torque_n_m(joint, angle, u_pa, co_contraction_pa, lowest_pa, highest_pa):
+def _torque_n_m(joint: JointRig, angle: FloatArray, u_pa: FloatArray, co_contraction_pa: float,
+                lowest_pa: float, highest_pa: float) -> FloatArray:
     """Return the torque at rest [N m] of nominal muscles and gravity, arrays over the angle."""
     value = joint.parameters
     difference = u_pa - 0.5 * (lowest_pa + highest_pa)
@@ -113,7 +121,7 @@ def _torque_n_m(joint, angle, u_pa, co_contraction_pa, lowest_pa, highest_pa):
     return torque
 
 
-def nominal_force_n(rig, pressure_pa, contraction_m):
+def nominal_force_n(rig: Rig, pressure_pa: FloatArray, contraction_m: FloatArray) -> FloatArray:
     """
     Return the force [N] of the nominal muscle of a rig at rest, without effects.
 

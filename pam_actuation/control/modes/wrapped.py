@@ -15,15 +15,20 @@
 """A control law, which works in metres of contraction, made to track something else."""
 
 import numpy as np
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.modes.tracked import Tracked
+from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_actuation.control.static_inverse import static_inverse
+from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
 
 
-def blank_inverse(nodes):
+def blank_inverse(nodes: int) -> FloatArray:
     """Return a static inverse of so many nodes that is to be filled: atmosphere everywhere."""
-    return np.concatenate([[0.0, 1.0], np.full(nodes, P_ATM_PA)])
+    return static_inverse(0.0, 1.0, np.full(nodes, P_ATM_PA))
 
 
-def in_mode(rig_name, mode):
+def in_mode(rig_name: str, mode: str) -> str:
     """Return the identity of rules: rig and mode, the mode stated once."""
     return rig_name if rig_name.endswith(f'/{mode}') else f'{rig_name}/{mode}'
 
@@ -39,84 +44,84 @@ class WrappedLaw:
 
     """
 
-    tracked = None
+    tracked: Tracked
     made_for = None         # facts of the rig, see ``control/made_for``
     other_rig = ''          # how the rig it runs on differs, if that was accepted
 
-    def __init__(self, law):
+    def __init__(self, law: CompiledController) -> None:
         self.law = law
 
     @property
-    def kind(self):
+    def kind(self) -> str:
         """Which law it is, as in controller files."""
         return self.law.kind
 
     @property
-    def rig_name(self):
+    def rig_name(self) -> str:
         """Identity of the rig the rules belong to."""
         return self.law.rig_name
 
     @property
-    def static_inverse(self):
+    def static_inverse(self) -> FloatArray:
         """Table of the law, over the equivalent contraction."""
         return self.law.static_inverse
 
     @property
-    def settings(self):
+    def settings(self) -> dict[str, float]:
         """Return the settings of the law, metres being those of the equivalent contraction."""
         return self.law.settings
 
     @property
-    def rate_hz(self):
+    def rate_hz(self) -> float:
         """Rate [Hz] at which ``step`` is to be called."""
         return self.law.rate_hz
 
     @property
-    def lead_s(self):
+    def lead_s(self) -> float:
         """Preview [s]: how far ahead the lead reference is to be taken."""
         return self.law.lead_s
 
     @property
-    def rules(self):
+    def rules(self) -> RuleBase | None:
         """Rules of the law, None if it has none."""
         return self.law.rules
 
     @property
-    def rules_replaced(self):
+    def rules_replaced(self) -> int:
         """Return how often the rules were exchanged from outside."""
         return self.law.rules_replaced
 
     @property
-    def freeze_learning(self):
+    def freeze_learning(self) -> bool:
         """Whether the rules are kept as they are."""
         return self.law.freeze_learning
 
     @freeze_learning.setter
-    def freeze_learning(self, value):
+    def freeze_learning(self, value: bool) -> None:
         self.law.freeze_learning = value
 
-    def replace_rules(self, rules, where='rules'):
+    def replace_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """Exchange the rules without a step in the command; as of the law."""
         self.law.replace_rules(rules, where)
 
-    def reset_rules(self):
+    def reset_rules(self) -> None:
         """Return to the initial rules without a step in the command."""
         self.law.reset_rules()
 
-    def learning_reason(self):
+    def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
         return self.law.learning_reason()
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         self.law.pause()
 
-    def reset(self):
+    def reset(self) -> None:
         """Return to the initial rules and forget the motion."""
         self.law.reset()
         self.pause()
 
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return YAML text from which ``load_controller`` builds an identical controller."""
         from pam_actuation.control.config import controller_to_yaml
         return controller_to_yaml(self)

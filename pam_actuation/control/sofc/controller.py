@@ -17,15 +17,16 @@
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.settings import checked_settings
-from pam_actuation.control.sofc import layout
-from pam_actuation.control.sofc.credit import ENTRY_SIZE, ring_rows
+from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
+from pam_actuation.control.sofc.records import ENTRY, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
-from pam_actuation.control.sofc.settings import parameter_vector, SCALING, SETTINGS
+from pam_actuation.control.sofc.settings import parameter_array, PARAMETERS, SCALING, SETTINGS
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.errors import InputError
+from pam_sim.records import fields, size_of
 
 
 class SelfOrganizingFuzzyController(CompiledController):
@@ -53,11 +54,11 @@ class SelfOrganizingFuzzyController(CompiledController):
     """
 
     kind = 'sofc'
-    state_names = layout.STATE_NAMES
+    state_names = OUTPUT.names
 
     def __init__(self, static_inverse, settings=None, rules=None, rig_name='', where=None):
         settings = checked_settings(SETTINGS, settings or {}, where)
-        super().__init__(settings, layout.STATE_COUNT, rig_name)
+        super().__init__(settings, STATE, rig_name)
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
             self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
@@ -78,23 +79,24 @@ class SelfOrganizingFuzzyController(CompiledController):
         if rules is not None:
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)
-        self.parameters = parameter_vector(self.settings)
-        rows = ring_rows(*(int(self.parameters[index]) for index in (
-            layout.P_DELAY, layout.P_SPREAD, layout.P_ANSWER)))
-        self._ring = np.zeros((rows, ENTRY_SIZE))
+        self.parameters = parameter_array(self.settings)
+        par = fields(self.parameters, PARAMETERS)
+        rows = ring_rows(int(par.delay_ticks), int(par.spread_ticks), int(par.answer_ticks))
+        self._ring = np.zeros(rows * size_of(ENTRY))
         rules = self.rules
+        self._kept = tuple(array.copy() for array in rules.arrays())
         self._step = sofc_step
         self._arguments = (
             self.parameters, self.static_inverse, rules.arrays(), rules.arrays('_initial'),
-            rules.arrays('_fired'), tuple(array.copy() for array in rules.arrays()), self._ring,
-            self._state, self._inputs, self._outputs)
+            rules.arrays('_fired'), self._kept, self._ring, self._state, self._inputs,
+            self._outputs)
         # Compile, or load what was compiled before, now and not in the first real tick.
         sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)
                     else array.copy() for array in self._arguments))
 
     def learning_reason(self):
         """Return in words whether the last tick learned, or why not."""
-        return REASONS[int(self._outputs[layout.O_REASON])]
+        return REASONS[int(fields(self._outputs, OUTPUT).learning_reason)]
 
     def pause(self):
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
@@ -132,30 +134,28 @@ class SelfOrganizingFuzzyController(CompiledController):
 
     def _keep_output(self, before_pa):
         self.rules_replaced += 1
-        self._ring[:, :] = 0.0        # no credit for rules that are gone
-        self._state[layout.S_HISTORY] = min(self._state[layout.S_HISTORY], 1.0)
-        self._state[layout.S_BEST] = 0.0          # the new rules are judged anew
-        for kept, values in zip(self._arguments[5], self.rules.arrays()):
+        self._ring[:] = 0.0        # no credit for rules that are gone
+        state = fields(self._state, STATE)
+        state.history_ticks = min(state.history_ticks, 1.0)
+        state.best_rms_m = 0.0        # the new rules are judged anew
+        for kept, values in zip(self._kept, self.rules.arrays()):
             kept[...] = values
         change = before_pa - self._rule_output_pa()
         limit = self.settings['integral_limit_pa']
-        shape = self._state[layout.S_INTEGRAL_SHAPE] or 1.0          # 0 before the first tick
-        integral = self._state[layout.S_INTEGRAL] + change / shape
-        self._state[layout.S_INTEGRAL] = min(max(integral, -limit), limit)
+        integral = state.integral_pa + change / (state.integral_shape or 1.0)  # 0 = not begun
+        state.integral_pa = min(max(integral, -limit), limit)
 
     def _rule_output_pa(self):
         """Return the contribution [Pa] of all rule tables where the last tick was."""
-        out = self._outputs
-        share = out[layout.O_SHARE]
+        out = fields(self._outputs, OUTPUT)
+        share = out.contracting_share
         return (
             self.settings['feedback_gain_pa'] * infer_feedback(
-                self.rules.feedback, share,
-                int(out[layout.O_ERROR_SET]), out[layout.O_ERROR_DEGREE],
-                int(out[layout.O_CHANGE_SET]), out[layout.O_CHANGE_DEGREE])
+                self.rules.feedback, share, int(out.error_set), out.error_degree,
+                int(out.change_set), out.change_degree)
             + infer_feedforward(
-                self.rules.feedforward, share,
-                int(out[layout.O_KNOT]), out[layout.O_KNOT_DEGREE])
+                self.rules.feedforward, share, int(out.reference_knot),
+                out.reference_knot_degree)
             + infer_motion(
-                self.rules.motion,
-                int(out[layout.O_MOTION_KNOT]), out[layout.O_MOTION_KNOT_DEGREE],
-                int(out[layout.O_RATE_KNOT]), out[layout.O_RATE_KNOT_DEGREE]))
+                self.rules.motion, int(out.motion_knot), out.motion_knot_degree,
+                int(out.motion_rate_knot), out.motion_rate_knot_degree))

@@ -25,30 +25,16 @@ spread`` ticks later. A spread also keeps fast swings of the error out of the
 rules, without a shift in phase.
 """
 
+from typing import TypeAlias
+
+import numpy as np
 from pam_sim.compiled import compiled
 
-ENTRY_ERROR_SET = 0       # lower active set of the error
-ENTRY_ERROR_DEGREE = 1    # degree of the set above it
-ENTRY_CHANGE_SET = 2
-ENTRY_CHANGE_DEGREE = 3
-ENTRY_SHARE = 4           # degree of 'contracting'
-ENTRY_KNOT = 5            # lower active knot of the reference
-ENTRY_KNOT_DEGREE = 6
-ENTRY_MOTION_KNOT = 7     # the same of the motion rules: position, then rate
-ENTRY_MOTION_KNOT_DEGREE = 8
-ENTRY_RATE_KNOT = 9
-ENTRY_RATE_KNOT_DEGREE = 10
-ENTRY_PASS = 11           # part of a pass this tick was, for the feed-forward rules
-ENTRY_MOTION_PASS = 12    # the same for the motion rules
-ENTRY_CORRECTION = 13     # pressure that mends an index of 1 m there [Pa/m]
-ENTRY_VALID = 14          # 1 = neither saturated nor disturbed when it was active
-ENTRY_OUTPUT = 15         # command [Pa] of that tick
-ENTRY_INDEX = 16          # performance index [m] of that tick, 0 where nothing was learned
-ENTRY_MOVING = 17         # what the integral [Pa] added then beyond its mean
-ENTRY_SIZE = 18
+# Rows of ``records.ENTRY``.
+Ring: TypeAlias = 'np.ndarray[tuple[int], np.dtype[np.record]]'
 
 
-def ring_rows(delay, spread, answer=0):
+def ring_rows(delay: int, spread: int, answer: int = 0) -> int:
     """
     Return the number of rows a ring buffer needs.
 
@@ -59,58 +45,61 @@ def ring_rows(delay, spread, answer=0):
 
 
 @compiled
-def push_feedback(ring, row, i, wi, j, wj, share):
-    """Write the firing strengths of the feedback rules over the oldest entry, ``row``."""
-    ring[row, ENTRY_ERROR_SET] = i
-    ring[row, ENTRY_ERROR_DEGREE] = wi
-    ring[row, ENTRY_CHANGE_SET] = j
-    ring[row, ENTRY_CHANGE_DEGREE] = wj
-    ring[row, ENTRY_SHARE] = share
+def push_feedback(entry: np.record, i: int, wi: float, j: int, wj: float, share: float) -> None:
+    """Write the firing strengths of the feedback rules into an entry."""
+    entry.error_set = i
+    entry.error_degree = wi
+    entry.change_set = j
+    entry.change_degree = wj
+    entry.contracting_share = share
 
 
 @compiled
-def push_feedforward(ring, row, k, wk, m, wm, n, wn):
+def push_feedforward(entry: np.record, k: int, wk: float, m: int, wm: float, n: int,
+                     wn: float) -> None:
     """Write the firing strengths of the feed-forward and the motion rules."""
-    ring[row, ENTRY_KNOT] = k
-    ring[row, ENTRY_KNOT_DEGREE] = wk
-    ring[row, ENTRY_MOTION_KNOT] = m
-    ring[row, ENTRY_MOTION_KNOT_DEGREE] = wm
-    ring[row, ENTRY_RATE_KNOT] = n
-    ring[row, ENTRY_RATE_KNOT_DEGREE] = wn
+    entry.reference_knot = k
+    entry.reference_knot_degree = wk
+    entry.motion_knot = m
+    entry.motion_knot_degree = wm
+    entry.motion_rate_knot = n
+    entry.motion_rate_knot_degree = wn
 
 
 @compiled
 def push_outcome(
-        ring, row, a_pass, motion_pass, correction_pa_per_m, moving_pa, valid, output_pa):
+        entry: np.record, feedforward_pass: float, motion_pass: float,
+        correction_pa_per_m: float, integral_deviation_pa: float, valid: float,
+        command_pa: float) -> None:
     """Write how far the reference passed the rules, what an error is worth, and the command."""
-    ring[row, ENTRY_PASS] = a_pass
-    ring[row, ENTRY_MOTION_PASS] = motion_pass
-    ring[row, ENTRY_CORRECTION] = correction_pa_per_m
-    ring[row, ENTRY_MOVING] = moving_pa
-    ring[row, ENTRY_VALID] = valid
-    ring[row, ENTRY_OUTPUT] = output_pa
+    entry.feedforward_pass = feedforward_pass
+    entry.motion_pass = motion_pass
+    entry.correction_pa_per_m = correction_pa_per_m
+    entry.integral_deviation_pa = integral_deviation_pa
+    entry.valid = valid
+    entry.command_pa = command_pa
 
 
 @compiled
-def row_of(ring, tick, ago):
+def row_of(ring: Ring, tick: int, ago: int) -> int:
     """Return the row of the entry ``ago`` ticks before ``tick``."""
     return (tick - ago) % ring.shape[0]
 
 
 @compiled
-def kernel_weight(offset, spread):
+def kernel_weight(offset: int, spread: int) -> float:
     """Return the triangular weight of the entry ``offset`` ticks off the credit delay."""
     side = spread + 1
     return (side - abs(offset)) / (side * side)
 
 
 @compiled
-def credited_index(ring, tick, spread):
+def credited_index(ring: Ring, tick: int, spread: int) -> float:
     """Return the index [m] that belongs to the rules of ``delay + spread`` ticks ago."""
     row = row_of(ring, tick, 2 * spread)
     total = 0.0
     for offset in range(-spread, spread + 1):
-        total += kernel_weight(offset, spread) * ring[row, ENTRY_INDEX]
+        total += kernel_weight(offset, spread) * ring[row].index_m
         row += 1
         if row == ring.shape[0]:
             row = 0

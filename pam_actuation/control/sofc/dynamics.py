@@ -29,9 +29,9 @@ at rest with no acceleration (minimum jerk, Flash and Hogan 1985), or along
 lag of a valve asks for the change of pressure, and that has the jerk in it.
 """
 
-from pam_actuation.control import inputs as place
-from pam_actuation.control.sofc import layout as at
-from pam_actuation.control.static_inverse import inverse_pressure_pa
+import numpy as np
+from pam_actuation.control.static_inverse import grid_of, GRID_SIZE, inverse_pressure_pa
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 
 _SLOPE_BASE_M = 5e-4      # the slope of the static inverse is taken over twice this
@@ -41,21 +41,21 @@ _LEAST_SHAPE = 0.5        # of the integral, its inverse the largest
 
 
 @compiled
-def jumps(par, st, inp):
+def jumps(par: np.record, st: np.record, inp: np.record) -> tuple[float, float]:
     """Return by how much reference and lead reference jumped against their rates [m]."""
-    period = par[at.P_PERIOD]
-    now = (inp[place.IN_REFERENCE] - st[at.S_REFERENCE]
-           - inp[place.IN_REFERENCE_RATE] * period)
-    lead = (inp[place.IN_LEAD_REFERENCE] - st[at.S_LEAD_REFERENCE]
-            - inp[place.IN_LEAD_RATE] * period)
-    st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
-    st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
-    return (now if abs(now) > par[at.P_JUMP] else 0.0,
-            lead if abs(lead) > par[at.P_JUMP] else 0.0)
+    period = par.period_s
+    now = (inp.reference_m - st.reference_m
+           - inp.reference_rate_m_per_s * period)
+    lead = (inp.lead_reference_m - st.lead_reference_m
+            - inp.lead_rate_m_per_s * period)
+    st.reference_m = inp.reference_m
+    st.lead_reference_m = inp.lead_reference_m
+    return (now if abs(now) > par.jump_m else 0.0,
+            lead if abs(lead) > par.jump_m else 0.0)
 
 
 @compiled
-def to_go(size_m, left_s, duration_s, form):
+def to_go(size_m: float, left_s: float, duration_s: float, form: float) -> tuple[float, float]:
     """Return how much of a move is still to come [m] and the rate it has now [m/s]."""
     if not left_s > 0.0:
         return 0.0, 0.0
@@ -70,78 +70,81 @@ def to_go(size_m, left_s, duration_s, form):
 
 
 @compiled
-def smooth_jump(par, st, jump_m, wait_s, s_size, s_left):
+def smooth_jump(par: np.record, move: np.record, jump_m: float,
+                wait_s: float) -> tuple[float, float]:
     """
     Take up a jump in one of the two references; return what is to go [m] and its rate.
 
-    ``wait_s``: the move begins so much later.
+    ``move`` is a ``records.MOVE``; ``wait_s``: it begins so much later.
     """
-    duration = par[at.P_JUMP_TIME]
+    duration = par.jump_time_s
     if not duration > 0.0:
         return 0.0, 0.0
     if jump_m != 0.0:
-        rest, _ = to_go(st[s_size], st[s_left], duration, par[at.P_JUMP_FORM])
-        st[s_size] = rest + jump_m
-        st[s_left] = duration + wait_s
-    rest, rate = to_go(st[s_size], st[s_left], duration, par[at.P_JUMP_FORM])
-    st[s_left] = max(0.0, st[s_left] - par[at.P_PERIOD])
+        rest, _ = to_go(move.size_m, move.left_s, duration, par.jump_form)
+        move.size_m = rest + jump_m
+        move.left_s = duration + wait_s
+    rest, rate = to_go(move.size_m, move.left_s, duration, par.jump_form)
+    move.left_s = max(0.0, move.left_s - par.period_s)
     return rest, rate
 
 
 @compiled
-def note_jump(st, rate_m_per_s):
+def note_jump(st: np.record, rate_m_per_s: float) -> None:
     """Remember a jump until the reference moves by itself."""
-    if st[at.S_JUMP_LEFT] > 0.0 or st[at.S_LEAD_JUMP_LEFT] > 0.0:
-        st[at.S_JUMPED] = 1.0
+    if st.move.left_s > 0.0 or st.lead_move.left_s > 0.0:
+        st.jumped = 1.0
     elif rate_m_per_s != 0.0:
-        st[at.S_JUMPED] = 0.0
+        st.jumped = 0.0
 
 
 @compiled
-def slope_pa_per_m(table, contraction_m):
+def slope_pa_per_m(table: FloatArray, contraction_m: float) -> float:
     """Return the slope of the static inverse, never below a part of its mean."""
-    nodes = table.shape[0] - 2
-    mean = (table[table.shape[0] - 1] - table[2]) / ((nodes - 1) * table[1])
+    pressure_pa = table[GRID_SIZE:]
+    last = pressure_pa.shape[0] - 1
+    mean = (pressure_pa[last] - pressure_pa[0]) / (last * grid_of(table).step_m)
     rise = (inverse_pressure_pa(table, contraction_m + _SLOPE_BASE_M)
             - inverse_pressure_pa(table, contraction_m - _SLOPE_BASE_M))
     return max(0.5 * rise / _SLOPE_BASE_M, _LEAST_SLOPE * mean)
 
 
 @compiled
-def load_shape(par, contraction_m):
+def load_shape(par: np.record, contraction_m: float) -> float:
     """
     Return which part of the integral counts at a contraction, 1 in the middle of the range.
 
     The more a muscle has contracted the less force a pascal makes: what a load beyond the
     nominal one takes is no constant pressure but grows with contraction.
     """
-    middle = 0.5 * (par[at.P_REFERENCE_LOWER] + par[at.P_REFERENCE_UPPER])
-    shape = 1.0 + par[at.P_INTEGRAL_GROWTH] * (contraction_m - middle)
+    middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
+    shape = 1.0 + par.integral_growth_per_m * (contraction_m - middle)
     return min(max(shape, _LEAST_SHAPE), 1.0 / _LEAST_SHAPE)
 
 
 @compiled
-def dynamic_pressure_pa(par, st, static_pa, rate_m_per_s, rate_jumped):
+def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_per_s: float,
+                        rate_jumped: bool) -> float:
     """
     Return what moving takes beyond the static pressure [Pa]; advances the filters.
 
     ``rate_jumped``: the rate of before means nothing.
     """
-    period = par[at.P_PERIOD]
+    period = par.period_s
     if rate_jumped:
-        st[at.S_LEAD_RATE] = rate_m_per_s
-        st[at.S_ACCELERATION] = 0.0
-    raw = (rate_m_per_s - st[at.S_LEAD_RATE]) / period
-    st[at.S_LEAD_RATE] = rate_m_per_s
-    part = period / (par[at.P_ACCELERATION_FILTER] + period)
-    st[at.S_ACCELERATION] += part * (raw - st[at.S_ACCELERATION])
-    if abs(st[at.S_ACCELERATION]) < _ACCELERATION_FLOOR_M_PER_S2:
-        st[at.S_ACCELERATION] = 0.0
-    moving = (par[at.P_RATE_FEEDFORWARD] * rate_m_per_s
-              + par[at.P_ACCELERATION_FEEDFORWARD] * st[at.S_ACCELERATION])
+        st.lead_rate_m_per_s = rate_m_per_s
+        st.acceleration_m_per_s2 = 0.0
+    raw = (rate_m_per_s - st.lead_rate_m_per_s) / period
+    st.lead_rate_m_per_s = rate_m_per_s
+    part = period / (par.acceleration_filter_s + period)
+    st.acceleration_m_per_s2 += part * (raw - st.acceleration_m_per_s2)
+    if abs(st.acceleration_m_per_s2) < _ACCELERATION_FLOOR_M_PER_S2:
+        st.acceleration_m_per_s2 = 0.0
+    moving = (par.rate_feedforward_pa_s_per_m * rate_m_per_s
+              + par.acceleration_feedforward_pa_s2_per_m * st.acceleration_m_per_s2)
     quasi_static = static_pa + moving
     if rate_jumped:
-        st[at.S_QUASI_STATIC] = quasi_static
-    lag = par[at.P_VALVE_LAG] * (quasi_static - st[at.S_QUASI_STATIC]) / period
-    st[at.S_QUASI_STATIC] = quasi_static
+        st.quasi_static_pa = quasi_static
+    lag = par.valve_lag_s * (quasi_static - st.quasi_static_pa) / period
+    st.quasi_static_pa = quasi_static
     return moving + lag

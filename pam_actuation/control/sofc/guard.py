@@ -30,7 +30,8 @@ the rules.
 
 import math
 
-from pam_actuation.control.sofc import layout as at
+import numpy as np
+from pam_actuation.control.sofc.rule_table import Tables
 from pam_sim.compiled import compiled
 
 _SAME_SPEED = 0.25        # windows whose mean speeds differ by more are not compared
@@ -42,85 +43,88 @@ _LEAST_FACTOR = 1.0 / 64.0
 
 
 @compiled
-def keep(values, kept):
+def keep(values: Tables, kept: Tables) -> None:
     """Copy the rules of all tables."""
+    feedback, feedforward, motion = values
+    kept_feedback, kept_feedforward, kept_motion = kept
     for d in range(2):
-        for i in range(values[0].shape[1]):
-            for j in range(values[0].shape[2]):
-                kept[0][d, i, j] = values[0][d, i, j]
-        for k in range(values[1].shape[1]):
-            kept[1][d, k] = values[1][d, k]
-    for m in range(values[2].shape[0]):
-        for n in range(values[2].shape[1]):
-            kept[2][m, n] = values[2][m, n]
+        for i in range(feedback.shape[1]):
+            for j in range(feedback.shape[2]):
+                kept_feedback[d, i, j] = feedback[d, i, j]
+        for k in range(feedforward.shape[1]):
+            kept_feedforward[d, k] = feedforward[d, k]
+    for m in range(motion.shape[0]):
+        for n in range(motion.shape[1]):
+            kept_motion[m, n] = motion[m, n]
 
 
 @compiled
-def restart_window(st):
+def restart_window(st: np.record) -> None:
     """Forget what was collected."""
-    st[at.S_WINDOW_TICKS] = 0.0
-    st[at.S_WINDOW_SQUARES] = 0.0
-    st[at.S_WINDOW_TRAVEL] = 0.0
-    st[at.S_TURNS] = 0.0
+    st.window.ticks = 0.0
+    st.window.squares_m2 = 0.0
+    st.window.speeds_m_per_s = 0.0
+    st.window.turns = 0.0
 
 
 @compiled
-def _turned(st, rate_m_per_s):
+def _turned(st: np.record, rate_m_per_s: float) -> bool:
     """Tell whether the reference turned round in this tick."""
     if abs(rate_m_per_s) <= _STILL_M_PER_S:
         return False
     moving = math.copysign(1.0, rate_m_per_s)
-    turned = moving * st[at.S_MOVING] < 0.0
-    st[at.S_MOVING] = moving
+    turned = moving * st.direction < 0.0
+    st.direction = moving
     return turned
 
 
 @compiled
-def _new_best(st, rms, values, kept):
+def _new_best(st: np.record, rms: float, values: Tables, kept: Tables) -> None:
     """Take a window as the one to compare with."""
-    st[at.S_BEST] = rms
-    st[at.S_BAD_WINDOWS] = 0.0
+    st.best_rms_m = rms
+    st.bad_windows = 0.0
     keep(values, kept)
 
 
 @compiled
-def _judge(par, st, values, kept):
+def _judge(par: np.record, st: np.record, values: Tables, kept: Tables) -> bool:
     """Compare a full window with the best one; return whether to roll back."""
-    rms = math.sqrt(st[at.S_WINDOW_SQUARES] / st[at.S_WINDOW_TICKS])
-    speed = st[at.S_WINDOW_TRAVEL] / st[at.S_WINDOW_TICKS]
-    former = st[at.S_FORMER]
-    st[at.S_FORMER] = rms
-    best = st[at.S_BEST]
-    if best <= 0.0 or abs(speed - st[at.S_BEST_SPEED]) > _SAME_SPEED * st[at.S_BEST_SPEED]:
-        st[at.S_BEST_SPEED] = speed
-        st[at.S_RATE_FACTOR] = 1.0
+    rms = math.sqrt(st.window.squares_m2 / st.window.ticks)
+    speed = st.window.speeds_m_per_s / st.window.ticks
+    former = st.former_rms_m
+    st.former_rms_m = rms
+    best = st.best_rms_m
+    if best <= 0.0 or abs(speed - st.best_speed_m_per_s) > _SAME_SPEED * st.best_speed_m_per_s:
+        st.best_speed_m_per_s = speed
+        st.rate_factor = 1.0
         _new_best(st, rms, values, kept)
         return False
-    if rms <= par[at.P_GUARD_RATIO] * best + par[at.P_DEAD_ZONE]:
-        st[at.S_BAD_WINDOWS] = 0.0
+    if rms <= par.guard_ratio * best + par.dead_zone_m:
+        st.bad_windows = 0.0
         if rms < best:
-            st[at.S_RATE_CEILING] = min(1.0, 2.0 * st[at.S_RATE_CEILING])
+            st.rate_ceiling = min(1.0, 2.0 * st.rate_ceiling)
             _new_best(st, rms, values, kept)
         if rms > _FALLING * best:
-            st[at.S_RATE_FACTOR] = max(
-                par[at.P_ANNEAL_FLOOR], par[at.P_ANNEAL] * st[at.S_RATE_FACTOR])
+            st.rate_factor = max(
+                par.anneal_floor, par.anneal * st.rate_factor)
         return False
-    st[at.S_RATE_FACTOR] = 1.0
-    st[at.S_BAD_WINDOWS] += 1.0
-    if st[at.S_BAD_WINDOWS] <= 1.0:
-        st[at.S_FIRST_BAD] = rms
+    st.rate_factor = 1.0
+    st.bad_windows += 1.0
+    if st.bad_windows <= 1.0:
+        st.first_bad_rms_m = rms
         return False
     if rms > _GROWING * former:
         return True
-    if st[at.S_BAD_WINDOWS] >= _NEW_NORMAL:
-        if rms > _GROWING * st[at.S_FIRST_BAD]:
+    if st.bad_windows >= _NEW_NORMAL:
+        if rms > _GROWING * st.first_bad_rms_m:
             return True
         _new_best(st, rms, values, kept)
     return False
 
 
 @compiled
-def watch(par, st, error_m, rate_m_per_s, values, kept):
+def watch(par: np.record, st: np.record, error_m: float, rate_m_per_s: float, values: Tables,
+          kept: Tables) -> bool:
     """
     Add one tick of learning; roll back where it made things worse.
 
@@ -131,21 +135,21 @@ def watch(par, st, error_m, rate_m_per_s, values, kept):
 
     """
     turned = _turned(st, rate_m_per_s)
-    st[at.S_WINDOW_TICKS] += 1.0
-    st[at.S_WINDOW_SQUARES] += error_m * error_m
-    st[at.S_WINDOW_TRAVEL] += abs(rate_m_per_s)
+    st.window.ticks += 1.0
+    st.window.squares_m2 += error_m * error_m
+    st.window.speeds_m_per_s += abs(rate_m_per_s)
     if not turned:
         return False
-    st[at.S_TURNS] += 1.0
-    if (st[at.S_TURNS] % 2.0 != 0.0
-            or st[at.S_WINDOW_TICKS] * par[at.P_PERIOD] < par[at.P_GUARD_WINDOW]):
+    st.window.turns += 1.0
+    if (st.window.turns % 2.0 != 0.0
+            or st.window.ticks * par.period_s < par.guard_window_s):
         return False
     worse = _judge(par, st, values, kept)
     restart_window(st)
     if worse:
         keep(kept, values)
-        st[at.S_RATE_CEILING] = max(_LEAST_FACTOR, 0.5 * st[at.S_RATE_CEILING])
-        st[at.S_BEST] = 0.0          # the restored rules are judged anew
-        st[at.S_BAD_WINDOWS] = 0.0
-        st[at.S_ROLLED_BACK] += 1.0
+        st.rate_ceiling = max(_LEAST_FACTOR, 0.5 * st.rate_ceiling)
+        st.best_rms_m = 0.0          # the restored rules are judged anew
+        st.bad_windows = 0.0
+        st.times_rolled_back += 1.0
     return worse

@@ -31,13 +31,17 @@ Automatica 15, 1979).
 
 from dataclasses import dataclass, field
 import hashlib
+from typing import TypeAlias
 
 import numpy as np
 from pam_actuation.control.sofc.membership import (
     SET_COUNT, SET_WORDS, signed_logarithmic_knots)
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.short_repr import short_repr
 
+# Feedback, feed-forward and motion rules.
+Tables: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 CONTRACTING, EXTENDING = 0, 1
 DIRECTIONS = ('contracting', 'extending')
 

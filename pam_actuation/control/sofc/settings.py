@@ -13,15 +13,17 @@
 # limitations under the License.
 
 """
-Settings of the self-organizing fuzzy controller and their places in compiled code.
+Settings of the self-organizing fuzzy controller and the record its compiled code reads.
 
-The order of ``SETTINGS`` is the order of the parameter vector: ``P_<NAME>`` in
-``layout`` are the indices. Derived entries (period, delays in ticks) follow.
+A setting is one entry of ``SETTINGS``; its field in ``PARAMETERS``, its key, default and
+range in files follow from it.
 """
 
-import numpy as np
-from pam_actuation.control.settings import Setting
-from pam_actuation.control.sofc import layout
+from collections.abc import Mapping
+
+from pam_actuation.control.settings import parameter_record, Setting
+from pam_sim.annotations import FloatArray
+from pam_sim.records import values_of
 
 SETTINGS = (
     Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
@@ -121,7 +123,13 @@ SETTINGS = (
             'factor of motion_learning from a jump until the reference moves by itself'),
 )
 
-NAMES = tuple(setting.name for setting in SETTINGS)
+PARAMETERS = parameter_record(
+    SETTINGS,
+    'period_s',
+    'delay_ticks',                    # credit delay
+    'spread_ticks',                   # credit spread, at most the delay
+    'answer_ticks',                   # from a command to the answer of the valve
+)
 
 # What rules mean depends on these; a file of rules must agree in all of them.
 SCALING = (
@@ -131,17 +139,12 @@ SCALING = (
     'motion_rate_fine_m_per_s')
 
 
-def parameter_vector(values):
-    """Return the parameter vector of compiled code for checked settings (a dict)."""
-    vector = np.zeros(layout.PARAMETER_COUNT)
-    for index, name in enumerate(NAMES):
-        vector[index] = values[name]
+def parameter_array(values: Mapping[str, float]) -> FloatArray:
+    """Return the array of ``PARAMETERS`` for checked settings."""
     period_s = 1.0 / values['rate_hz']
-    vector[layout.P_PERIOD] = period_s
-    vector[layout.P_DELAY] = round(values['credit_delay_s'] / period_s)
-    vector[layout.P_SPREAD] = round(values['credit_spread_s'] / period_s)
-    # The preview covers the dead time; what the valve lags besides is filtered.
-    vector[layout.P_ANSWER] = round(values['lead_s'] / period_s)
-    if vector[layout.P_SPREAD] > vector[layout.P_DELAY]:
-        vector[layout.P_SPREAD] = vector[layout.P_DELAY]
-    return vector
+    delay = round(values['credit_delay_s'] / period_s)
+    return values_of(PARAMETERS, {
+        **values, 'period_s': period_s, 'delay_ticks': delay,
+        'spread_ticks': min(round(values['credit_spread_s'] / period_s), delay),
+        # The preview covers the dead time; what the valve lags besides is filtered.
+        'answer_ticks': round(values['lead_s'] / period_s)})

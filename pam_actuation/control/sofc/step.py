@@ -21,20 +21,26 @@ memory of the firing strengths; modification of the rules that were active one
 credit delay ago; roll-back.
 """
 
+from collections.abc import Callable
 import math
 
-from numba import njit
-from pam_actuation.control import inputs as place
+import numpy as np
+from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.sofc import credit, dynamics, guard, layout as at, learning
+from pam_actuation.control.sofc import credit, dynamics, guard, learning
+from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
 from pam_actuation.control.sofc.performance_index import index_linear, index_table
+from pam_actuation.control.sofc.records import ENTRY, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import (
-    contracting_share, infer_feedback, infer_feedforward, infer_motion)
+    contracting_share, infer_feedback, infer_feedforward, infer_motion, Tables)
+from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
-from pam_sim.compiled import compiled, source_key
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.records import part
 from pam_sim.units import P_ATM_PA
 
 _START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
@@ -43,143 +49,151 @@ _LIFTED_M = 5e-4          # below this contraction the pressure at rest says not
 
 
 @compiled
-def _start(par, inverse, values, kept, st, inp):
+def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st: np.record,
+           inp: np.record) -> None:
     """Begin so that the reference starts where the muscle is and the command where it is."""
-    x = inp[place.IN_CONTRACTION]
-    st[:] = 0.0
-    st[at.S_STARTED] = 1.0
-    st[at.S_RATE_FACTOR] = 1.0
-    st[at.S_RATE_CEILING] = 1.0
-    st[at.S_SHARE] = 0.5
-    st[at.S_OFFSET] = inp[place.IN_REFERENCE] - x
-    st[at.S_CONTRACTION] = x
-    st[at.S_REFERENCE] = inp[place.IN_REFERENCE]
-    st[at.S_LEAD_REFERENCE] = inp[place.IN_LEAD_REFERENCE]
+    x = inp.contraction_m
+    st.started = 1.0
+    st.integral_pa = 0.0      # where rules were exchanged before the first tick
+    st.rate_factor = 1.0
+    st.rate_ceiling = 1.0
+    st.contracting_share = 0.5
+    st.offset_m = inp.reference_m - x
+    st.contraction_m = x
+    st.reference_m = inp.reference_m
+    st.lead_reference_m = inp.lead_reference_m
     guard.keep(values, kept)
-    pressure = inp[place.IN_PRESSURE]
-    st[at.S_OUTPUT] = first_command_pa(
-        pressure, P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE],
-        P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE])
+    pressure = inp.pressure_pa
+    st.command_pa = first_command_pa(
+        pressure, P_ATM_PA + par.min_pressure_gauge_pa,
+        P_ATM_PA + par.max_pressure_gauge_pa)
     if math.isfinite(pressure) and x > _LIFTED_M:
         trim = (pressure - inverse_pressure_pa(inverse, x)) / dynamics.load_shape(par, x)
-        st[at.S_INTEGRAL] = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
-        st[at.S_INTEGRAL_MEAN] = st[at.S_INTEGRAL]
+        st.integral_pa = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
+        st.integral_mean_pa = st.integral_pa
 
 
 @compiled
-def _valve_lags(par, ring, st, inp):
+def _valve_lags(par: np.record, ring: Ring, st: np.record, inp: np.record) -> bool:
     """
     Tell whether the measured pressure is far from what the commands should have made of it.
 
     Expected is the command of one preview ago behind the lag of the valve.
     """
-    if st[at.S_HISTORY] < par[at.P_ANSWER]:
-        st[at.S_EXPECTED] = inp[place.IN_PRESSURE]
+    if st.history_ticks < par.answer_ticks:
+        st.expected_pa = inp.pressure_pa
         return False
-    then = credit.row_of(ring, int(st[at.S_TICK]), int(par[at.P_ANSWER]))
-    arrived = ring[then, credit.ENTRY_OUTPUT]
-    if not math.isfinite(st[at.S_EXPECTED]):
-        st[at.S_EXPECTED] = arrived
-    part = par[at.P_PERIOD] / (par[at.P_VALVE_LAG] + par[at.P_PERIOD])
-    st[at.S_EXPECTED] += part * (arrived - st[at.S_EXPECTED])
-    gap = abs(st[at.S_EXPECTED] - inp[place.IN_PRESSURE])
-    return gap > par[at.P_VALVE_GAP]          # False for NaN: pressure is optional
+    then = credit.row_of(ring, int(st.tick), int(par.answer_ticks))
+    arrived = ring[then].command_pa
+    if not math.isfinite(st.expected_pa):
+        st.expected_pa = arrived
+    part = par.period_s / (par.valve_lag_s + par.period_s)
+    st.expected_pa += part * (arrived - st.expected_pa)
+    gap = abs(st.expected_pa - inp.pressure_pa)
+    return gap > par.valve_gap_pa          # False for NaN: pressure is optional
 
 
 @compiled
-def _surprising(par, st, error):
+def _surprising(par: np.record, st: np.record, error: float) -> bool:
     """Tell whether an error is out of proportion to those of the last window."""
-    return abs(error) > par[at.P_SURPRISE] * st[at.S_FORMER] > 0.0
+    return abs(error) > par.surprise_ratio * st.former_rms_m > 0.0
 
 
 @compiled
-def _reason(par, ring, st, inp, error, at_limit, lags):
+def _reason(par: np.record, ring: Ring, st: np.record, inp: np.record, error: float,
+            at_limit: bool, lags: bool) -> int:
     """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
-    tick = int(st[at.S_TICK])
-    delay = int(par[at.P_DELAY])
-    spread = int(par[at.P_SPREAD])
-    if inp[place.IN_LEARN] < 0.5:
+    tick = int(st.tick)
+    delay = int(par.delay_ticks)
+    spread = int(par.spread_ticks)
+    if inp.learning < 0.5:
         return learning.FROZEN_OFF
-    if st[at.S_HISTORY] < delay + spread or abs(st[at.S_OFFSET]) > _START_BAND_M:
-        if st[at.S_ROLLED_BACK] > 0.0 and st[at.S_HISTORY] < delay + spread:
+    if st.history_ticks < delay + spread or abs(st.offset_m) > _START_BAND_M:
+        if st.times_rolled_back > 0.0 and st.history_ticks < delay + spread:
             return learning.FROZEN_ROLLED_BACK
         return learning.FROZEN_START
     if lags:
         return learning.FROZEN_VALVE
-    if st[at.S_FREEZE_LEFT] > 0.0:
+    if st.freeze_left_s > 0.0:
         return learning.FROZEN_JUMP
-    force = inp[place.IN_FORCE]
-    if force < par[at.P_SLACK_FORCE]:         # False for NaN: force is optional
+    force = inp.force_n
+    if force < par.slack_force_n:         # False for NaN: force is optional
         return learning.FROZEN_SLACK
     then = credit.row_of(ring, tick, delay)
-    if at_limit or ring[then, credit.ENTRY_VALID] < 0.5:
+    if at_limit or ring[then].valid < 0.5:
         return learning.FROZEN_SATURATED
     if _surprising(par, st, error):
         return learning.FROZEN_SURPRISE
-    if abs(error) <= par[at.P_DEAD_ZONE]:
+    if abs(error) <= par.dead_zone_m:
         return learning.FROZEN_DEAD_ZONE
     return learning.LEARNING
 
 
 @compiled
-def _learn(par, values, initial, ring, st):
+def _learn(par: np.record, values: Tables, initial: Tables, ring: Ring,
+           st: np.record) -> tuple[float, float, float]:
     """Modify the rules whose indices are now all known; return the squares of the changes."""
-    tick = int(st[at.S_TICK])
-    spread = int(par[at.P_SPREAD])
-    row = credit.row_of(ring, tick, int(par[at.P_DELAY]) + spread)
+    feedback, feedforward, motion = values
+    first_feedback, first_feedforward, first_motion = initial
+    tick = int(st.tick)
+    spread = int(par.spread_ticks)
+    entry = ring[credit.row_of(ring, tick, int(par.delay_ticks) + spread)]
     index = credit.credited_index(ring, tick, spread)
-    if index == 0.0 or ring[row, credit.ENTRY_VALID] < 0.5:
+    if index == 0.0 or entry.valid < 0.5:
         return 0.0, 0.0, 0.0
-    rate = par[at.P_LEARNING_RATE] * st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
-    leak = abs(index) * par[at.P_PERIOD]
-    share = ring[row, credit.ENTRY_SHARE]
+    rate = par.learning_rate * st.rate_factor * st.rate_ceiling
+    leak = abs(index) * par.period_s
+    share = entry.contracting_share
     fb_squares = learning.modify_feedback(
-        values[0], initial[0], share,
-        int(ring[row, credit.ENTRY_ERROR_SET]), ring[row, credit.ENTRY_ERROR_DEGREE],
-        int(ring[row, credit.ENTRY_CHANGE_SET]), ring[row, credit.ENTRY_CHANGE_DEGREE],
-        rate * index * par[at.P_PERIOD] * par[at.P_FEEDBACK_LEARNING],
-        leak * par[at.P_FEEDBACK_LEAK], par[at.P_FEEDBACK_STEP_LIMIT])
+        feedback, first_feedback, share,
+        int(entry.error_set), entry.error_degree,
+        int(entry.change_set), entry.change_degree,
+        rate * index * par.period_s * par.feedback_learning_per_m_s,
+        leak * par.feedback_leak_per_m_s, par.feedback_step_limit)
     # What the index asks for in pressure, for one pass.
     wanted_pa = rate * (
-        index * ring[row, credit.ENTRY_CORRECTION]
-        + par[at.P_TAKEOVER] * ring[row, credit.ENTRY_MOVING])
+        index * entry.correction_pa_per_m
+        + par.takeover * entry.integral_deviation_pa)
     ff_squares = learning.modify_feedforward(
-        values[1], initial[1], share,
-        int(ring[row, credit.ENTRY_KNOT]), ring[row, credit.ENTRY_KNOT_DEGREE],
-        wanted_pa * ring[row, credit.ENTRY_PASS] * par[at.P_FEEDFORWARD_LEARNING],
-        leak * par[at.P_FEEDFORWARD_LEAK],
-        par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
-    if st[at.S_JUMPED] > 0.0:
-        wanted_pa *= par[at.P_JUMP_MOTION_LEARNING]
+        feedforward, first_feedforward, share,
+        int(entry.reference_knot), entry.reference_knot_degree,
+        wanted_pa * entry.feedforward_pass * par.feedforward_learning,
+        leak * par.feedforward_leak_per_m_s,
+        par.feedforward_step_limit_pa, par.feedforward_limit_pa)
+    if st.jumped > 0.0:
+        wanted_pa *= par.jump_motion_learning
     motion_squares = learning.modify_motion(
-        values[2], initial[2],
-        int(ring[row, credit.ENTRY_MOTION_KNOT]), ring[row, credit.ENTRY_MOTION_KNOT_DEGREE],
-        int(ring[row, credit.ENTRY_RATE_KNOT]), ring[row, credit.ENTRY_RATE_KNOT_DEGREE],
-        wanted_pa * ring[row, credit.ENTRY_MOTION_PASS] * par[at.P_MOTION_LEARNING],
-        leak * par[at.P_FEEDFORWARD_LEAK],
-        par[at.P_FEEDFORWARD_STEP_LIMIT], par[at.P_FEEDFORWARD_LIMIT])
+        motion, first_motion,
+        int(entry.motion_knot), entry.motion_knot_degree,
+        int(entry.motion_rate_knot), entry.motion_rate_knot_degree,
+        wanted_pa * entry.motion_pass * par.motion_learning,
+        leak * par.feedforward_leak_per_m_s,
+        par.feedforward_step_limit_pa, par.feedforward_limit_pa)
     return fb_squares, ff_squares, motion_squares
 
 
 @compiled
-def _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn):
+def _count(fired: Tables, share: float, i: int, wi: float, j: int, wj: float, k: int, wk: float,
+           m: int, wm: float, n: int, wn: float) -> None:
     """Add the firing strengths of this tick to the counts of the rules."""
+    feedback, feedforward, motion = fired
     for d in range(2):
         direction = share if d == 0 else 1.0 - share
-        fired[0][d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
-        fired[0][d, i, j + 1] += direction * (1.0 - wi) * wj
-        fired[0][d, i + 1, j] += direction * wi * (1.0 - wj)
-        fired[0][d, i + 1, j + 1] += direction * wi * wj
-        fired[1][d, k] += direction * (1.0 - wk)
-        fired[1][d, k + 1] += direction * wk
-    fired[2][m, n] += (1.0 - wm) * (1.0 - wn)
-    fired[2][m, n + 1] += (1.0 - wm) * wn
-    fired[2][m + 1, n] += wm * (1.0 - wn)
-    fired[2][m + 1, n + 1] += wm * wn
+        feedback[d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
+        feedback[d, i, j + 1] += direction * (1.0 - wi) * wj
+        feedback[d, i + 1, j] += direction * wi * (1.0 - wj)
+        feedback[d, i + 1, j + 1] += direction * wi * wj
+        feedforward[d, k] += direction * (1.0 - wk)
+        feedforward[d, k + 1] += direction * wk
+    motion[m, n] += (1.0 - wm) * (1.0 - wn)
+    motion[m, n + 1] += (1.0 - wm) * wn
+    motion[m + 1, n] += wm * (1.0 - wn)
+    motion[m + 1, n + 1] += wm * wn
 
 
 @compiled
-def _passes(par, st, knot_place, motion_place, rate_place):
+def _passes(par: np.record, st: np.record, knot_place: float, motion_place: float,
+            rate_place: float) -> tuple[float, float]:
     """
     Return which part of a pass over the feed-forward and the motion rules this tick was.
 
@@ -188,238 +202,253 @@ def _passes(par, st, knot_place, motion_place, rate_place):
     error of the rules, later it is creep. Motion rules do not know from which side the
     muscle came to rest, so less of that may count for them (``motion_at_rest``).
     """
-    still = par[at.P_PERIOD] / par[at.P_PASS_TIME]
-    if st[at.S_JUMP_LEFT] > 0.0:
-        st[at.S_SETTLING_LEFT] = par[at.P_SETTLING_TIME]
-    elif st[at.S_SETTLING_LEFT] > 0.0:
-        st[at.S_SETTLING_LEFT] -= par[at.P_PERIOD]
-        still *= par[at.P_SETTLING_PASSES]
+    still = par.period_s / par.pass_time_s
+    if st.move.left_s > 0.0:
+        st.settling_left_s = par.settling_time_s
+    elif st.settling_left_s > 0.0:
+        st.settling_left_s -= par.period_s
+        still *= par.settling_passes
     a_pass = still
-    motion_pass = still * par[at.P_MOTION_AT_REST]
-    if st[at.S_HISTORY] > 0.0:
-        by_position = motion_place - st[at.S_MOTION_PLACE]
-        by_rate = rate_place - st[at.S_RATE_PLACE]
-        a_pass += abs(knot_place - st[at.S_PLACE])
+    motion_pass = still * par.motion_at_rest
+    if st.history_ticks > 0.0:
+        by_position = motion_place - st.motion_knot_place
+        by_rate = rate_place - st.motion_rate_place
+        a_pass += abs(knot_place - st.knot_place)
         motion_pass += math.sqrt(by_position * by_position + by_rate * by_rate)
-    st[at.S_PLACE] = knot_place
-    st[at.S_MOTION_PLACE] = motion_place
-    st[at.S_RATE_PLACE] = rate_place
+    st.knot_place = knot_place
+    st.motion_knot_place = motion_place
+    st.motion_rate_place = rate_place
     return min(a_pass, 1.0), min(motion_pass, 1.0)
 
 
 @compiled
-def _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out):
+def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
+          kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``sofc_step``."""
-    period = par[at.P_PERIOD]
-    if st[at.S_STARTED] < 0.5:
+    feedback_rules, feedforward_rules, motion_rules = values
+    period = par.period_s
+    if st.started < 0.5:
         _start(par, inverse, values, kept, st, inp)
     jump, lead_jump = dynamics.jumps(par, st, inp)
     # A jump not seen ahead: the move can only begin one preview from now.
-    wait = par[at.P_LEAD] if lead_jump != 0.0 else 0.0
-    to_go, extra_rate = dynamics.smooth_jump(par, st, jump, wait, at.S_JUMP, at.S_JUMP_LEFT)
-    lead_to_go, lead_extra_rate = dynamics.smooth_jump(
-        par, st, lead_jump, 0.0, at.S_LEAD_JUMP, at.S_LEAD_JUMP_LEFT)
+    wait = par.lead_s if lead_jump != 0.0 else 0.0
+    to_go, extra_rate = dynamics.smooth_jump(par, st.move, jump, wait)
+    lead_to_go, lead_extra_rate = dynamics.smooth_jump(par, st.lead_move, lead_jump, 0.0)
     change = filtered_change(
-        st[at.S_RATE], par[at.P_CHANGE_FILTER], inp[place.IN_REFERENCE_RATE] + extra_rate,
-        inp[place.IN_CONTRACTION] - st[at.S_CONTRACTION], inp[place.IN_ELAPSED], period,
-        st[at.S_HISTORY] > 0.0)
-    st[at.S_RATE] = change
-    st[at.S_CONTRACTION] = inp[place.IN_CONTRACTION]
-    dynamics.note_jump(st, inp[place.IN_REFERENCE_RATE])
+        st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s + extra_rate,
+        inp.contraction_m - st.contraction_m, inp.elapsed_s, period,
+        st.history_ticks > 0.0)
+    st.change_m_per_s = change
+    st.contraction_m = inp.contraction_m
+    dynamics.note_jump(st, inp.reference_rate_m_per_s)
     lags = _valve_lags(par, ring, st, inp)
-    held_back = inp[place.IN_HELD_BACK]
+    held_back = inp.held_back
     stays_behind = lags or held_back != 0.0
-    if stays_behind or (par[at.P_JUMP_TIME] <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
-        st[at.S_FREEZE_LEFT] = par[at.P_DELAY] * period + par[at.P_JUMP_FREEZE]
+    if stays_behind or (par.jump_time_s <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
+        st.freeze_left_s = par.delay_ticks * period + par.jump_freeze_s
     offset = held_offset(
-        st[at.S_OFFSET], held_back, inp[place.IN_REFERENCE] - to_go - inp[place.IN_CONTRACTION],
-        st[at.S_ERROR], par[at.P_START_TIME], period)
-    error = inp[place.IN_REFERENCE] - to_go - offset - inp[place.IN_CONTRACTION]
-    st[at.S_ERROR] = error
-    lead = inp[place.IN_LEAD_REFERENCE] - lead_to_go - offset
-    lead_rate = inp[place.IN_LEAD_RATE] + lead_extra_rate
-    st[at.S_OFFSET] = faded_offset(offset, par[at.P_START_TIME], period)
+        st.offset_m, held_back, inp.reference_m - to_go - inp.contraction_m,
+        st.error_m, par.start_time_s, period)
+    error = inp.reference_m - to_go - offset - inp.contraction_m
+    st.error_m = error
+    lead = inp.lead_reference_m - lead_to_go - offset
+    lead_rate = inp.lead_rate_m_per_s + lead_extra_rate
+    st.offset_m = faded_offset(offset, par.start_time_s, period)
 
     # Fuzzification.
-    error_scaled = error / par[at.P_ERROR_UNIVERSE]
-    change_scaled = change / par[at.P_CHANGE_UNIVERSE]
+    error_scaled = error / par.error_universe_m
+    change_scaled = change / par.change_universe_m_per_s
     i, wi = locate(error_scaled, -1.0, 1.0, SET_COUNT)
     j, wj = locate(change_scaled, -1.0, 1.0, SET_COUNT)
-    if par[at.P_MEMBERSHIP_FORM] > 0.5:
-        wi = gaussian_degree(wi, par[at.P_MEMBERSHIP_WIDTH])
-        wj = gaussian_degree(wj, par[at.P_MEMBERSHIP_WIDTH])
-    lower = par[at.P_REFERENCE_LOWER]
-    upper = par[at.P_REFERENCE_UPPER]
-    k, wk = locate(lead, lower, upper, values[1].shape[1])
-    m, wm = locate(lead, lower, upper, values[2].shape[0])
+    if par.membership_form > 0.5:
+        wi = gaussian_degree(wi, par.membership_width)
+        wj = gaussian_degree(wj, par.membership_width)
+    lower = par.reference_lower_m
+    upper = par.reference_upper_m
+    k, wk = locate(lead, lower, upper, feedforward_rules.shape[1])
+    m, wm = locate(lead, lower, upper, motion_rules.shape[0])
     n, wn = locate_signed_logarithmic(
-        lead_rate, par[at.P_MOTION_RATE_FINE], par[at.P_MOTION_RATE_UPPER], values[2].shape[1])
-    way = 0.0 if st[at.S_HISTORY] < 0.5 else lead - st[at.S_LEAD]
-    st[at.S_LEAD] = lead
-    share = contracting_share(st[at.S_SHARE], way, par[at.P_DIRECTION_BLEND])
-    st[at.S_SHARE] = share
+        lead_rate, par.motion_rate_fine_m_per_s, par.motion_rate_upper_m_per_s,
+        motion_rules.shape[1])
+    way = 0.0 if st.history_ticks < 0.5 else lead - st.lead_m
+    st.lead_m = lead
+    share = contracting_share(st.contracting_share, way, par.direction_blend_m)
+    st.contracting_share = share
     a_pass, motion_pass = _passes(par, st, k + wk, m + wm, n + wn)
 
     # Inference and trim.
     base = inverse_pressure_pa(inverse, lead)
     dynamic = dynamics.dynamic_pressure_pa(
-        par, st, base, lead_rate, st[at.S_HISTORY] < 0.5 or lead_jump != 0.0)
-    feedback = par[at.P_FEEDBACK_GAIN] * infer_feedback(values[0], share, i, wi, j, wj)
-    feedforward = infer_feedforward(values[1], share, k, wk)
-    motion = infer_motion(values[2], m, wm, n, wn)
-    proportional = par[at.P_PROPORTIONAL] * error
-    derivative = par[at.P_DERIVATIVE] * change
-    integral = st[at.S_INTEGRAL]
-    st[at.S_INTEGRAL_SHAPE] = dynamics.load_shape(par, lead)
-    trim = integral * st[at.S_INTEGRAL_SHAPE]
+        par, st, base, lead_rate, st.history_ticks < 0.5 or lead_jump != 0.0)
+    feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
+    feedforward = infer_feedforward(feedforward_rules, share, k, wk)
+    motion = infer_motion(motion_rules, m, wm, n, wn)
+    proportional = par.proportional_pa_per_m * error
+    derivative = par.derivative_pa_s_per_m * change
+    integral = st.integral_pa
+    st.integral_shape = dynamics.load_shape(par, lead)
+    trim = integral * st.integral_shape
     wanted = (base + dynamic + feedback + feedforward + motion
               + proportional + trim + derivative)
 
     # The limits of the actuator, then of its speed.
-    lowest = P_ATM_PA + par[at.P_MIN_PRESSURE_GAUGE]
-    highest = P_ATM_PA + par[at.P_MAX_PRESSURE_GAUGE]
+    lowest = P_ATM_PA + par.min_pressure_gauge_pa
+    highest = P_ATM_PA + par.max_pressure_gauge_pa
     inside, command = limited(
-        wanted, st[at.S_OUTPUT], lowest, highest, par[at.P_SLEW] * period)
+        wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
     at_low = wanted < lowest
     at_high = wanted > highest
     at_slew = command != inside
     at_limit = at_low or at_high or at_slew
-    st[at.S_OUTPUT] = command
+    st.command_pa = command
 
     # Integral with back-calculation against the limits of pressure.
-    integral_gain = par[at.P_INTEGRAL]
+    integral_gain = par.integral_pa_per_m_s
     if _surprising(par, st, error):
-        integral_gain *= par[at.P_SURPRISE_INTEGRAL]
+        integral_gain *= par.surprise_integral
     growth = integral_growth(
-        integral_gain * error, (inside - wanted) / par[at.P_ANTI_WINDUP_TIME],
+        integral_gain * error, (inside - wanted) / par.anti_windup_time_s,
         held_back) * period
     # Supply, valve or driver hold the pressure back, or the command is on its way: more would
     # not help, and the way from one pressure to another is no error of the pressure at its end.
     if lags or at_slew:
         growth = 0.0
-    st[at.S_INTEGRAL] = min(
-        max(integral + growth, -par[at.P_INTEGRAL_LIMIT]), par[at.P_INTEGRAL_LIMIT])
+    st.integral_pa = min(
+        max(integral + growth, -par.integral_limit_pa), par.integral_limit_pa)
 
     # Credit memory and rule modification.
-    undisturbed = st[at.S_FREEZE_LEFT] <= 0.0 and abs(offset) <= _START_BAND_M
-    row = credit.row_of(ring, int(st[at.S_TICK]), 0)
-    mean = st[at.S_INTEGRAL_MEAN]
-    st[at.S_INTEGRAL_MEAN] += period / (par[at.P_TAKEOVER_TIME] + period) * (integral - mean)
-    credit.push_feedback(ring, row, i, wi, j, wj, share)
-    credit.push_feedforward(ring, row, k, wk, m, wm, n, wn)
-    correction = par[at.P_CORRECTION]
+    undisturbed = st.freeze_left_s <= 0.0 and abs(offset) <= _START_BAND_M
+    entry = ring[credit.row_of(ring, int(st.tick), 0)]
+    mean = st.integral_mean_pa
+    st.integral_mean_pa += period / (par.takeover_time_s + period) * (integral - mean)
+    credit.push_feedback(entry, i, wi, j, wj, share)
+    credit.push_feedforward(entry, k, wk, m, wm, n, wn)
+    correction = par.correction_pa_per_m
     if not correction > 0.0:
         correction = dynamics.slope_pa_per_m(inverse, lead)
-    credit.push_outcome(ring, row, a_pass, motion_pass, correction, integral - mean,
+    credit.push_outcome(entry, a_pass, motion_pass, correction, integral - mean,
                         0.0 if at_limit or not undisturbed else 1.0, command)
-    if par[at.P_INDEX_FORM] < 0.5:
-        index = index_linear(error, change, par[at.P_INDEX_TAU], par[at.P_INDEX_LIMIT])
+    if par.index_form < 0.5:
+        index = index_linear(error, change, par.index_tau_s, par.index_limit_m)
     else:
-        index = index_table(error_scaled, change_scaled, par[at.P_INDEX_LIMIT])
+        index = index_table(error_scaled, change_scaled, par.index_limit_m)
     reason = _reason(par, ring, st, inp, error, at_limit, stays_behind)
     fb_squares = 0.0
     ff_squares = 0.0
     motion_squares = 0.0
-    ring[row, credit.ENTRY_INDEX] = index if reason == learning.LEARNING else 0.0
+    entry.index_m = index if reason == learning.LEARNING else 0.0
     if reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE:
         fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
     _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
-    out[at.O_COMMAND] = command
-    out[at.O_ERROR] = error
-    out[at.O_CHANGE] = change
-    out[at.O_INVERSE] = base
-    out[at.O_DYNAMIC] = dynamic
-    out[at.O_FEEDBACK] = feedback
-    out[at.O_FEEDFORWARD] = feedforward
-    out[at.O_MOTION] = motion
-    out[at.O_PROPORTIONAL] = proportional
-    out[at.O_INTEGRAL] = trim
-    out[at.O_DERIVATIVE] = derivative
-    out[at.O_UNLIMITED] = wanted
-    out[at.O_SAT_LOW] = 1.0 if at_low else 0.0
-    out[at.O_SAT_HIGH] = 1.0 if at_high else 0.0
-    out[at.O_SAT_SLEW] = 1.0 if at_slew else 0.0
-    out[at.O_SHARE] = share
-    out[at.O_ERROR_SET] = i
-    out[at.O_ERROR_DEGREE] = wi
-    out[at.O_CHANGE_SET] = j
-    out[at.O_CHANGE_DEGREE] = wj
-    out[at.O_KNOT] = k
-    out[at.O_KNOT_DEGREE] = wk
-    out[at.O_MOTION_KNOT] = m
-    out[at.O_MOTION_KNOT_DEGREE] = wm
-    out[at.O_RATE_KNOT] = n
-    out[at.O_RATE_KNOT_DEGREE] = wn
-    out[at.O_INDEX] = index
-    out[at.O_REASON] = reason
-    out[at.O_CREDIT] = 1.0 if reason == learning.LEARNING else 0.0
-    out[at.O_FEEDBACK_NORM] = par[at.P_FEEDBACK_GAIN] * math.sqrt(fb_squares)
-    out[at.O_FEEDFORWARD_NORM] = math.sqrt(ff_squares)
-    out[at.O_MOTION_NORM] = math.sqrt(motion_squares)
-    out[at.O_OFFSET] = offset
-    out[at.O_JUMP] = to_go
-    st[at.S_TICK] += 1.0
-    st[at.S_HISTORY] += 1.0
-    st[at.S_FREEZE_LEFT] = max(0.0, st[at.S_FREEZE_LEFT] - period)
+    out.command_pa = command
+    out.error_m = error
+    out.change_of_error_m_per_s = change
+    out.inverse_pa = base
+    out.dynamic_feedforward_pa = dynamic
+    out.feedback_rules_pa = feedback
+    out.feedforward_rules_pa = feedforward
+    out.motion_rules_pa = motion
+    out.proportional_pa = proportional
+    out.integral_pa = trim
+    out.derivative_pa = derivative
+    out.unlimited_command_pa = wanted
+    out.saturated_low = 1.0 if at_low else 0.0
+    out.saturated_high = 1.0 if at_high else 0.0
+    out.slew_limited = 1.0 if at_slew else 0.0
+    out.contracting_share = share
+    out.error_set = i
+    out.error_degree = wi
+    out.change_set = j
+    out.change_degree = wj
+    out.reference_knot = k
+    out.reference_knot_degree = wk
+    out.motion_knot = m
+    out.motion_knot_degree = wm
+    out.motion_rate_knot = n
+    out.motion_rate_knot_degree = wn
+    out.performance_index_m = index
+    out.learning_reason = reason
+    out.credited_tick_valid = 1.0 if reason == learning.LEARNING else 0.0
+    out.feedback_rule_change_norm_pa = par.feedback_gain_pa * math.sqrt(fb_squares)
+    out.feedforward_rule_change_norm_pa = math.sqrt(ff_squares)
+    out.motion_rule_change_norm_pa = math.sqrt(motion_squares)
+    out.start_offset_m = offset
+    out.jump_to_go_m = to_go
+    st.tick += 1.0
+    st.history_ticks += 1.0
+    st.freeze_left_s = max(0.0, st.freeze_left_s - period)
     _guard(par, values, kept, st, inp, error, reason, out)
     return command
 
 
 @compiled
-def _guard(par, values, kept, st, inp, error, reason, out):
+def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.record,
+           error: float, reason: int, out: np.record) -> None:
     """Watch over learning; a roll-back makes no step in the command."""
     off = reason == learning.FROZEN_OFF or reason == learning.FROZEN_VALVE
     if off or reason == learning.FROZEN_START or reason == learning.FROZEN_JUMP:
         guard.restart_window(st)      # such errors tell nothing about the rules
-    elif par[at.P_GUARD_RATIO] > 0.0 and guard.watch(
-            par, st, error, inp[place.IN_REFERENCE_RATE], values, kept):
-        share = out[at.O_SHARE]
+    elif par.guard_ratio > 0.0 and guard.watch(
+            par, st, error, inp.reference_rate_m_per_s, values, kept):
+        feedback, feedforward, motion = values
+        share = out.contracting_share
         restored = (
-            par[at.P_FEEDBACK_GAIN] * infer_feedback(
-                values[0], share, int(out[at.O_ERROR_SET]), out[at.O_ERROR_DEGREE],
-                int(out[at.O_CHANGE_SET]), out[at.O_CHANGE_DEGREE])
+            par.feedback_gain_pa * infer_feedback(
+                feedback, share, int(out.error_set), out.error_degree,
+                int(out.change_set), out.change_degree)
             + infer_feedforward(
-                values[1], share, int(out[at.O_KNOT]), out[at.O_KNOT_DEGREE])
+                feedforward, share, int(out.reference_knot), out.reference_knot_degree)
             + infer_motion(
-                values[2], int(out[at.O_MOTION_KNOT]), out[at.O_MOTION_KNOT_DEGREE],
-                int(out[at.O_RATE_KNOT]), out[at.O_RATE_KNOT_DEGREE]))
-        before = out[at.O_FEEDBACK] + out[at.O_FEEDFORWARD] + out[at.O_MOTION]
-        limit = par[at.P_INTEGRAL_LIMIT]
-        st[at.S_INTEGRAL] = min(
-            max(st[at.S_INTEGRAL] + (before - restored) / st[at.S_INTEGRAL_SHAPE], -limit), limit)
-        st[at.S_HISTORY] = 1.0        # no credit for rules that are gone
-    out[at.O_WINDOW] = st[at.S_FORMER]
-    out[at.O_BEST] = st[at.S_BEST]
-    out[at.O_RATE_FACTOR] = st[at.S_RATE_FACTOR] * st[at.S_RATE_CEILING]
-    out[at.O_ROLLED_BACK] = st[at.S_ROLLED_BACK]
+                motion, int(out.motion_knot), out.motion_knot_degree,
+                int(out.motion_rate_knot), out.motion_rate_knot_degree))
+        before = out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
+        limit = par.integral_limit_pa
+        st.integral_pa = min(
+            max(st.integral_pa + (before - restored) / st.integral_shape, -limit), limit)
+        st.history_ticks = 1.0        # no credit for rules that are gone
+    out.window_rms_error_m = st.former_rms_m
+    out.best_window_rms_error_m = st.best_rms_m
+    out.learning_rate_factor = st.rate_factor * st.rate_ceiling
+    out.times_rolled_back = st.times_rolled_back
 
 
-def _entry(key):
+@compiled
+def _step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
+          kept: Tables, ring: FloatArray, st: FloatArray, inp: FloatArray,
+          out: FloatArray) -> float:
+    """Run one tick on arrays; see ``sofc_step``."""
+    return _tick(part(par, 0, PARAMETERS), inverse, values, initial, fired, kept,
+                 ring.view(ENTRY), part(st, 0, STATE), part(inp, 0, INPUT), part(out, 0, OUTPUT))
+
+
+def _entry(key: int) -> Callable[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-    def sofc_step(par, inverse, values, initial, fired, kept, ring, st, inp, out):
+    @entry_point
+    def sofc_step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables,
+                  fired: Tables, kept: Tables, ring: FloatArray, st: FloatArray,
+                  inp: FloatArray, out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
         Parameters
         ----------
         par, inverse : float64[:]
-            Parameter vector (``settings.parameter_vector``) and static inverse table.
+            Array of ``settings.PARAMETERS`` and static inverse table.
         values, initial, fired, kept : tuple of arrays
             Feedback, feed-forward and motion rules; their initial values, their firing counts,
             the last good ones.
-        ring : float64[:, :]
-            Credit memory (``credit.ring_rows`` rows).
+        ring : float64[:]
+            Credit memory: ``credit.ring_rows`` of ``records.ENTRY``, one behind the other.
         st, inp, out : float64[:]
-            State (``layout.S_*``), inputs (``inputs.IN_*``), outputs (``layout.O_*``).
+            Arrays of ``records.STATE``, ``inputs.INPUT`` and ``records.OUTPUT``.
 
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _tick(par, inverse, values, initial, fired, kept, ring, st, inp, out)
+        return _step(par, inverse, values, initial, fired, kept, ring, st, inp, out)
 
     return sofc_step
 
 
-sofc_step = _entry(source_key(_tick))
+sofc_step = _entry(source_key(_step))
