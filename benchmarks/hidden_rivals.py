@@ -27,9 +27,10 @@ import time
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_sim.errors import InputError
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.noise import sensor_floor
+from pam_sim.gap.data.noise import sensor_floor
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.model_file import load_rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from scipy.optimize import least_squares

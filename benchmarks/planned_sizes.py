@@ -30,7 +30,8 @@ from pam_actuation.experiments.protocols import sensitivities
 from pam_actuation.experiments.separating import sensors_for, simulated
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
-from pam_sim.gap.plan import outlooks, sized
+from pam_sim.gap.plan.outlook import outlooks
+from pam_sim.gap.plan.sensitivity import sized
 
 MODEL, PROTOCOL = 'dmsp_5_300_hanging_mass', 'pressure_identification'
 

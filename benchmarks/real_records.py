@@ -37,7 +37,8 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
-from pam_sim.gap.free_run import Recording, run_from_pressure
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.subsystems.simulation import run_from_pressure
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 

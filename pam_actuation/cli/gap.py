@@ -140,7 +140,7 @@ def _explain(args):
     from pam_actuation.report.gap import model_for
     from pam_sim import load_rig
     from pam_sim.catalogue import catalogue, find
-    from pam_sim.gap.look_alikes import look_alikes
+    from pam_sim.gap.plan.look_alikes import look_alikes
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], namespace=args.namespace)

@@ -31,11 +31,11 @@ from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.separating import (
     HIGHEST_GAUGE_PA, LOWEST_GAUGE_PA, sensors_for, simulated)
 from pam_sim.errors import InputError
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.health import check_health
-from pam_sim.gap.plan import (
-    in_proportion, least_factors, outlooks, score, Sensitivities)
-from pam_sim.gap.result import READABLE
+from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.signals import READABLE
+from pam_sim.gap.plan.outlook import in_proportion, least_factors, outlooks, score
+from pam_sim.gap.plan.sensitivity import Sensitivities
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.units import P_ATM_PA
 

@@ -33,12 +33,12 @@ from pam_actuation.bags.load import load_run
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim.errors import InputError
-from pam_sim.gap.choice import SAME_FORM
-from pam_sim.gap.compare import gap, preference, share
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.parts import SELECT
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import SELECT
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.select.comparison import gap, preference, share
+from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.units import P_ATM_PA
 
@@ -49,7 +49,7 @@ SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noi
                 'force': 'force_noise_n'}
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
-SURE_SHARE = 10.0 * SAME_FORM
+SURE_SHARE = 10.0 * CRITERIA.same_form_share
 
 
 def menu(valve):
@@ -170,26 +170,27 @@ def separation(run, rig, rivals, with_force):
     topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
                           rig.load != 'hanging_mass')
-    problem = Problem(rig, cuts_of(rig, [recording], own_proof=False))
-    first, *others = (problem.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
-    for cut in problem.cuts:
+    estimator = Estimator(rig, subsystem_problems(rig, [recording], holds_certify=False))
+    first, *others = (estimator.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
+    for problem in estimator.problems:
         # As in the search: where the floor is careful, gaps would begin above what the truth left.
-        s = cut.subsystem
-        cut.level = min([cut.level] + [cut.chi2(f.errors[s], SELECT) for f in (first, *others)])
+        s = problem.subsystem
+        problem.level = min([problem.level] + [
+            problem.chi2(f.errors[s], SELECT) for f in (first, *others)])
     nearest = decided = np.inf
     for other in others:
         nearest = min(nearest, np.sqrt(sum(
-            max(gap(c, other.errors[c.subsystem]), 0.0) for c in problem.cuts)))
-        decided = min(decided, max(_decided(problem, c, first, other)
-                                   for c in problem.cuts))
+            max(gap(c, other.errors[c.subsystem]), 0.0) for c in estimator.problems)))
+        decided = min(decided, max(_decided(estimator, c, first, other)
+                                   for c in estimator.problems))
     return float(nearest), float(decided)
 
 
-def _decided(problem, cut, first, other):
-    s = cut.subsystem
-    base = problem.base.errors[s]
-    t = np.nan_to_num(preference(cut, base, first.errors[s], other.errors[s]))
-    apart = share(cut, base, first.errors[s]) - share(cut, base, other.errors[s])
+def _decided(estimator, problem, first, other):
+    s = problem.subsystem
+    base = estimator.base.errors[s]
+    t = np.nan_to_num(preference(problem, base, first.errors[s], other.errors[s]))
+    apart = share(problem, base, first.errors[s]) - share(problem, base, other.errors[s])
     return min(t / SURE_T, apart / SURE_SHARE)
 
 

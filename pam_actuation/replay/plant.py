@@ -20,9 +20,10 @@ import numpy as np
 from pam_actuation.replay.difference import difference
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.health import recorded_valve
-from pam_sim.gap.result import FIELD
+from pam_sim.gap.data.health import recorded_valve
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.signals import FIELD
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.short_repr import short_repr
 
 MIN_DURATION_S = 0.1         # the start is read from half of it

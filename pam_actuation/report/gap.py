@@ -42,8 +42,9 @@ from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, whole_files, write_text
 from pam_sim.gap import find_gap
-from pam_sim.gap.free_run import free_run, Recording
-from pam_sim.gap.health import check_health, recorded_valve
+from pam_sim.gap.data.health import check_health, recorded_valve
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 

@@ -15,20 +15,13 @@
 """
 Find the gap between recordings and a model, name what is missing, add it and prove it.
 
-The files in reading order: ``health`` (can these data be used), ``noise`` (what
-sensors and stamps explain), ``parts`` (what is fitted, what judges, what proves),
-``free_run`` (the model on the recorded valve signal), ``cuts`` (each subsystem on its
-measured input), ``candidates`` (what may be missing), ``hypothesis`` (what a model may have
-beyond the given one), ``solver`` (one least-squares problem), ``fit`` (hypotheses fitted),
-``side_by_side`` (several at once), ``screen`` (which are worth a fit), ``compare`` (which one
-the data prefer), ``choice`` (which rival wins), ``search`` (one effect after another),
-``pairs`` (two at once, where that fails), ``finish`` (what of them stays), ``uncertainty`` (how
-well its numbers are known), ``prove`` (free runs on data kept aside), ``doubt`` (how much these
-can tell), ``refute`` (which names they contradict), ``locate`` (where the gap sits),
-``workflow`` (all of it in order, and the verdict), ``words`` (the verdict in sentences),
-``result`` (what gap.json holds).
-A witness without a model of what is missing: ``fingerprint``. Before anything is measured:
-``plan`` (what a protocol could show) and ``look_alikes``.
+The rooms in reading order, each of which knows only those before it: ``data`` (what was
+recorded, its noise, its split), ``subsystems`` (each on its own measured input), ``fit``
+(hypotheses fitted), ``select`` (candidates, ranking, forward selection, backward elimination,
+pairs), ``verify`` (certify data: validation, refutation, materiality), ``report`` (reason, place
+and fingerprint of a gap), ``plan`` (what a protocol could show, before measuring). On top
+``verdict`` and ``workflow``. Below all: ``criteria`` (every decision threshold) and ``result``
+(what gap.json holds).
 """
 
 from pam_sim.gap.result import GapResult

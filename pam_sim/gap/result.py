@@ -16,16 +16,14 @@
 
 from dataclasses import dataclass, field
 import math
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.gap.data.signals import READABLE
 from pam_sim.short_repr import short_repr
 
 SCHEMA = 1
-SIGNALS = ('pressure', 'contraction', 'force')
-FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
-UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
-# For people: factor from SI and unit.
-READABLE = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'force': (1.0, 'N')}
 
 
 @dataclass(frozen=True)
@@ -40,18 +38,18 @@ class SignalGap:
     unit: str
     noise_floor: float
     rmse_before: float
-    rmse_refit: float | None
-    rmse_after: float | None
+    rmse_refit: float
+    rmse_after: float
 
     @property
-    def shrink_percent(self):
+    def shrink_percent(self) -> float | None:
         """Return how much of the gap left by refitting the final model closes, or None."""
-        if self.rmse_refit is None or self.rmse_refit <= self.noise_floor:
+        if self.rmse_refit <= self.noise_floor:
             return None
         left = max(self.rmse_after ** 2 - self.noise_floor ** 2, 0.0)
         return 100.0 * (1.0 - math.sqrt(left / (self.rmse_refit ** 2 - self.noise_floor ** 2)))
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of gap.json."""
         return {'unit': self.unit, 'noise_floor': self.noise_floor,
                 'rmse_before': self.rmse_before, 'rmse_refit': self.rmse_refit,
@@ -67,7 +65,7 @@ class Share:
     condition: str
     share_of_gap: float
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of gap.json."""
         return {'subsystem': self.subsystem, 'signal': self.signal,
                 'condition': self.condition, 'share_of_gap': self.share_of_gap}
@@ -86,10 +84,10 @@ class Calibrated:
     unit: str
     nominal: float
     value: float
-    ci95: tuple
-    pull: float
+    ci95: tuple[float, float]
+    prior_deviation: float
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of gap.json."""
         return {'name': self.name, 'nominal': self.nominal, 'value': self.value,
                 'unit': self.unit, 'ci95': list(self.ci95)}
@@ -100,11 +98,11 @@ class Calibrated:
 class Trace:
     """A signal measured and simulated at the measured stamps, SI units."""
 
-    stamp_ns: np.ndarray
-    measured: np.ndarray
-    before: np.ndarray
-    refit: np.ndarray
-    after: np.ndarray
+    stamp_ns: IntArray
+    measured: FloatArray
+    before: FloatArray
+    refit: FloatArray
+    after: FloatArray
 
 
 @short_repr
@@ -146,27 +144,27 @@ class GapResult:
 
     verdict: str
     reason: str
-    signals: dict = field(default_factory=dict)
-    where: list = field(default_factory=list)
-    parameters: list = field(default_factory=list)
-    calibration: list = field(default_factory=list)
-    effects: list = field(default_factory=list)
-    ambiguity_set: list = field(default_factory=list)
-    next_experiment: dict | None = None
+    signals: dict[str, SignalGap] = field(default_factory=dict)
+    where: list[Share] = field(default_factory=list)
+    parameters: list[Calibrated] = field(default_factory=list)
+    calibration: list[Calibrated] = field(default_factory=list)
+    effects: list[dict[str, Any]] = field(default_factory=list)
+    ambiguity_set: list[str] = field(default_factory=list)
+    next_experiment: dict[str, Any] | None = None
     unexplained_fraction: float = 0.0
-    fingerprint: dict = field(default_factory=dict)
-    minimum_detectable: dict = field(default_factory=dict)
+    fingerprint: dict[str, dict[str, Any]] = field(default_factory=dict)
+    minimum_detectable: dict[str, dict[str, Any]] = field(default_factory=dict)
     runtime_s: float = 0.0
     simulations: int = 0
-    remarks: list = field(default_factory=list)
-    traces: dict = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    traces: dict[str, Trace] = field(default_factory=dict)
     model_yaml: str = ''
-    moved: dict = field(default_factory=dict)
-    rivals: list = field(default_factory=list)
-    noise: dict = field(default_factory=dict)
-    evidence: list = field(default_factory=list)
+    moved: dict[str, float] = field(default_factory=dict)
+    rivals: list[Any] = field(default_factory=list)
+    noise: dict[str, float] = field(default_factory=dict)
+    evidence: list[dict[str, Any]] = field(default_factory=list)
 
-    def text(self):
+    def text(self) -> str:
         """Return the result in lines for a person."""
         rows = [f'{self.verdict}: {self.reason}']
         for name, s in self.signals.items():
@@ -177,7 +175,7 @@ class GapResult:
                 f'final {s.rmse_after * factor:.3g} {unit} rms')
         return '\n'.join(rows + [f'  {r}' for r in self.remarks])
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return what gap.json holds, plain data without NaN."""
         return _finite({
             'schema': SCHEMA, 'verdict': self.verdict, 'effects': self.effects,
@@ -191,7 +189,7 @@ class GapResult:
             'reason': self.reason})
 
 
-def _finite(value):
+def _finite(value: Any) -> Any:
     """Return the value with NumPy numbers as plain ones and NaN or infinity as None."""
     if isinstance(value, dict):
         return {str(k): _finite(v) for k, v in value.items()}

@@ -28,7 +28,7 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim import load_rig
-from pam_sim.gap.health import check_health
+from pam_sim.gap.data.health import check_health
 from pam_sim.units import P_ATM_PA
 import pytest
 

@@ -16,17 +16,19 @@
 
 from gap_runs import nominal
 import numpy as np
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, Rival
-from pam_sim.gap.cuts import Cut
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.parts import SELECT
-from pam_sim.gap.result import SIGNALS
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.signals import SIGNALS
+from pam_sim.gap.data.split import SELECT
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.ranking import Ranking
+from pam_sim.gap.select.rival import Rival
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 SAMPLES = 100                # of a block
 
 
-class Blocks(Cut):
+class Blocks(SubsystemProblem):
     """Time blocks of one signal that judge; nothing is simulated."""
 
     subsystem, signals, known = 'muscle', ('contraction',), []
@@ -38,38 +40,40 @@ class Blocks(Cut):
         self.level = 1.0
 
 
-def errors(cut, seed, off):
+def errors(problem, seed, off):
     """Return noise, the same for all rivals of a seed, plus what a rival is off by block."""
-    noise = np.random.default_rng(seed).standard_normal(cut.block.size)
-    return noise + np.asarray(off, dtype=float)[cut.block]
+    noise = np.random.default_rng(seed).standard_normal(problem.block.size)
+    return noise + np.asarray(off, dtype=float)[problem.block]
 
 
 class Tied:
-    """Rivals in one cut, whose errors are given; the cut is ``cuts[0]``."""
+    """Rivals in one subsystem, whose errors are given; the subsystem is ``subsystems[0]``."""
 
-    def __init__(self, cut, before, left):
-        self.cuts = [cut]
+    criteria = CRITERIA
+
+    def __init__(self, problem, before, left):
+        self.problems = [problem]
         self.base = self._found(None, before)
         self.rivals = [Rival(name, self._found(name, off)) for name, off in left.items()]
-        self.choice = Choice(self, self.base, 2.0)
+        self.ranking = Ranking(self, self.base, 2.0)
         for r in self.rivals:
-            r.share = self.choice.shares(r.found)
+            r.share = self.ranking.shares(r.found)
 
     def _found(self, name, left):
         effects = () if name is None else tuple(
             c for c in candidates(nominal(), SIGNALS) if c.effect == name)
-        cut = self.cuts[0]
+        problem = self.problems[0]
         theta = np.concatenate([np.full(len(c.free), 0.5) for c in effects] or [np.zeros(0)])
-        return Found(Hypothesis(effects), theta, {'muscle': np.zeros(0)},
-                     {'muscle': errors(cut, 1, np.broadcast_to(left, 60))}, {})
+        return Fit(Hypothesis(effects), theta, {'muscle': np.zeros(0)},
+                   {'muscle': errors(problem, 1, np.broadcast_to(left, 60))}, {})
 
     @staticmethod
-    def crossed(found):
+    def cross_fit(found):
         """Return what a fit to the other part is; here the same."""
         return found
 
-    polish = crossed
+    polish = cross_fit
 
     def names(self):
         """Return the names that the data cannot tell apart."""
-        return [r.name for r in self.choice.tied(self.rivals, self.base, self.cuts[0])]
+        return [r.name for r in self.ranking.tied(self.rivals, self.base, self.problems[0])]

@@ -15,58 +15,61 @@
 """Which rivals the data tell apart, and which experiment would."""
 
 import math
+from types import SimpleNamespace
 
 from gap_rivals import Blocks, errors, Tied
 from gap_runs import nominal, recorded
 import numpy as np
 from pam_actuation.experiments.separating import separation
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import AHEAD_T, BEHIND_T, Named
-from pam_sim.gap.compare import CERTAIN_T, MIN_BLOCKS, preference
-from pam_sim.gap.cuts import Known
-from pam_sim.gap.finish import within_the_chain
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.parts import FIT, SELECT
-from pam_sim.gap.prove import Proof, start_error_sd
-from pam_sim.gap.search import Search
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select import backward, size
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.comparison import preference
+from pam_sim.gap.select.plausibility import with_plausible_numbers
+from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.select.size import with_certain_sizes, within_the_chain
+from pam_sim.gap.subsystems.known import Known
+from pam_sim.gap.verify.validation import start_error_sd, Validation
 import pytest
 
 
 @pytest.mark.parametrize('telling, says', [(8, True), (4, False), (3, False)])
 def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, says):
-    cut, rare = Blocks(80), np.arange(80) < telling
-    base = errors(cut, 0, np.full(80, 5.0))
-    better = errors(cut, 0, np.zeros(80))
+    problem, rare = Blocks(80), np.arange(80) < telling
+    base = errors(problem, 0, np.full(80, 5.0))
+    better = errors(problem, 0, np.zeros(80))
     # Where there are few blocks, they must agree the more: in these some say little.
-    worse = errors(cut, 0, np.where(rare, np.where(np.arange(80) % 4, 3.0, 0.8), 0.01))
-    found = preference(cut, base, better, worse)
-    assert (found > CERTAIN_T) == says
-    assert preference(cut, base, worse, better) == pytest.approx(-found, nan_ok=True)
-    assert math.isnan(found) == (telling < MIN_BLOCKS)
+    worse = errors(problem, 0, np.where(rare, np.where(np.arange(80) % 4, 3.0, 0.8), 0.01))
+    found = preference(problem, base, better, worse)
+    assert (found > CRITERIA.certain_t) == says
+    assert preference(problem, base, worse, better) == pytest.approx(-found, nan_ok=True)
+    assert math.isnan(found) == (telling < CRITERIA.min_blocks)
 
 
 @pytest.mark.parametrize('agree, says', [(1.0, True), (0.5, False)])
 def test_many_quiet_blocks_that_agree_count_where_loud_ones_are_few(agree, says):
-    cut, place = Blocks(30), np.arange(30)
+    problem, place = Blocks(30), np.arange(30)
     before = np.where(place < 6, 3.0, 0.45)
     # Of the loud ones all get better, but half of them hardly; of the quiet ones a share does.
     after = np.where(place < 6, np.where(place % 2, 0.0, 2.8),
                      np.where(place % 10 < 10 * agree, 0.0, 0.65))
-    base, better = errors(cut, 0, before), errors(cut, 0, after)
-    assert math.isnan(preference(cut, base, better, base))      # three blocks are no test
-    assert (preference(cut, base, better, base, quiet=True) > CERTAIN_T) == says
+    base, better = errors(problem, 0, before), errors(problem, 0, after)
+    assert math.isnan(preference(problem, base, better, base))      # three blocks are no test
+    assert (preference(problem, base, better, base, quiet=True) > CRITERIA.certain_t) == says
 
 
 def test_what_was_fitted_judges_as_well_where_each_part_is_judged_by_a_fit_to_the_other():
-    cut = Blocks(40)
-    cut.part = np.where(cut.block % 2, SELECT, FIT)
-    rng, base = np.random.default_rng(2), errors(cut, 0, np.full(40, 4.0))
-    better, worse = (errors(cut, 0, rng.uniform(low, low + 2.0, 40)) for low in (0.0, 0.3))
-    once = preference(cut, base, better, worse)
-    twice = preference(cut, base, better, worse, crossed=(FIT, better, worse))
-    assert 1.0 < once < CERTAIN_T < twice
-    against = preference(cut, base, better, worse, crossed=(FIT, worse, better))
+    problem = Blocks(40)
+    problem.part = np.where(problem.block % 2, SELECT, FIT)
+    rng, base = np.random.default_rng(2), errors(problem, 0, np.full(40, 4.0))
+    better, worse = (errors(problem, 0, rng.uniform(low, low + 2.0, 40)) for low in (0.0, 0.3))
+    once = preference(problem, base, better, worse)
+    twice = preference(problem, base, better, worse, other_part=(FIT, better, worse))
+    assert 1.0 < once < CRITERIA.certain_t < twice
+    against = preference(problem, base, better, worse, other_part=(FIT, worse, better))
     assert abs(against) < 1.0
 
 
@@ -79,7 +82,7 @@ def test_no_rival_goes_for_less_than_a_formulation_may_be_off(names, off, tied):
     case = Tied(Blocks(60), 5.0, dict(zip(names, (0.0, off))))
     left = case.names()
     # Both differ in every block alike, beyond doubt.
-    assert case.rivals[1].t['muscle'] > CERTAIN_T
+    assert case.rivals[1].t['muscle'] > CRITERIA.certain_t
     assert left == list(names[:1 + tied])
 
 
@@ -99,7 +102,7 @@ def test_a_rival_that_explains_clearly_less_goes_with_less_doubt_than_another(si
     case = Tied(Blocks(60), 5.0 * some, {
         'bladder_stiffness': left[0], 'parallel_spring': np.hypot(left[1], np.sqrt(size) * some)})
     names = case.names()
-    assert BEHIND_T < case.rivals[1].t['muscle'] < AHEAD_T
+    assert CRITERIA.behind_t < case.rivals[1].t['muscle'] < CRITERIA.ahead_t
     assert names == ['bladder_stiffness', 'parallel_spring'][:1 + tied]
 
 
@@ -108,15 +111,16 @@ def test_the_certify_run_confirms_what_is_real(real, share):
     time_s = np.arange(4000) * 0.005
     effect = 2e-5 * np.sin(time_s)
     noise = 1e-5 * np.random.default_rng(2).standard_normal(time_s.size)
-    proof = Proof.__new__(Proof)
+    validation = Validation.__new__(Validation)
 
     class Given:
         signals, measured = ('contraction',), {'contraction': real * effect + noise}
 
-    proof.recording, proof.part = Given(), {'contraction': np.ones(time_s.size, dtype=bool)}
-    proof.noise, proof.after = {'contraction': 1e-5}, {'contraction': effect}
-    proof.refit = {'contraction': np.zeros(time_s.size)}
-    assert proof.fall(proof.refit, proof.after)[0] == pytest.approx(share, abs=0.1)
+    validation.recording = Given()
+    validation.part = {'contraction': np.ones(time_s.size, dtype=bool)}
+    validation.noise, validation.after = {'contraction': 1e-5}, {'contraction': effect}
+    validation.refit = {'contraction': np.zeros(time_s.size)}
+    assert validation.fall(validation.refit, validation.after)[0] == pytest.approx(share, abs=0.1)
 
 
 def test_an_experiment_must_decide_in_many_places():
@@ -155,67 +159,56 @@ def test_a_free_run_knows_how_uncertain_its_start_is():
 
 
 @pytest.mark.parametrize('alone, goes', [(0.96, 'hysteresis'), (0.7, 'coulomb_friction')])
-def test_a_friction_is_not_replaced_by_the_loop_that_has_turned_into_it(alone, goes):
+def test_a_friction_is_not_replaced_by_the_loop_that_has_turned_into_it(
+        monkeypatch, alone, goes):
     by_name = {c.effect: c for c in candidates(nominal(), ('contraction', 'force'))}
     loop = by_name['hysteresis_lugre']
-    narrow = Found(Hypothesis((loop,)), np.array([1.0, 0.0, loop.free[2].coordinate(
+    narrow = Fit(Hypothesis((loop,)), np.array([1.0, 0.0, loop.free[2].coordinate(
         loop.free[2].upper)]), {}, {}, {})
-    dry = Found(Hypothesis((by_name['coulomb_friction'],)), np.ones(1), {}, {}, {})
-    both = Found(Hypothesis((*dry.hypothesis.effects, loop)), np.ones(4), {}, {}, {})
+    dry = Fit(Hypothesis((by_name['coulomb_friction'],)), np.ones(1), {}, {}, {})
+    both = Fit(Hypothesis((*dry.hypothesis.effects, loop)), np.ones(4), {}, {}, {})
 
-    class Given(Search):
-        class choice:
-            shares = staticmethod(lambda found: {'muscle': alone if found is dry else 1.0})
-
-        def __init__(self):
-            self._swapped = lambda current, out: dry if out == 'hysteresis' else narrow
-
-    named = [Named(n, 'muscle', [], (n,)) for n in ('coulomb_friction', 'hysteresis')]
-    gone, without = Given()._simpler(both, named[0], narrow, named)
+    given = SimpleNamespace(criteria=CRITERIA, estimator=None, ranking=SimpleNamespace(
+        shares=lambda found: {'muscle': alone if found is dry else 1.0}))
+    monkeypatch.setattr(backward, 'fit_without', lambda estimator, current, name: (
+        dry if name == 'hysteresis' else narrow))
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in ('coulomb_friction', 'hysteresis')]
+    gone, without = backward._simpler(given, both, named[0], narrow, named)
     assert gone.name == goes and without is (dry if goes == 'hysteresis' else narrow)
 
 
 @pytest.mark.parametrize('within, names_stand', [(0.99, True), (0.9, False)])
 def test_a_number_that_is_bent_without_need_costs_no_name(within, names_stand):
-    cut = Blocks(4)
-    cut.known = [Known('damping_n_s_per_m', 'N s/m', 25.0, 0.5, 0.0, 100.0)]
+    problem = Blocks(4)
+    problem.known = [Known('damping_n_s_per_m', 'N s/m', 25.0, 0.5, 0.0, 100.0)]
     friction = next(c for c in candidates(nominal(), ('contraction',))
                     if c.effect == 'coulomb_friction')
-    bent, held = (Found(Hypothesis((friction,)), np.ones(1), {'muscle': np.array([z])}, {}, {})
+    bent, held = (Fit(Hypothesis((friction,)), np.ones(1), {'muscle': np.array([z])}, {}, {})
                   for z in (-3.5, -1.0))
 
-    class Given(Search):
-        class problem:
-            cuts, unbent = [cut], staticmethod(lambda found, box: held)
-
-        class choice:
-            shares = staticmethod(lambda found: {'muscle': within})
-
-        def __init__(self):
-            pass
-
-    assert Given()._straightened(bent) is (held if names_stand else bent)
-    assert Given()._straightened(held) is held
+    given = SimpleNamespace(
+        criteria=CRITERIA, problems=[problem],
+        estimator=SimpleNamespace(within_box=lambda found, box: held),
+        ranking=SimpleNamespace(shares=lambda found: {'muscle': within}))
+    assert with_plausible_numbers(given, bent) is (held if names_stand else bent)
+    assert with_plausible_numbers(given, held) is held
 
 
 @pytest.mark.parametrize('z, stays', [(0.6, False), (-1.9, False), (4.0, True), (-9.0, True)])
-def test_a_number_that_came_back_into_its_tolerance_is_not_wrong(z, stays):
-    cut = Blocks(4)
-    cut.known = [Known('V_dead', 'm3', 3e-6, 1e-7, 0.0, 1e-4)]
+def test_a_number_that_came_back_into_its_tolerance_is_not_wrong(monkeypatch, z, stays):
+    problem = Blocks(4)
+    problem.known = [Known('V_dead', 'm3', 3e-6, 1e-7, 0.0, 1e-4)]
     bias = next(c for c in candidates(nominal(), ('contraction',))
                 if c.effect == 'contraction_bias')
-    both = Found(Hypothesis((bias,), ('V_dead',)), np.ones(1), {'muscle': np.array([z])}, {}, {})
-    alone = Found(Hypothesis((bias,)), np.ones(1), {'muscle': np.zeros(1)}, {}, {})
+    both = Fit(Hypothesis((bias,), ('V_dead',)), np.ones(1), {'muscle': np.array([z])}, {}, {})
+    alone = Fit(Hypothesis((bias,)), np.ones(1), {'muscle': np.zeros(1)}, {}, {})
 
-    class Given(Search):
-        class problem:
-            cuts, certainty = [cut], staticmethod(lambda found, place: 99.0)
-
-        def __init__(self):
-            self._swapped = lambda current, out: alone
-
-    named = [Named(n, 'muscle', [], (n,)) for n in ('V_dead', 'contraction_bias')]
-    found, left = Given()._established(both, named)
+    given = SimpleNamespace(
+        criteria=CRITERIA, problems=[problem],
+        estimator=SimpleNamespace(certainty=lambda found, place: 99.0))
+    monkeypatch.setattr(size, 'fit_without', lambda estimator, current, name: alone)
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in ('V_dead', 'contraction_bias')]
+    found, left = with_certain_sizes(given, both, named)
     assert [w.name for w in left] == ['V_dead', 'contraction_bias'][not stays:]
     assert found is (both if stays else alone)
 
@@ -227,10 +220,12 @@ def test_a_lag_that_any_filter_may_have_is_no_effect(name, size, is_so):
     effect = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
                   if c.effect == name)
     theta = [f.coordinate(size or f.typical) for f in effect.free]
-    assert within_the_chain(Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == is_so
+    found = Fit(Hypothesis((effect,)), np.array(theta), {}, {}, {})
+    assert within_the_chain(found, 0, CRITERIA) == is_so
 
 
 def test_of_two_that_have_one_form_a_bent_one_is_not_ahead():
     case = Tied(Blocks(60), 5.0, {'contraction_bias': 0.0, 'pressure_gain': 0.1})
-    case.choice._strain = lambda found: 200.0 * (found.hypothesis.names == ('contraction_bias',))
+    case.ranking._prior_cost = lambda found: 200.0 * (
+        found.hypothesis.names == ('contraction_bias',))
     assert case.names() == ['pressure_gain']

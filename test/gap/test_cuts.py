@@ -16,23 +16,24 @@
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
-from pam_sim.gap.cuts import acts_on, cuts_of
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.noise import noise_of
-from pam_sim.gap.parts import FIT, SELECT
+from pam_sim.gap.data.noise import noise_of
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 
 def errors(rig, given=None, **options):
-    """Return subsystem -> (cut, errors of the given model on a recording of the rig)."""
+    """Return subsystem -> (subsystem, errors of the given model on a recording of the rig)."""
     given = given or nominal()
     recording = Recording(recorded(rig, voltages(12.0), **options), 'ppr')
     found = {}
-    for cut in cuts_of(given, [recording]):
-        known = np.zeros(len(cut.known))
-        if cut.subsystem == 'valve':
-            known[[k.name for k in cut.known].index('latency')] = -1.0     # there is none
-        found[cut.subsystem] = (cut, cut.errors(given, known))
+    for problem in subsystem_problems(given, [recording]):
+        known = np.zeros(len(problem.known))
+        if problem.subsystem == 'valve':
+            known[[k.name for k in problem.known].index('latency')] = -1.0     # there is none
+        found[problem.subsystem] = (problem, problem.errors(given, known))
     return found
 
 
@@ -41,8 +42,8 @@ def with_effect(name, **parameters):
 
 
 def test_the_true_model_leaves_noise_in_both_cuts():
-    for cut, left in errors(nominal()).values():
-        assert 0.4 < cut.chi2(left, FIT) < 1.1 and 0.4 < cut.chi2(left, SELECT) < 1.1
+    for problem, left in errors(nominal()).values():
+        assert 0.4 < problem.chi2(left, FIT) < 1.1 and 0.4 < problem.chi2(left, SELECT) < 1.1
 
 
 @pytest.mark.parametrize('effect, here, there', [
@@ -50,10 +51,10 @@ def test_the_true_model_leaves_noise_in_both_cuts():
     ('guide_friction', 'muscle', 'valve')])
 def test_an_effect_shows_in_its_own_cut_only(effect, here, there):
     found = errors(with_effect(effect))
-    cut, left = found[here]
-    assert cut.chi2(left, SELECT) > 50.0
-    cut, left = found[there]
-    assert cut.chi2(left, SELECT) < 1.1
+    problem, left = found[here]
+    assert problem.chi2(left, SELECT) > 50.0
+    problem, left = found[there]
+    assert problem.chi2(left, SELECT) < 1.1
     assert acts_on(effect, here) and not acts_on(effect, there)
 
 
@@ -62,29 +63,29 @@ def test_an_effect_shows_in_its_own_cut_only(effect, here, there):
     ('pressure_lag', {'time_constant_s': 0.006}), ('contraction_bias', {'bias_m': 3e-4})])
 def test_a_known_sensor_effect_is_taken_out_of_the_input(sensor, parameters):
     rig = with_effect(sensor, **parameters)
-    cut, left = errors(rig)['muscle']
-    assert cut.chi2(left, SELECT) > 2.0
-    cut, left = errors(rig, given=rig)['muscle']
-    assert cut.chi2(left, SELECT) < 1.5
+    problem, left = errors(rig)['muscle']
+    assert problem.chi2(left, SELECT) > 2.0
+    problem, left = errors(rig, given=rig)['muscle']
+    assert problem.chi2(left, SELECT) < 1.5
 
 
 def test_a_force_recorded_in_one_of_two_runs_is_used():
     first = Recording(recorded(nominal(), voltages(8.0), topics=('pressure', 'contraction')),
                       'ppr')
     second = Recording(recorded(nominal(), voltages(8.0), seed=1), 'ppr')
-    cut = cuts_of(nominal(), [first, second])[1]
-    assert cut.signals == ('contraction', 'force')
+    problem = subsystem_problems(nominal(), [first, second])[1]
+    assert problem.signals == ('contraction', 'force')
     # At 200 Hz: 8 s of contraction in both, of force in one.
-    assert [int((cut.signal == s).sum() // 800) for s in range(2)] == [3, 1]
+    assert [int((problem.signal == s).sum() // 800) for s in range(2)] == [3, 1]
     # Another day, another skew: each recording has its own.
-    assert [k.name for k in cut.known if not k.of_rig] == [
+    assert [k.name for k in problem.known if not k.of_rig] == [
         'pressure_skew', 'pressure_skew_2', 'force_skew_2']
-    late, z = cut.known[[k.name for k in cut.known].index('pressure_skew_2')], np.zeros(
-        len(cut.known))
-    still = cut.values(nominal(), z)
-    z[cut.known.index(late)] = 1.0
-    moved = cut.values(nominal(), z) != still
-    assert moved[cut.run == 1].any() and not moved[cut.run == 0].any()
+    late, z = problem.known[[k.name for k in problem.known].index('pressure_skew_2')], np.zeros(
+        len(problem.known))
+    still = problem.values(nominal(), z)
+    z[problem.known.index(late)] = 1.0
+    moved = problem.values(nominal(), z) != still
+    assert moved[problem.run == 1].any() and not moved[problem.run == 0].any()
 
 
 def test_noise_with_a_memory_is_measured_where_the_signal_rests():

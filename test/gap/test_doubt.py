@@ -12,26 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Doubt about numbers, what the other cut says of a tie, and fits side by side."""
+"""Doubt about numbers, what the other subsystem says of a tie, and fits side by side."""
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Choice, Rival
-from pam_sim.gap.cuts import Cut, cuts_of
-from pam_sim.gap.doubt import distance_to_none, spread_of_numbers
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.parts import SELECT
-from pam_sim.gap.prove import Proof
-from pam_sim.gap.side_by_side import side_by_side
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import SELECT
+from pam_sim.gap.fit.distance import distance_to_none
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.fit.parallel import parallel_map
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.ranking import Ranking
+from pam_sim.gap.select.rival import Rival
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.verify.spread import spread_of_numbers
+from pam_sim.gap.verify.validation import Validation
 import pytest
 
 TIME_S = np.arange(4000) * 0.005
 
 
-class Given(Proof):
+class Given(Validation):
     """A calibrated model with one number, known within 1, that moves its run like ``form``."""
 
     def __init__(self, form):
@@ -50,9 +54,9 @@ class Given(Proof):
 
 
 def test_a_number_that_one_motion_hardly_shows_leaves_doubt_in_another():
-    proof = Given(3e-5 * np.cos(TIME_S))
+    validation = Given(3e-5 * np.cos(TIME_S))
     # Known within 1, it moves the run by its form; the rms of a cosine.
-    spread = spread_of_numbers(proof, Given, None, True)
+    spread = spread_of_numbers(validation, Given, None, True)
     assert spread['contraction'] == pytest.approx(3e-5 / np.sqrt(2.0), rel=0.01)
 
 
@@ -74,7 +78,7 @@ def test_a_number_stands_in_for_an_effect_within_its_range_only(most):
         np.sqrt(x @ np.linalg.inv(covariance) @ x))
 
 
-class Blocks(Cut):
+class Blocks(SubsystemProblem):
     """Sixty blocks of one signal that judge; nothing is simulated."""
 
     known, level = [], 1.0
@@ -90,40 +94,40 @@ class Blocks(Cut):
     (0.4, 0.0, ['threshold_pressure']), (0.0, 0.0, ['threshold_pressure', 'pressure_bias']),
     (0.05, 3.0, ['threshold_pressure', 'pressure_bias'])])
 def test_a_tie_is_decided_where_one_of_the_two_does_harm(in_valve, before, names):
-    cuts = [Blocks('valve', 'pressure'), Blocks('muscle', 'contraction')]
+    problems = [Blocks('valve', 'pressure'), Blocks('muscle', 'contraction')]
     pool = {c.name: c for c in candidates(nominal(), ('pressure', 'contraction'))}
     noise = np.random.default_rng(1).standard_normal(6000)
 
     def found(name, valve, muscle):
         effects = (pool[name],) if name else ()
-        return Found(Hypothesis(effects), np.full(len(effects), 0.5),
-                     {'valve': np.zeros(0), 'muscle': np.zeros(0)},
-                     {'valve': noise + valve, 'muscle': noise + muscle}, {})
+        return Fit(Hypothesis(effects), np.full(len(effects), 0.5),
+                   {'valve': np.zeros(0), 'muscle': np.zeros(0)},
+                   {'valve': noise + valve, 'muscle': noise + muscle}, {})
 
     class Tied:
-        base = found(None, before, 5.0)
-        crossed = polish = staticmethod(lambda found: found)
+        base, criteria = found(None, before, 5.0), CRITERIA
+        cross_fit = polish = staticmethod(lambda found: found)
 
-    Tied.cuts = cuts
-    choice = Choice(Tied, Tied.base, 0.05)
+    Tied.problems = problems
+    ranking = Ranking(Tied, Tied.base, 0.05)
     rivals = [Rival(name, found(name, valve, 0.0)) for name, valve in (
         ('threshold_pressure', before), ('pressure_bias', before + in_valve))]
     for r in rivals:
-        r.share = choice.shares(r.found)
-    tied = choice.tied(rivals, Tied.base, cuts[1])
+        r.share = ranking.shares(r.found)
+    tied = ranking.tied(rivals, Tied.base, problems[1])
     assert sorted(r.name for r in tied) == sorted(names)
 
 
 def test_fits_side_by_side_are_those_one_after_another():
-    problem = Problem(nominal(), cuts_of(nominal(), [Recording(recorded(
+    estimator = Estimator(nominal(), subsystem_problems(nominal(), [Recording(recorded(
         nominal().with_(effects=[{'name': 'parallel_spring', 'parameters': {}}]),
         voltages(12.0)), 'ppr')]))
-    slopes = {s: of.copy() for s, of in problem.slopes.items()}
+    slopes = {s: of.copy() for s, of in estimator.slopes.items()}
     pool = [c for c in candidates(nominal(), ('contraction',))
             if c.effect in ('parallel_spring', 'bladder_stiffness', 'end_taper')]
-    fits = [problem.fit(Hypothesis((c,)), [0.5]) for c in pool]
-    alone = [problem.polish(f) for f in fits]
-    for one, other in zip(alone, side_by_side(problem.polish, fits)):
+    fits = [estimator.fit(Hypothesis((c,)), [0.5]) for c in pool]
+    alone = [estimator.polish(f) for f in fits]
+    for one, other in zip(alone, parallel_map(estimator.polish, fits)):
         assert np.array_equal(one.theta, other.theta)
         assert all(np.array_equal(one.errors[s], other.errors[s]) for s in one.errors)
-    assert all(np.array_equal(problem.slopes[s], slopes[s]) for s in slopes)
+    assert all(np.array_equal(estimator.slopes[s], slopes[s]) for s in slopes)

@@ -22,7 +22,7 @@ from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.registry import effects
 import pam_sim.gap
-from pam_sim.gap.free_run import SENSOR_CHANGES
+from pam_sim.gap.subsystems.effects import SENSOR_CHANGES
 from pam_sim.parameters import Parameter
 import pytest
 

@@ -20,8 +20,8 @@ from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.sections.gap import gap_section
 from pam_sim.gap import find_gap
-from pam_sim.gap.fingerprint import BinnedMap, CONDITIONS, conditions_of, explained
-from pam_sim.gap.free_run import Recording
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.report.fingerprint import BinnedMap, CONDITIONS, conditions_of, explained
 import pytest
 
 

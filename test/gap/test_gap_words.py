@@ -24,9 +24,9 @@ from pam_actuation.report.sections.gap import gap_section
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
-from pam_sim.gap.choice import Named
+from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import Calibrated, GapResult, SignalGap
-from pam_sim.gap.words import explain
+from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.run import Run, Series
 import pytest
 
@@ -54,7 +54,7 @@ def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **mo
 
 
 def test_what_grows_rises_and_what_stays_stays():
-    named = [Named('hysteresis', 'muscle', [], ('hysteresis',))]
+    named = [NamedEffect('hysteresis', 'muscle', [], ('hysteresis',))]
     text = said('effects', {'force': FORCE, 'pressure': PRESSURE}, named, effects=['hysteresis'])
     assert 'the gap in force rises from 0.186 to 0.197 N' in text
     assert 'the gap in pressure falls from 8 to 0.4 kPa' in text
@@ -82,15 +82,15 @@ def test_no_pair_of_numbers_is_told_the_wrong_way():
 
 
 def test_only_what_cannot_be_told_apart_is_listed_so():
-    named = [Named('valve_dead_time', 'valve', [], ('valve_dead_time', 'tube_lag')),
-             Named('hysteresis', 'muscle', [], ('hysteresis',))]
+    named = [NamedEffect('valve_dead_time', 'valve', [], ('valve_dead_time', 'tube_lag')),
+             NamedEffect('hysteresis', 'muscle', [], ('hysteresis',))]
     text = said('ambiguous', {'pressure': PRESSURE}, named,
                 effects=['valve_dead_time', 'hysteresis'], parameters=[MASS])
     assert text.startswith('These data cannot tell valve_dead_time and tube_lag apart. Likeliest:')
     likeliest, certain = text.split(' Certain: ')
     assert 'valve_dead_time: delay_s' in likeliest and 'hysteresis' not in likeliest
     assert 'hysteresis: loop' in certain and 'mass_kg = 5.75' in certain
-    named[1] = Named('hysteresis', 'muscle', [], ('hysteresis', 'mass_kg'))
+    named[1] = NamedEffect('hysteresis', 'muscle', [], ('hysteresis', 'mass_kg'))
     text = said('ambiguous', {'pressure': PRESSURE}, named,
                 effects=['valve_dead_time', 'hysteresis'])
     assert 'cannot tell valve_dead_time and tube_lag, nor hysteresis and mass_kg apart.' in text
@@ -141,7 +141,7 @@ def run():
 
 
 def part(run, start, stop, every=1, topics=None):
-    """Return a part of a recording, as a cut or filtered copy holds it."""
+    """Return a part of a recording, as a subsystem or filtered copy holds it."""
     return Run({topic: Series(series.stamp_ns[start:stop:every], {
         name: column[start:stop:every] for name, column in series.values.items()})
         for topic, series in run.topics.items() if topics is None or topic in topics},

@@ -15,7 +15,7 @@
 """Noise read from data: white, quantised, with motion in it."""
 
 import numpy as np
-from pam_sim.gap.noise import autocorrelation_time, noise_sd, quantisation_step, rms_rate
+from pam_sim.gap.data.noise import autocorrelation_time, noise_sd, quantisation_step, rms_rate
 import pytest
 
 

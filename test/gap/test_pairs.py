@@ -16,11 +16,11 @@
 
 from gap_runs import nominal, recorded, voltages
 from pam_sim.gap import find_gap
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.pairs import promising_pairs
-from pam_sim.gap.search import Search
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.select.context import context_of
+from pam_sim.gap.select.pairs import promising_pairs
+from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 CREEP = {'name': 'creep', 'parameters': {
@@ -37,10 +37,10 @@ def run():
 
 
 def test_the_true_pair_promises_most(run):
-    problem = Problem(nominal(), cuts_of(nominal(), [Recording(run, 'ppr')]))
-    screened = Search(problem, 0.05, 0.01).screened
-    cut = next(c for c in problem.cuts if c.subsystem == 'muscle')
-    pairs = promising_pairs(problem, problem.base, screened, cut)
+    estimator = Estimator(nominal(), subsystem_problems(nominal(), [Recording(run, 'ppr')]))
+    screened = context_of(estimator, 0.05, 0.01).screened
+    problem = next(c for c in estimator.problems if c.subsystem == 'muscle')
+    pairs = promising_pairs(estimator, estimator.base, screened, problem)
     assert {c.name for c in pairs[0][0]} == {'creep', 'contraction_bias'}
     assert all(a.name != b.name for (a, b), _ in pairs)
 
@@ -49,7 +49,7 @@ def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
     both = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in both.effects} == {'creep', 'contraction_bias'}
     assert both.verdict == 'effects'
-    monkeypatch.setattr('pam_sim.gap.search.pair_of', lambda search, cut: None)
+    monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
     alone = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in alone.effects} != {'creep', 'contraction_bias'}
 
@@ -57,6 +57,6 @@ def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
 def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
     """One by one, a third one is taken for both, then one of them; when it goes, the other."""
     run = recorded(nominal().with_(effects=[CREEP, SMALLER]), voltages(24.0))
-    monkeypatch.setattr('pam_sim.gap.search.pair_of', lambda search, cut: None)
+    monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
     found = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}

@@ -20,16 +20,17 @@ from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment, protocols
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.plan import in_proportion, least_factors, outlooks, score, Sensitivities
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.plan.outlook import in_proportion, least_factors, outlooks, score
+from pam_sim.gap.plan.sensitivity import Sensitivities
+from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.located_yaml import dump_yaml
 import pytest
 
 NAMES = ('coulomb_friction', 'guide_friction', 'parallel_spring', 'flow_limit')
 
 
-def looks(topics=('pressure', 'contraction', 'force'), seconds=10.0, seed=3):
+def sensitivities(topics=('pressure', 'contraction', 'force'), seconds=10.0, seed=3):
     run = recorded(nominal(), voltages(seconds, seed), topics=topics)
     return Sensitivities(nominal(), Recording(run, 'ppr'), NAMES)
 
@@ -37,14 +38,14 @@ def looks(topics=('pressure', 'contraction', 'force'), seconds=10.0, seed=3):
 @pytest.fixture(scope='module')
 def with_cell():
     """Return the Sensitivities of a protocol with a load cell."""
-    return looks()
+    return sensitivities()
 
 
 def test_friction_at_the_rail_needs_a_load_cell_to_be_told_from_the_muscles(with_cell):
     seen = {o.name: o for o in outlooks(with_cell)}
     assert seen['coulomb_friction'].inseparable == ()
     assert seen['coulomb_friction'].named is not None
-    blind = {o.name: o for o in outlooks(looks(('pressure', 'contraction')))}
+    blind = {o.name: o for o in outlooks(sensitivities(('pressure', 'contraction')))}
     assert 'guide_friction' in blind['coulomb_friction'].inseparable
     assert blind['coulomb_friction'].named is None
 
@@ -54,19 +55,19 @@ def test_at_its_least_size_an_effect_moves_a_signal_by_one_floor(with_cell):
     from scipy.optimize import lsq_linear
     o = next(o for o in outlooks(with_cell) if o.name == 'coulomb_friction')
     rig = nominal().with_(effects=[{'name': o.name, 'parameters': o.visible}])
-    cut = next(c for c in cuts_of(nominal(), [Recording(
-        recorded(nominal(), voltages(10.0)), 'ppr')], own_proof=False)
+    problem = next(c for c in subsystem_problems(nominal(), [Recording(
+        recorded(nominal(), voltages(10.0)), 'ppr')], holds_certify=False)
         if c.subsystem == 'muscle')
-    rows, zero = cut.part < 3, np.zeros(len(cut.known))
-    base = cut.errors(nominal(), zero)
-    slopes = np.column_stack([(cut.errors(nominal(), k.step * unit) - base) / k.step
-                              for k, unit in zip(cut.known, np.eye(len(cut.known)))])[rows]
-    change = (cut.errors(rig, zero) - base)[rows]
+    rows, zero = problem.part < 3, np.zeros(len(problem.known))
+    base = problem.errors(nominal(), zero)
+    slopes = np.column_stack([(problem.errors(nominal(), k.step * unit) - base) / k.step
+                              for k, unit in zip(problem.known, np.eye(len(problem.known)))])[rows]
+    change = (problem.errors(rig, zero) - base)[rows]
     fit = lsq_linear(np.vstack([slopes, np.eye(zero.size)]),
                      -np.append(change, zero), (-3.5, 3.5)).x
     left = change + slopes @ fit
-    worst = max(np.sqrt(np.mean(left[cut.signal[rows] == s] ** 2))
-                for s in range(len(cut.signals)))
+    worst = max(np.sqrt(np.mean(left[problem.signal[rows] == s] ** 2))
+                for s in range(len(problem.signals)))
     assert worst == pytest.approx(1.0, rel=0.15)
 
 

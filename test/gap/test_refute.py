@@ -14,16 +14,21 @@
 
 """What the certify data refuse, and what is too small for a name."""
 
+from types import SimpleNamespace
+
 from gap_runs import nominal
 import numpy as np
-from pam_sim.gap.candidates import candidates, is_limit_at
-from pam_sim.gap.choice import Named, Rival
-from pam_sim.gap.cuts import SKEW_MAX_S
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.parts import SELECT
-from pam_sim.gap.prove import held_without, is_material, Proof
-from pam_sim.gap.refute import refute, unconfirmed
-from pam_sim.gap.search import Search
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.split import SELECT
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select.backward import is_missed
+from pam_sim.gap.select.candidates import candidates, is_limit_at
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.subsystems.known import SKEW_MAX_S
+from pam_sim.gap.verify.materiality import is_material
+from pam_sim.gap.verify.model import held_without
+from pam_sim.gap.verify.refutation import refute, unconfirmed
+from pam_sim.gap.verify.validation import Validation
 import pytest
 
 SIGNALS = ('pressure', 'contraction', 'force')
@@ -35,7 +40,7 @@ NAMES = ('pressure_bias', 'threshold_pressure')
 def found_of(*names):
     effects = tuple(BY_NAME[n] for n in names)
     theta = np.concatenate([np.zeros(0), *(np.ones(len(c.free)) for c in effects)])
-    return Found(Hypothesis(effects), theta, {}, {}, {})
+    return Fit(Hypothesis(effects), theta, {}, {}, {})
 
 
 @pytest.mark.parametrize('moved, apart, drift, left', [
@@ -51,21 +56,22 @@ def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart,
     noise = np.random.default_rng(3).standard_normal(SAMPLES)
     fits = {n: found_of(n) for n in NAMES}
     runs = {(): 0.0 * truth, (NAMES[1],): truth, (NAMES[0],): truth + apart * np.cos(time_s)}
-    proof = Proof.__new__(Proof)
-    proof.drift = [{'contraction': sign * drift * np.cos(time_s)} for sign in (-1.0, 1.0)]
+    validation = Validation.__new__(Validation)
+    validation.drift = [{'contraction': sign * drift * np.cos(time_s)} for sign in (-1.0, 1.0)]
 
     class Given:
         signals, measured = ('contraction',), {'contraction': truth + noise}
 
     class Unchanged:
+        criteria = CRITERIA
         polish = staticmethod(lambda found: found)
 
-    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    validation.recording, validation.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
     # Sine and cosine have half of the square.
-    proof.noise = {'contraction': 1.0 / np.sqrt(2.0)}
-    proof.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
-    named = [Named(NAMES[0], 'muscle', [Rival(n, f) for n, f in fits.items()], NAMES)]
-    kept, final = refute(named, Unchanged(), found_of(), fits[NAMES[0]], proof, True)
+    validation.noise = {'contraction': 1.0 / np.sqrt(2.0)}
+    validation.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
+    named = [NamedEffect(NAMES[0], 'muscle', [Rival(n, f) for n, f in fits.items()], NAMES)]
+    kept, final = refute(named, Unchanged(), found_of(), fits[NAMES[0]], validation, True)
     assert kept[0].names == left and kept[0].name == left[0]
     assert final is fits[left[0]]
 
@@ -76,55 +82,56 @@ def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
     truth, drift = 5.0 * np.sin(time_s), 8.0 * np.cos(time_s)
     noise = np.random.default_rng(4).standard_normal(SAMPLES)
     moves = {name: drift if name == spurious else truth for name in NAMES}
-    proof = Proof.__new__(Proof)
+    validation = Validation.__new__(Validation)
 
     class Given:
         signals, measured = ('contraction',), {'contraction': truth + noise}
 
     class Refitted:
+        criteria = CRITERIA
         fit = staticmethod(lambda left, theta, near: found_of(*left.names))
 
-    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
-    proof.noise = proof.floor = {'contraction': 1.0}
-    proof.run = lambda found, whole: {
+    validation.recording, validation.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    validation.noise = validation.floor = {'contraction': 1.0}
+    validation.run = lambda found, whole: {
         'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
-    proof.after = proof.run(found_of(*NAMES), True)
-    proof.drift = [{'contraction': 0.0 * truth}]
-    named = [Named(n, 'muscle', [], (n,)) for n in NAMES]
+    validation.after = validation.run(found_of(*NAMES), True)
+    validation.drift = [{'contraction': 0.0 * truth}]
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in NAMES]
     final = found_of(*NAMES)
-    name, left = unconfirmed(named, Refitted(), found_of(), final, proof, True)
+    name, left = unconfirmed(named, Refitted(), found_of(), final, validation, True)
     assert name == spurious
     assert left.hypothesis.names == tuple(n for n in NAMES if n != spurious)
     # Where the valve may drift that way by itself, the fall tells nothing.
-    proof.drift = [{'contraction': sign * drift} for sign in (-1.0, 1.0)]
-    assert unconfirmed(named, Refitted(), found_of(), final, proof, True) == (None, final)
-    proof.drift = [{'contraction': 0.0 * truth}]
+    validation.drift = [{'contraction': sign * drift} for sign in (-1.0, 1.0)]
+    assert unconfirmed(named, Refitted(), found_of(), final, validation, True) == (None, final)
+    validation.drift = [{'contraction': 0.0 * truth}]
     # Beside what leaves far more, a small one is not judged.
     Given.measured = {'contraction': truth + noise + 50.0 * np.sin(7.0 * time_s)}
-    assert unconfirmed(named, Refitted(), found_of(), final, proof, True) == (None, final)
+    assert unconfirmed(named, Refitted(), found_of(), final, validation, True) == (None, final)
     Given.measured = {'contraction': truth + noise}
     # What is true stays; of what moves nothing that could be seen there, nothing is said.
-    proof.after = proof.run(left, True)
+    validation.after = validation.run(left, True)
     true = [w for w in named if w.name != spurious]
-    assert unconfirmed(true, Refitted(), found_of(), left, proof, True) == (None, left)
+    assert unconfirmed(true, Refitted(), found_of(), left, validation, True) == (None, left)
     moves[true[0].name] = -0.01 * truth
-    proof.after = proof.run(left, True)
-    assert unconfirmed(true, Refitted(), found_of(), left, proof, True) == (None, left)
+    validation.after = validation.run(left, True)
+    assert unconfirmed(true, Refitted(), found_of(), left, validation, True) == (None, left)
 
 
 @pytest.mark.parametrize('skew_s, left_s', [
     (1e-3, 0.0), (-1e-3, 0.0), (4e-3, 4e-3 - SKEW_MAX_S)])
 def test_a_run_gets_the_skew_of_the_certify_recording_within_bounds(skew_s, left_s):
     time_s = np.arange(SAMPLES) * 0.005
-    proof = Proof.__new__(Proof)
+    validation = Validation.__new__(Validation)
 
     class Given:
         measured = {'contraction': np.sin(3.0 * (time_s - skew_s))}
 
     Given.time_s = {'contraction': time_s}
-    proof.recording, proof.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
+    validation.recording, validation.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
     run = {'contraction': np.sin(3.0 * time_s), 'pressure': time_s}
-    aligned = proof._aligned(run, {'contraction': 0.0, 'force': 0.0})
+    aligned = validation._aligned(run, {'contraction': 0.0, 'force': 0.0})
     assert aligned['pressure'] is time_s
     error = aligned['contraction'] - Given.measured['contraction']
     slope = np.cos(3.0 * time_s) * 3.0
@@ -164,7 +171,7 @@ def test_an_effect_is_missed_in_whichever_cut_gets_worse_without_it(harm):
     class Judged:
         block = np.repeat(np.arange(40), 50)
         part, signal = np.full(2000, SELECT), np.zeros(2000, dtype=int)
-        signals, level, known = ('contraction',), 1.0, []
+        signals, level, known, criteria = ('contraction',), 1.0, [], CRITERIA
 
         def __init__(self, subsystem):
             self.subsystem = subsystem
@@ -173,17 +180,13 @@ def test_an_effect_is_missed_in_whichever_cut_gets_worse_without_it(harm):
             return float(np.mean(errors ** 2))
 
     noise = np.random.default_rng(5).standard_normal(2000)
-    cuts = [Judged('valve'), Judged('muscle')]
+    problems = [Judged('valve'), Judged('muscle')]
 
     def errors(off):
-        return Found(Hypothesis(), np.zeros(0), {}, {
-            c.subsystem: noise + off * (off == 5.0 or c.subsystem == harm) for c in cuts}, {})
+        return Fit(Hypothesis(), np.zeros(0), {}, {
+            c.subsystem: noise + off * (off == 5.0 or c.subsystem == harm) for c in problems}, {})
 
-    class Given(Search):
-        first_gap, least_gap, base = {'valve': 25.0, 'muscle': 25.0}, 0.01, errors(5.0)
-
-        def __init__(self):
-            pass
-
-    missed = [c.subsystem for c in cuts if Given()._is_missed(c, errors(0.0), errors(3.0))]
+    given = SimpleNamespace(criteria=CRITERIA, first_gap={'valve': 25.0, 'muscle': 25.0},
+                            least_gap=0.01, base=errors(5.0))
+    missed = [c.subsystem for c in problems if is_missed(given, c, errors(0.0), errors(3.0))]
     assert missed == [harm] * (harm is not None)

@@ -17,7 +17,7 @@
 from gap_runs import nominal, recorded, voltages
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
-from pam_sim.gap.candidates import candidates, relatives
+from pam_sim.gap.select.candidates import candidates, relatives
 import pytest
 
 NAMES = ['coulomb_friction', 'pressure_friction', 'viscous_damping']

@@ -16,20 +16,20 @@
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.screen import screen
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.screening import screen
+from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 
 def screened(rig, given, valve_signal):
     """Return (baseline, candidates as screened) for a recording of a rig and a given model."""
     recording = Recording(recorded(rig, valve_signal), given.valve)
-    problem = Problem(given, cuts_of(given, [recording]))
+    estimator = Estimator(given, subsystem_problems(given, [recording]))
     found = candidates(given, ('pressure', 'contraction', 'force'))
-    return problem.base, screen(problem, problem.base, found)
+    return estimator.base, screen(estimator, estimator.base, found)
 
 
 def first(found, subsystem):

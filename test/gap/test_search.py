@@ -21,18 +21,21 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
-from pam_sim.gap.candidates import candidates, split_refinements
-from pam_sim.gap.choice import Rival, without_limits
-from pam_sim.gap.compare import preference, share
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.finish import CERTAIN_SIZE
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.look_alikes import look_alikes
-from pam_sim.gap.parts import SELECT
-from pam_sim.gap.screen import Screened
-from pam_sim.gap.search import Search
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import SELECT
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.plan.look_alikes import look_alikes
+from pam_sim.gap.select.candidates import candidates, split_refinements
+from pam_sim.gap.select.comparison import preference, share
+from pam_sim.gap.select.context import first_gap_of, SearchContext
+from pam_sim.gap.select.forward import mends_a_formulation
+from pam_sim.gap.select.ranking import without_limits
+from pam_sim.gap.select.rival import Rival
+from pam_sim.gap.select.rivals import names_that_contend, other_starts, refined
+from pam_sim.gap.select.screening import Screened
+from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 
@@ -92,11 +95,11 @@ def test_a_number_that_hides_the_gap_from_far_off_is_what_is_wrong(too_large):
 
 @pytest.mark.parametrize('promise, flat, first', [(0.1, 0.02, 0.08), (0.001, 0.2, 0.16)])
 def test_what_drifts_slowly_opens_a_cut_at_full_weight(promise, flat, first):
-    cut = types.SimpleNamespace(subsystem='muscle', level=1.0, chi2=lambda errors, part: 0.8)
-    given = types.SimpleNamespace(
-        base=types.SimpleNamespace(errors={'muscle': None}), seen_gap=0.05, screened=[Screened(
-            None, (), {'muscle': promise}, flat=Screened(None, (), {'muscle': flat}))])
-    assert Search._first_gap(given, cut) == pytest.approx(first)
+    problem = types.SimpleNamespace(subsystem='muscle', level=1.0, chi2=lambda errors, part: 0.8)
+    base = types.SimpleNamespace(errors={'muscle': None})
+    screened = [Screened(
+        None, (), {'muscle': promise}, flat=Screened(None, (), {'muscle': flat}))]
+    assert first_gap_of(problem, base, screened, 0.05) == pytest.approx(first)
 
 
 def test_names_can_be_limited():
@@ -111,20 +114,20 @@ def test_a_formulation_never_fits_worse_than_the_one_it_contains():
     rig = nominal().with_(effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.0}}])
     recording = Recording(recorded(rig, voltages(12.0)), 'ppr')
-    problem = Problem(nominal(), cuts_of(nominal(), [recording]))
+    estimator = Estimator(nominal(), subsystem_problems(nominal(), [recording]))
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
     coulomb = by_name['coulomb_friction']
-    one = problem.fit(Hypothesis((coulomb,)), [0.5])
-    two = problem.fit(Hypothesis((coulomb, by_name['end_taper'])), [*one.theta, 0.0], one)
-    assert problem.cost(one) < 0.05 * problem.cost(problem.base)
-    assert problem.cost(two) < 1.01 * problem.cost(one)
-    cut = problem.cuts[1]
-    base = problem.base.errors['muscle']
-    assert share(cut, base, one.errors['muscle']) > 0.95
-    assert preference(cut, base, one.errors['muscle'], base, SELECT) > 3.0
-    assert preference(cut, base, base, one.errors['muscle'], SELECT) < -3.0
+    one = estimator.fit(Hypothesis((coulomb,)), [0.5])
+    two = estimator.fit(Hypothesis((coulomb, by_name['end_taper'])), [*one.theta, 0.0], one)
+    assert estimator.cost(one) < 0.05 * estimator.cost(estimator.base)
+    assert estimator.cost(two) < 1.01 * estimator.cost(one)
+    problem = estimator.problems[1]
+    base = estimator.base.errors['muscle']
+    assert share(problem, base, one.errors['muscle']) > 0.95
+    assert preference(problem, base, one.errors['muscle'], base, SELECT) > 3.0
+    assert preference(problem, base, base, one.errors['muscle'], SELECT) < -3.0
     # The size of what is there is certain, that of what is not may be none.
-    assert problem.certainty(two, 0) > CERTAIN_SIZE > problem.certainty(two, 1)
+    assert estimator.certainty(two, 0) > CRITERIA.certain_size > estimator.certainty(two, 1)
 
 
 @pytest.mark.parametrize('name, kept', [
@@ -133,18 +136,19 @@ def test_a_loop_that_has_lost_its_width_is_the_simpler_friction(name, kept):
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
 
     def rival(effect, theta, share_of_gap):
-        found = Found(Hypothesis((by_name[effect],)), np.array(theta), {}, {}, {})
+        found = Fit(Hypothesis((by_name[effect],)), np.array(theta), {}, {}, {})
         return Rival(by_name[effect].name, found, {'muscle': share_of_gap})
 
     stiffness = by_name['hysteresis_lugre'].free[2]
     narrow = rival('hysteresis_lugre', [1.0, 0.0, stiffness.coordinate(stiffness.upper)], 0.99)
     wide = rival('hysteresis_lugre', [1.0, 0.0, 0.0], 0.99)
     near = rival(name, [1.0], 0.95)
-    bare = Found(Hypothesis(), np.zeros(0), {}, {}, {})
+    bare = Fit(Hypothesis(), np.zeros(0), {}, {}, {})
     assert narrow.at_edge and not wide.at_edge and not near.at_edge
-    assert without_limits([near, narrow], bare, 'muscle') == ([narrow] if kept else []) + [near]
-    assert without_limits([near, wide], bare, 'muscle') == [wide, near]
-    assert without_limits([narrow], near.found, 'muscle') == ([narrow] if kept else [])
+    assert without_limits([near, narrow], bare, 'muscle', CRITERIA) == (
+        [narrow] if kept else []) + [near]
+    assert without_limits([near, wide], bare, 'muscle', CRITERIA) == [wide, near]
+    assert without_limits([narrow], near.found, 'muscle', CRITERIA) == ([narrow] if kept else [])
 
 
 @pytest.mark.parametrize('winner, rest, mends', [
@@ -155,11 +159,12 @@ def test_a_loop_that_has_lost_its_width_is_the_simpler_friction(name, kept):
 def test_a_small_rest_is_no_second_effect_of_the_same_family(winner, rest, mends):
     (friction,) = [c for c in candidates(nominal(), ('contraction',), ['coulomb_friction'])
                    if c.effect == 'coulomb_friction']
-    cut = types.SimpleNamespace(level=1.0, chi2=lambda errors, part: 1.0 + 100.0 * rest)
-    given = types.SimpleNamespace(_cut=lambda subsystem: cut, first_gap={'muscle': 100.0})
-    current = Found(Hypothesis((friction,)), np.ones(1), {}, {'muscle': None}, {})
+    problem = types.SimpleNamespace(level=1.0, chi2=lambda errors, part: 1.0 + 100.0 * rest)
+    given = types.SimpleNamespace(
+        problem_of=lambda subsystem: problem, first_gap={'muscle': 100.0}, criteria=CRITERIA)
+    current = Fit(Hypothesis((friction,)), np.ones(1), {}, {'muscle': None}, {})
     named = types.SimpleNamespace(name=winner, subsystem='muscle')
-    assert Search._mends_a_form(given, named, current) is mends
+    assert mends_a_formulation(given, named, current) is mends
 
 
 @pytest.mark.parametrize('share_of_gap, before, tried', [
@@ -167,13 +172,13 @@ def test_a_small_rest_is_no_second_effect_of_the_same_family(winner, rest, mends
 def test_what_explains_nearly_all_is_refined_from_where_it_ended(share_of_gap, before, tried):
     by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
     plain, bending = by_name['coulomb_friction'], by_name['coulomb_friction_presliding']
-    found = Found(Hypothesis((by_name['end_taper'], plain)), np.array([0.1, 2.5]), {}, {}, {})
+    found = Fit(Hypothesis((by_name['end_taper'], plain)), np.array([0.1, 2.5]), {}, {}, {})
     rivals = [Rival('coulomb_friction', found, {'muscle': share_of_gap}),
               Rival('end_taper', found, {'muscle': 0.99})]
     _, refinements = split_refinements([by_name['coulomb_friction'], *(
         c for c in by_name.values() if c.effect.startswith('coulomb_friction_'))])
-    refined = Search._refined(rivals, refinements, {'muscle': before}, 1)
-    assert [(s.candidate, s.start) for s in refined] == (
+    found = refined(rivals, refinements, {'muscle': before}, 1, CRITERIA)
+    assert [(s.candidate, s.start) for s in found] == (
         [(bending, (2.5, 0.0, 1.0))] if tried else [])
 
 
@@ -185,13 +190,13 @@ def test_a_limit_keeps_nothing_from_being_refined(stiffness_n_per_m, tried):
     plain, loop = by_name['pressure_friction'], by_name['hysteresis_lugre']
     values = {'force_n': 0.0, 'force_per_pa': 7.4e-7, 'stiffness_n_per_m': stiffness_n_per_m}
     rivals = [
-        Rival('pressure_friction', Found(
+        Rival('pressure_friction', Fit(
             Hypothesis((plain,)), np.array([0.3]), {}, {}, {}), {'muscle': 0.985}),
-        Rival('hysteresis', Found(Hypothesis((loop,)), np.array(
+        Rival('hysteresis', Fit(Hypothesis((loop,)), np.array(
             [f.coordinate(values[f.name]) for f in loop.free]), {}, {}, {}), {'muscle': 0.9988})]
-    refined = Search._refined(
-        rivals, [by_name['pressure_friction_presliding']], {'muscle': 0.0}, 0)
-    assert [s.candidate.effect for s in refined] == ['pressure_friction_presliding'] * tried
+    found = refined(
+        rivals, [by_name['pressure_friction_presliding']], {'muscle': 0.0}, 0, CRITERIA)
+    assert [s.candidate.effect for s in found] == ['pressure_friction_presliding'] * tried
 
 
 @pytest.mark.parametrize('best, left, again', [
@@ -201,34 +206,35 @@ def test_a_limit_keeps_nothing_from_being_refined(stiffness_n_per_m, tried):
 def test_what_contends_is_fitted_from_elsewhere_where_all_leave_much(best, left, again):
     pool = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
     delay = pool['valve_dead_time']
-    cuts = [types.SimpleNamespace(subsystem=s, level=1.0, chi2=lambda errors, part: 1.0 + errors)
-            for s in ('valve', 'muscle')]
+    problems = [types.SimpleNamespace(
+        subsystem=s, level=1.0, chi2=lambda errors, part: 1.0 + errors)
+                for s in ('valve', 'muscle')]
     found = types.SimpleNamespace(errors={'valve': left, 'muscle': left})
     rivals = [Rival('valve_dead_time', found, {'valve': best, 'muscle': 0.0}),
               Rival('creep', found, {'valve': 0.0, 'muscle': 0.97})]
     contending = [Screened(delay, (7.0,), {}), Screened(pool['end_taper'], (3.0,), {})]
-    tried = Search._other_starts(rivals, contending, cuts)
+    tried = other_starts(rivals, contending, problems, CRITERIA)
     assert [(s.candidate, s.start) for s in tried] == ([(delay, (1.0,))] if again else [])
 
 
 def test_names_contend_at_the_level_that_rivals_reach_and_are_refined_at_the_one_before():
     """A gap below the floor has names, and the best of two that refine no rest of zero."""
-    cut = types.SimpleNamespace(subsystem='valve', level=1.0, chi2=lambda errors, part: errors)
+    problem = types.SimpleNamespace(subsystem='valve', level=1.0, chi2=lambda errors, part: errors)
     base, rests = 0.99, {'leakage': 0.95, 'pressure_bias': 0.96, 'tube_lag': 0.985}
 
     def shares(found):
-        whole = base - cut.level
+        whole = base - problem.level
         return {'valve': min((base - found.errors['valve']) / whole, 1.0) if whole > 0.0 else 0.0}
 
     rivals = [Rival(name, types.SimpleNamespace(errors={'valve': rest}), {'valve': 0.0})
               for name, rest in rests.items()]
-    search = types.SimpleNamespace(
-        choice=types.SimpleNamespace(shares=shares), _contending=Search._contending)
-    search.set_levels = types.MethodType(Search.set_levels, search)
+    given = types.SimpleNamespace(
+        ranking=types.SimpleNamespace(shares=shares), criteria=CRITERIA)
+    given.set_levels = types.MethodType(SearchContext.set_levels, given)
     current = types.SimpleNamespace(errors={'valve': base})
-    assert Search._names_that_contend(search, rivals, current, [cut]) == {
+    assert names_that_contend(given, rivals, current, [problem]) == {
         'leakage', 'pressure_bias'}
-    assert cut.level == 1.0 and [r.share['valve'] for r in rivals] == [0.0, 0.0, 0.0]
+    assert problem.level == 1.0 and [r.share['valve'] for r in rivals] == [0.0, 0.0, 0.0]
 
 
 def test_two_frictions_over_a_narrow_band_stay_together():

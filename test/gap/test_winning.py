@@ -21,16 +21,21 @@ from gap_rivals import Blocks, Tied
 from gap_runs import NOMINAL, nominal
 import numpy as np
 from pam_sim import load_rig
-from pam_sim.gap import workflow
-from pam_sim.gap.candidates import candidates
-from pam_sim.gap.choice import Named, Rival
-from pam_sim.gap.compare import CERTAIN_T, preference
-from pam_sim.gap.cuts import known_numbers
-from pam_sim.gap.finish import within_the_chain
-from pam_sim.gap.hypothesis import Found, Hypothesis
-from pam_sim.gap.parts import FIT, SELECT
-from pam_sim.gap.screen import Screened
-from pam_sim.gap.search import Search
+from pam_sim.gap import verdict as verdict_module
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select import backward, rerank, size
+from pam_sim.gap.select.backward import eliminated, is_missed
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.comparison import preference
+from pam_sim.gap.select.plausibility import is_poor
+from pam_sim.gap.select.rerank import ranked_again
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.select.rivals import best_of_each_name, containing
+from pam_sim.gap.select.screening import Screened
+from pam_sim.gap.select.size import with_certain_sizes, within_the_chain
+from pam_sim.gap.subsystems.known import known_numbers
 import pytest
 
 BIAS = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
@@ -40,9 +45,9 @@ BIAS = next(c for c in candidates(nominal(), ('pressure', 'contraction'))
 class GoesOn(Tied):
     """Rivals that end elsewhere when their fit goes on; ``went_on`` tells which did."""
 
-    def __init__(self, cut, before, left, ends=None):
+    def __init__(self, problem, before, left, ends=None):
         self.went_on, self.ends = [], ends or {}
-        super().__init__(cut, before, left)
+        super().__init__(problem, before, left)
 
     def polish(self, found):
         """Return where a fit ends."""
@@ -55,7 +60,7 @@ class GoesOn(Tied):
 def test_a_fit_that_cannot_explain_enough_of_a_rest_does_not_go_on(off, goes_on):
     case = GoesOn(Blocks(60), 5.0, {'bladder_stiffness': off})
     current = case._found('coulomb_friction', 2.5)
-    case.choice.tied(case.rivals, current, case.cuts[0])
+    case.ranking.tied(case.rivals, current, case.problems[0])
     # Of the rest of 6.25 floors squared 70 % must go; a fit that goes on may halve its own.
     assert case.went_on == ['bladder_stiffness'][:goes_on]
     alone = GoesOn(Blocks(60), 5.0, {'bladder_stiffness': off})
@@ -74,36 +79,34 @@ def test_a_fit_within_the_noise_goes_on_before_it_counts_as_behind(end, tied):
 
 @pytest.mark.parametrize('elsewhere, sure', [(True, True), (False, False)])
 def test_half_sure_is_asked_of_all_of_the_data(elsewhere, sure):
-    cut = Blocks(60)
-    cut.part = np.where(cut.block % 2, SELECT, FIT)
+    problem = Blocks(60)
+    problem.part = np.where(problem.block % 2, SELECT, FIT)
     rng = np.random.default_rng(4)
     before, after = rng.uniform(1.2, 3.2, 60), rng.uniform(0.8, 3.0, 60)
-    case = Tied(cut, before, {'bladder_stiffness': after})
+    case = Tied(problem, before, {'bladder_stiffness': after})
     rival = case.rivals[0]
-    alone = preference(cut, case.base.errors['muscle'], rival.found.errors['muscle'],
+    alone = preference(problem, case.base.errors['muscle'], rival.found.errors['muscle'],
                        case.base.errors['muscle'], quiet=True)
-    assert 1.0 < alone < CERTAIN_T
+    assert 1.0 < alone < CRITERIA.certain_t
     if not elsewhere:                     # fitted to one half it does nothing for the other
-        rival.crossed = case._found('bladder_stiffness', before)
-    assert case.choice._is_sure(rival, case.base, cut) == sure
+        rival.cross_fit = case._found('bladder_stiffness', before)
+    assert case.ranking._is_sure(rival, case.base, problem) == sure
 
 
-class Stage(Search):
-    """A search with one cut, of which only single stages are asked."""
-
-    def __init__(self, case):
-        self.problem, self.base = SimpleNamespace(cuts=case.cuts), case.base
-        self.pool = candidates(nominal(), ('contraction',))
+def context(case):
+    """Return the context of a search with one subsystem."""
+    return SimpleNamespace(problems=case.problems, base=case.base, criteria=CRITERIA,
+                           pool=candidates(nominal(), ('contraction',)))
 
 
 @pytest.mark.parametrize('at_edge, best', [(False, 0.1), (True, 0.5)])
 def test_of_a_name_the_formulation_that_leaves_least_competes(at_edge, best):
-    cut = Blocks(60)
-    case = Tied(cut, 5.0, {'bladder_stiffness': 0.5, 'parallel_spring': 0.1})
-    cut.level = 2.0                       # both explain all beyond it
+    problem = Blocks(60)
+    case = Tied(problem, 5.0, {'bladder_stiffness': 0.5, 'parallel_spring': 0.1})
+    problem.level = 2.0                       # both explain all beyond it
     forms = [SimpleNamespace(name='friction', found=r.found, at_edge=edge, off=off)
              for r, edge, off in zip(case.rivals, (False, at_edge), (0.5, 0.1))]
-    found = Stage(case)._best_of_name(forms)
+    found = best_of_each_name(context(case), forms)
     assert [r.off for r in found] == [best]
 
 
@@ -114,8 +117,8 @@ def test_of_a_name_the_formulation_that_leaves_least_competes(at_edge, best):
     ('threshold_pressure', 6.0, 0.93, False), ('threshold_pressure', 6.0, 0.89, True)])
 def test_a_clear_rest_costs_a_name_of_several_formulations_earlier(name, off, explained, poor):
     case = Tied(Blocks(60), 20.0, {name: off})
-    assert Stage(case)._is_poor(
-        case.cuts[0], case.rivals[0].found, {'muscle': explained}) == poor
+    assert is_poor(
+        context(case), case.problems[0], case.rivals[0].found, {'muscle': explained}) == poor
 
 
 @pytest.mark.parametrize('off, explained, poor', [
@@ -123,10 +126,10 @@ def test_a_clear_rest_costs_a_name_of_several_formulations_earlier(name, off, ex
 def test_a_number_of_the_model_leaves_no_clear_rest(off, explained, poor):
     case = Tied(Blocks(60), 20.0, {'threshold_pressure': off})
     mass = next(k for k in known_numbers(nominal()) if k.name == 'mass_kg')
-    case.cuts[0].known = [mass]
+    case.problems[0].known = [mass]
     found = replace(case.rivals[0].found, hypothesis=Hypothesis((), ('mass_kg',)),
                     known_z={'muscle': np.array([8.0])})
-    assert Stage(case)._is_poor(case.cuts[0], found, {'muscle': explained}) == poor
+    assert is_poor(context(case), case.problems[0], found, {'muscle': explained}) == poor
 
 
 @pytest.mark.parametrize('form', ['valve_dead_zone', 'valve_dead_zone_gradual'])
@@ -139,7 +142,7 @@ def test_a_valve_that_opens_as_late_as_it_closes_only_delays(form, open_s, close
     times = {'open_time_s': open_s, 'close_time_s': close_s}
     theta = [f.coordinate(times.get(f.name, f.typical)) for f in effect.free]
     assert within_the_chain(
-        Found(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0) == delays
+        Fit(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0, CRITERIA) == delays
 
 
 @pytest.mark.parametrize('off, materiality, verdict', [
@@ -147,53 +150,56 @@ def test_a_valve_that_opens_as_late_as_it_closes_only_delays(form, open_s, close
 def test_a_gap_without_a_name_must_be_clear(monkeypatch, off, materiality, verdict):
     signal = SimpleNamespace(rmse_refit=np.hypot(1.0, off))
     result = SimpleNamespace(parameters=[], signals={'pressure': signal})
-    proof = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': 0.8},
-                            unexplained=lambda: 1.0)
-    monkeypatch.setattr(workflow, 'is_material', lambda *given: False)
-    monkeypatch.setattr(workflow, 'spread_of_numbers', lambda *given: {})
-    proof.moved = proof.fall = lambda *given: (0.0, 0.0)
-    proof.refit = proof.after = None
+    validation = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': 0.8},
+                                 unexplained=lambda: 1.0)
+    monkeypatch.setattr(verdict_module, 'is_material', lambda *given: False)
+    monkeypatch.setattr(verdict_module, 'spread_of_numbers', lambda *given: {})
+    validation.moved = validation.fall = lambda *given: (0.0, 0.0)
+    validation.refit = validation.after = None
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
-    monkeypatch.setattr(workflow, 'held_without', lambda found: found)
+    monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(named=[], share={'valve': 0.0})
-    workflow._judge(result, outcome, None, proof, found, found, materiality, True)
+    estimator = SimpleNamespace(criteria=CRITERIA)
+    verdict_module.judge(
+        result, outcome, estimator, validation, found, found, materiality, True)
     assert result.verdict == verdict
 
 
 @pytest.mark.parametrize('tied, named', [
     (['pressure_bias'], ('pressure_bias',)), (['leakage'], ('leakage',)),
     (['leakage', 'pressure_bias'], ('leakage', 'pressure_bias')), ([], ('leakage',))])
-def test_beside_another_effect_the_better_of_two_sensor_causes_takes_the_place(tied, named):
-    alone = Found(Hypothesis((BIAS,)), np.ones(1), {}, {}, {})
+def test_beside_another_effect_the_better_of_two_sensor_causes_takes_the_place(
+        monkeypatch, tied, named):
+    alone = Fit(Hypothesis((BIAS,)), np.ones(1), {}, {}, {})
     # By itself the bias explains what the threshold does; beside that it may be what the leak was.
     bias = Rival('pressure_bias', alone, {'valve': -2.0, 'muscle': 0.99})
-    both = [Named('leakage', 'valve', [bias], ('leakage',)),
-            Named('threshold_pressure', 'muscle', [], ('threshold_pressure',))]
+    both = [NamedEffect('leakage', 'valve', [bias], ('leakage',)),
+            NamedEffect('threshold_pressure', 'muscle', [], ('threshold_pressure',))]
 
-    class Given(Search):
-
-        def __init__(self):
-            self.choice = SimpleNamespace(
-                shares=lambda found: {},
-                tied=lambda rivals, current, cut: [
-                    next(r for r in rivals if r.name == name) for name in tied])
-            self._swapped = lambda current, out, put=None: alone
-            self._cut = lambda subsystem: None
-
-    found = Given()._resolve(SimpleNamespace(hypothesis=SimpleNamespace(
+    given = SimpleNamespace(
+        criteria=CRITERIA, estimator=None, problem_of=lambda subsystem: None,
+        ranking=SimpleNamespace(
+            shares=lambda found: {}, tied=lambda rivals, current, problem: [
+                next(r for r in rivals if r.name == name) for name in tied]))
+    monkeypatch.setattr(
+        rerank, 'fit_without', lambda estimator, current, name, put=None: alone)
+    found = ranked_again(given, SimpleNamespace(hypothesis=SimpleNamespace(
         names=('leakage', 'threshold_pressure'))), both)[1]
     assert [w.names for w in found] == [named, ('threshold_pressure',)]
 
 
 @pytest.mark.parametrize('effect, number', [
     ('viscous_damping', 'damping_n_s_per_m'), ('dead_volume', 'V_dead')])
-def test_a_number_and_the_effect_that_is_another_name_of_it_are_one(effect, number):
+def test_a_number_and_the_effect_that_is_another_name_of_it_are_one(
+        monkeypatch, effect, number):
     given = SimpleNamespace(
-        problem=SimpleNamespace(cuts=['muscle']), matters=lambda current, without: True,
-        _is_missed=lambda *judged: True, _swapped=lambda current, out: (*current, out))
-    named = [Named(n, 'muscle', [], (n,)) for n in (number, 'creep', effect)]
-    assert Search._eliminate(given, (), named) == ((number,), named[1:])
-    assert Search._eliminate(given, (), named[:2]) == ((), named[:2])
+        problems=['muscle'], estimator=None, matters=lambda current, without: True)
+    monkeypatch.setattr(backward, 'is_missed', lambda *judged: True)
+    monkeypatch.setattr(
+        backward, 'fit_without', lambda estimator, current, name: (*current, name))
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in (number, 'creep', effect)]
+    assert eliminated(given, (), named) == ((number,), named[1:])
+    assert eliminated(given, (), named[:2]) == ((), named[:2])
 
 
 def test_an_effect_that_gave_way_to_its_limit_is_tried_beside_it():
@@ -203,8 +209,8 @@ def test_an_effect_that_gave_way_to_its_limit_is_tried_beside_it():
 
     creep, loops = screened('creep', 0.0)[0], screened('hysteresis', 0.1, 0.3, 0.2)
     given = [creep, *loops, *screened('end_taper', 0.9)]
-    assert Search._wider(given, {'bladder_stiffness'}) == [creep]
-    assert Search._wider(given, {'coulomb_friction', 'parallel_spring'}) == [loops[1]]
+    assert containing(given, {'bladder_stiffness'}) == [creep]
+    assert containing(given, {'coulomb_friction', 'parallel_spring'}) == [loops[1]]
 
 
 @pytest.mark.parametrize('left, beside, missed', [
@@ -212,64 +218,60 @@ def test_an_effect_that_gave_way_to_its_limit_is_tried_beside_it():
 def test_what_is_alone_in_its_cut_is_missed_as_a_single_effect_is(left, beside, missed):
     case = Tied(Blocks(60), 1.2, {'bladder_stiffness': 1.2 * left})
     given = SimpleNamespace(
-        base=case.base, first_gap={'muscle': 1.44}, least_gap=0.01)
-    assert Search._is_missed(given, case.cuts[0], case.rivals[0].found,
-                             case._found(beside, 1.2)) == missed
+        base=case.base, first_gap={'muscle': 1.44}, least_gap=0.01, criteria=CRITERIA)
+    assert is_missed(given, case.problems[0], case.rivals[0].found,
+                     case._found(beside, 1.2)) == missed
 
 
 @pytest.mark.parametrize('names, at_most', [
     (('creep',), 1.2), (('creep', 'end_taper'), 1.4), (('mass_kg',), 1.0)])
 def test_how_large_effects_may_be_rests_on_the_least_certain(names, at_most):
-    problem = SimpleNamespace(certainty=lambda final, place: 1.96 / (0.2, 0.4)[place])
+    estimator = SimpleNamespace(certainty=lambda final, place: 1.96 / (0.2, 0.4)[place])
     effects = tuple(SimpleNamespace(name=n) for n in ('creep', 'end_taper'))
     final = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects))
-    named = [Named(n, 'muscle', [], (n,)) for n in names]
-    assert workflow._at_most(problem, final, named) == pytest.approx(at_most, rel=1e-4)
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in names]
+    assert verdict_module._at_most(estimator, final, named) == pytest.approx(at_most, rel=1e-4)
 
 
 @pytest.mark.parametrize('certainty, verdict', [(6.0, 'effects'), (60.0, 'no_gap')])
 def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
         monkeypatch, certainty, verdict):
     result = SimpleNamespace(parameters=[], effects=['creep'], signals={})
-    proof = SimpleNamespace(noise={}, unexplained=lambda: 0.0, fall=lambda *given: (1.0, 0.8),
-                            moved=lambda *given: {'contraction': 0.8}, refit=None, after=None)
-    monkeypatch.setattr(workflow, 'held_without', lambda found: found)
+    validation = SimpleNamespace(
+        noise={}, unexplained=lambda: 0.0, fall=lambda *given: (1.0, 0.8),
+        moved=lambda *given: {'contraction': 0.8}, refit=None, after=None)
+    monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     creep = SimpleNamespace(name='creep')
     final = SimpleNamespace(hypothesis=SimpleNamespace(effects=(creep,)))
     outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
-        Named('creep', 'muscle', [], ('creep',))])
-    problem = SimpleNamespace(certainty=lambda found, place: certainty)
-    workflow._judge(result, outcome, problem, proof, None, final, 1.0, True)
+        NamedEffect('creep', 'muscle', [], ('creep',))])
+    estimator = SimpleNamespace(
+        certainty=lambda found, place: certainty, criteria=CRITERIA)
+    verdict_module.judge(result, outcome, estimator, validation, None, final, 1.0, True)
     assert result.verdict == verdict
 
 
 @pytest.mark.parametrize('plain_share, stays', [(0.95, True), (0.85, False)])
 def test_a_name_that_a_further_shape_made_uncertain_stands_in_its_plainer_form(
-        plain_share, stays):
+        monkeypatch, plain_share, stays):
     by_name = {c.effect: c for c in candidates(nominal(), ('contraction',))}
 
     def rival(form, share):
         candidate = by_name[form]
-        return Rival('coulomb_friction', Found(
+        return Rival('coulomb_friction', Fit(
             Hypothesis((candidate,)), np.ones(len(candidate.free)), {}, {}, {}), {'muscle': share})
 
     forms = [rival('coulomb_friction_presliding', 1.0), rival('coulomb_friction', plain_share)]
-    none = Found(Hypothesis(), np.zeros(0), {}, {}, {})
+    none = Fit(Hypothesis(), np.zeros(0), {}, {}, {})
     shares = {id(r.found): r.share for r in forms}
 
-    class Last(Search):
-        problem = SimpleNamespace(cuts=[], polish=lambda found: found)
-        choice = SimpleNamespace(shares=lambda found: shares[id(found)])
-
-        def __init__(self):
-            pass
-
-        def _stands(self, name, current):
-            return len(current.hypothesis.effects[0].free) == 1
-
-        def _swapped(self, current, out, put=None):
-            return put.found if put else none
-
-    named = [Named('coulomb_friction', 'muscle', forms, ('coulomb_friction',), forms)]
-    left = Last()._established(forms[0].found, named)
+    given = SimpleNamespace(
+        problems=[], criteria=CRITERIA, estimator=SimpleNamespace(polish=lambda found: found),
+        ranking=SimpleNamespace(shares=lambda found: shares[id(found)]))
+    monkeypatch.setattr(size, '_stands', lambda context, name, current: (
+        len(current.hypothesis.effects[0].free) == 1))
+    monkeypatch.setattr(size, 'fit_without', lambda estimator, current, name, put=None: (
+        put.found if put else none))
+    named = [NamedEffect('coulomb_friction', 'muscle', forms, ('coulomb_friction',), forms)]
+    left = with_certain_sizes(given, forms[0].found, named)
     assert left == ((forms[1].found, named) if stays else (none, []))

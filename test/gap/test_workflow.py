@@ -21,9 +21,10 @@ import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
-from pam_sim.gap.free_run import free_run, held_mean, Recording
-from pam_sim.gap.parts import CERTIFY, FIT, part_of, SELECT, UNUSED
+from pam_sim.gap.data.recording import held_mean, Recording
+from pam_sim.gap.data.split import CERTIFY, FIT, part_of, SELECT, UNUSED
 from pam_sim.gap.result import SignalGap
+from pam_sim.gap.subsystems.simulation import free_run
 import pytest
 
 
@@ -193,7 +194,7 @@ def test_parts_cover_everything_once_the_start_has_settled():
     part = part_of(np.arange(0.0, 20.0, 0.5), 20.0)
     assert part[0] == UNUSED
     assert [(part == p).sum() for p in (FIT, SELECT, CERTIFY)] == [15, 16, 8]
-    assert not (part_of(np.arange(0.5, 20.0, 0.5), 20.0, own_proof=False) == CERTIFY).any()
+    assert not (part_of(np.arange(0.5, 20.0, 0.5), 20.0, holds_certify=False) == CERTIFY).any()
 
 
 def test_shrink_takes_the_noise_out():

@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_sim.effects.registry import effects
-from pam_sim.gap.free_run import free_run, Recording
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.model_file import load_rig
 import pytest
 import truth_bags

@@ -101,11 +101,11 @@ print(abs(ours.contraction_m - bare.contraction_m).max() > 1e-6)
 
 RANKING = """
 from pam_sim import load_rig
-from pam_sim.gap.candidates import candidates, is_limit
-from pam_sim.gap.cuts import cuts_of
-from pam_sim.gap.fit import Problem
-from pam_sim.gap.free_run import Recording
-from pam_sim.gap.screen import screen
+from pam_sim.gap.select.candidates import candidates, is_limit
+from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.select.screening import screen
 from pam_sim.run import Run, Series
 import numpy as np
 rig = load_rig('dmsp_5_300_hanging_mass')

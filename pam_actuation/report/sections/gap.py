@@ -145,7 +145,7 @@ def _calibration(result):
         return ''
     wrong = {p.name for p in result.parameters}
     rows = [[c.name, f'{c.nominal:.5g} {c.unit}', f'{c.value:.5g} {c.unit}',
-             f'{c.ci95[0]:.5g} … {c.ci95[1]:.5g}', f'{c.pull:+.1f}',
+             f'{c.ci95[0]:.5g} … {c.ci95[1]:.5g}', f'{c.prior_deviation:+.1f}',
              'wrong' if c.name in wrong else ''] for c in result.calibration]
     return ('<details><summary>Calibrated numbers</summary>'
             + table(['number', 'nominal', 'calibrated', '95 % interval',

@@ -19,7 +19,7 @@ import numpy as np
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, table
 from pam_actuation.report.sections.replay import SHOWN
-from pam_sim.gap.fingerprint import CONDITIONS, conditions_of, MOTIONS
+from pam_sim.gap.report.fingerprint import CONDITIONS, conditions_of, MOTIONS
 
 COLOURS = dict(zip(MOTIONS, ('simulated', 'residual', 'after')))
 MOST_POINTS = 700            # of each colour

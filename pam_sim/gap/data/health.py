@@ -1,0 +1,156 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Can this recording be compared with a model: enough, regular, moving, plausible."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
+from pam_sim.run import Run
+
+
+@dataclass
+class Health:
+    """
+    Outcome of the check.
+
+    ``problems`` forbid a comparison, ``remarks`` weaken it; both are sentences.
+    """
+
+    problems: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    valve: str = ''
+    signals: tuple[str, ...] = ()
+    rate_hz: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def usable(self) -> bool:
+        """Return whether the recording can be compared with a model."""
+        return not self.problems
+
+
+def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
+    """
+    Check a recording before anything is computed from it.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        The recording.
+    valve : {'ppr', 'hsv'}
+        Valve of the model it shall be compared with.
+    criteria : Criteria
+        Decision thresholds.
+
+    Returns
+    -------
+    Health
+
+    """
+    health = Health()
+    health.valve = recorded_valve(run)
+    if not health.valve:
+        health.problems.append(
+            'the recording has no valve_signal with ppr_voltage or fill_duty and vent_duty, '
+            'so the model has no input')
+        return health
+    if health.valve != valve:
+        health.problems.append(
+            f'the recording is of a rig with valve {health.valve}, the model has {valve}')
+        return health
+    # What the loader of a bag found in the values, such as a wrong unit.
+    health.problems += [text.rstrip('.') for text in getattr(run, 'unusable', ())]
+    if health.problems:
+        return health
+    health.remarks += getattr(run, 'implausible', ())
+    health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
+    for needed in ('pressure', 'contraction'):
+        if needed not in health.signals:
+            health.problems.append(f'the recording has no {needed}')
+    if 'force' not in health.signals:
+        health.remarks.append(
+            'without a load cell, errors of the force map and of the load look alike')
+    if health.usable:
+        _check_duration(run, health, criteria)
+        for topic in health.signals + ('valve_signal',):
+            _check_stamps(run, topic, health, criteria)
+        _check_motion(run, health, criteria)
+        _check_saturation(run, health, criteria)
+    return health
+
+
+def recorded_valve(run: Run) -> str:
+    """Return ``ppr``, ``hsv`` or '' by what the valve signal of the run is named."""
+    if 'valve_signal' in run:
+        for valve, names in VALVE_FIELDS.items():
+            if all(name in run.topics['valve_signal'].values for name in names):
+                return valve
+    return ''
+
+
+def _check_duration(run: Run, health: Health, criteria: Criteria) -> None:
+    stamps = [run.topics[s].stamp_ns for s in health.signals + ('valve_signal',)]
+    common = (min(int(np.max(s)) for s in stamps) - max(int(np.min(s)) for s in stamps)) * 1e-9
+    if common < criteria.min_duration_s:
+        health.problems.append(
+            f'only {max(common, 0.0):.1f} s are covered by all signals; at least '
+            f'{criteria.min_duration_s:g} s are needed')
+
+
+def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> None:
+    stamps = np.sort(np.asarray(run.topics[topic].stamp_ns, dtype=np.int64))
+    periods = np.diff(stamps) * 1e-9
+    periods = periods[periods > 0.0]
+    if periods.size < 10:
+        health.problems.append(f'{topic} has {stamps.size} messages, too few')
+        return
+    health.rate_hz[topic] = 1.0 / float(np.median(periods))
+    if health.rate_hz[topic] < criteria.min_rate_hz:
+        health.problems.append(
+            f'{topic} comes at {health.rate_hz[topic]:.0f} Hz; at least 100 Hz are needed')
+    holes = periods[periods > criteria.max_hole_s]
+    lost = float(holes.sum() / periods.sum())
+    if lost > criteria.max_dropout_share:
+        health.problems.append(
+            f'{topic} is missing for {100 * lost:.0f} % of the time')
+    elif holes.size:
+        health.remarks.append(
+            f'{topic} has {holes.size} holes, the longest {1e3 * holes.max():.0f} ms')
+    for name, values in run.topics[topic].values.items():
+        if name in FIELD.values() and not np.isfinite(values).all():
+            health.problems.append(f'{topic} holds values that are not finite')
+
+
+def _check_motion(run: Run, health: Health, criteria: Criteria) -> None:
+    for signal, least in (('pressure', criteria.min_pressure_move_pa),
+                          ('contraction', criteria.min_contraction_move_m)):
+        if np.ptp(run.topics[signal].values[FIELD[signal]]) < least:
+            health.problems.append(
+                f'the {signal} hardly moves, so the recording says nothing about the model')
+
+
+def _check_saturation(run: Run, health: Health, criteria: Criteria) -> None:
+    values = run.topics['valve_signal'].values
+    full = [float(np.mean(values[name] >= limit)) for name, limit in (
+        ('ppr_voltage', 6.0 - 1e-6), ('fill_duty', 0.999), ('vent_duty', 0.999))
+        if name in values]
+    share = max(full)
+    if share > criteria.max_saturation_share:
+        health.problems.append(
+            f'the valve signal is at its limit for {100 * share:.0f} % of the messages')
+    elif share > criteria.noted_saturation_share:
+        health.remarks.append(
+            f'the valve signal is at its limit for {100 * share:.0f} % of the messages')

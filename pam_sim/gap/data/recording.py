@@ -1,0 +1,165 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A run on the physics grid: inputs held between their stamps, outputs at theirs."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
+from pam_sim.response import Response
+from pam_sim.run import Run, Series
+
+GRID_S = 0.001
+START_S = 0.05               # the state at the start is read from this stretch
+
+
+class Recording:
+    """
+    A run prepared for free runs: inputs on the physics grid, outputs at their stamps.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        A recording that passed ``check_health``.
+    valve : {'ppr', 'hsv'}
+        Its valve.
+    driven : bool
+        Contraction is an input of the model (isometric or driven load), no output.
+
+    Attributes
+    ----------
+    signals : tuple of str
+        Recorded output signals.
+    stamp_ns, time_s, measured : dict of str -> numpy.ndarray
+        Stamps, seconds since the start and values of each signal, between start and end.
+    start_ns : int
+        Stamp of time 0; the first instant at which all signals are known.
+    steps : int
+        Physics steps of a free run.
+
+    """
+
+    def __init__(self, run: Run, valve: str, driven: bool = False) -> None:
+        self.valve = valve
+        self.driven = driven
+        known = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
+        self.signals = tuple(s for s in known if not (driven and s == 'contraction'))
+        used = [run.topics[s].stamp_ns for s in known + ('valve_signal',)]
+        self.start_ns = max(int(np.min(s)) for s in used)
+        end_ns = min(int(np.max(s)) for s in used)
+        self.steps = int((end_ns - self.start_ns) * 1e-9 / GRID_S)
+        self.grid_s = np.arange(self.steps + 1) * GRID_S
+        self.stamp_ns, self.time_s, self.measured = {}, {}, {}
+        for signal in known:
+            stamp, value = _ordered(run.topics[signal], FIELD[signal])
+            seconds = (stamp - self.start_ns) * 1e-9
+            inside = (seconds >= 0.0) & (seconds <= self.grid_s[-1])
+            self.stamp_ns[signal] = stamp[inside]
+            self.time_s[signal] = seconds[inside]
+            self.measured[signal] = value[inside]
+        self._valve = [_ordered(run.topics['valve_signal'], name)
+                       for name in VALVE_FIELDS[valve]]
+        self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in self._valve]
+        self.external_force_n = None
+        if 'external_force' in run:
+            stamp, value = _ordered(run.topics['external_force'], 'force_n')
+            self.external_force_n = held_mean(
+                (stamp - self.start_ns) * 1e-9, value, self.grid_s, before=0.0)
+
+    def valve_signal(self, delay_s: float = 0.0, stamp_shift_s: FloatArray | None = None
+                     ) -> FloatArray:
+        """
+        Return the valve signal of each physics step, shape (N,) or (N, 2).
+
+        ``delay_s`` shifts all of it, ``stamp_shift_s`` (one number per message) each
+        message by itself.
+        """
+        columns = []
+        for seconds, value in self._valve:
+            moved = seconds + delay_s
+            if stamp_shift_s is not None:
+                moved = np.maximum.accumulate(moved + stamp_shift_s[:moved.size])
+            columns.append(held_mean(moved, value, self.grid_s))
+        return columns[0] if len(columns) == 1 else np.column_stack(columns)
+
+    @property
+    def messages(self) -> int:
+        """Return the number of valve messages."""
+        return self._valve[0][0].size
+
+    def start(self, signal: str) -> float:
+        """
+        Return the value of a signal at the start of the recording.
+
+        The median of the first 50 ms, or the end of a straight line through them where
+        the signal is already moving.
+        """
+        early = self.time_s[signal] <= START_S
+        seconds, value = self.time_s[signal][early], self.measured[signal][early]
+        if value.size > 4:
+            slope, level = np.polyfit(seconds, value, 1)
+            left = float(np.std(value - level - slope * seconds))
+            if abs(slope) * float(np.std(seconds)) > 2.0 * left:
+                return float(level)
+        return float(np.median(value))
+
+    def at_stamps(self, response: Response, late_s: Mapping[str, float] | None = None
+                  ) -> dict[str, FloatArray]:
+        """Return the response at the measured stamps, by signal; ``late_s`` are their errors."""
+        late_s = late_s or {}
+        return {s: np.interp(self.time_s[s] - late_s.get(s, 0.0), response.time_s,
+                             getattr(response, FIELD[s])) for s in self.signals}
+
+
+def held_mean(time_s: FloatArray, value: FloatArray, grid_s: FloatArray,
+              before: float | None = None) -> FloatArray:
+    """
+    Return the mean of a held signal over every step of a grid.
+
+    Parameters
+    ----------
+    time_s, value : numpy.ndarray, shape (M,)
+        When the signal takes a value, which it then holds.
+    grid_s : numpy.ndarray, shape (N + 1,)
+        Evenly spaced ends of the steps.
+    before : float, optional
+        Value before ``time_s[0]``; by default the first one.
+
+    Returns
+    -------
+    numpy.ndarray, shape (N,)
+
+    """
+    first = value[0] if before is None else before
+    start = min(float(grid_s[0]), float(time_s[0])) - 1.0
+    end = max(float(grid_s[-1]), float(time_s[-1])) + 1.0
+    knots = np.concatenate(([start], time_s, [end]))
+    held = np.concatenate(([first], value))
+    # The integral of a held signal is piecewise linear, so its means are exact.
+    integral = np.concatenate(([0.0], np.cumsum(held * np.diff(knots))))
+    return np.diff(np.interp(grid_s, knots, integral)) / np.diff(grid_s)
+
+
+def _ordered(series: Series, field: str) -> tuple[IntArray, FloatArray]:
+    """Return (stamp_ns, value) sorted by stamp, the later one of equal stamps kept."""
+    stamp = np.asarray(series.stamp_ns, dtype=np.int64)
+    value = np.asarray(series.values[field], dtype=float)
+    good = np.isfinite(value)
+    stamp, value = stamp[good], value[good]
+    order = np.argsort(stamp, kind='stable')
+    stamp, value = stamp[order], value[order]
+    last = np.append(np.diff(stamp) > 0, True)
+    return stamp[last], value[last]

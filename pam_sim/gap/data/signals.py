@@ -1,0 +1,22 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorded signals: names, fields of a run, units."""
+
+SIGNALS = ('pressure', 'contraction', 'force')
+FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
+UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
+# For people: factor from SI and unit.
+READABLE = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'force': (1.0, 'N')}
+VALVE_FIELDS = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}

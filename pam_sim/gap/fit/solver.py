@@ -1,0 +1,219 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One least-squares problem: what an effect adds and the numbers of its subsystems.
+
+Bounded, with a Gaussian prior on every known number and a wide one on every shape; weights
+are lowered by misfit and memory until they agree with the errors.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.errors import InputError
+from pam_sim.gap.data.noise import autocorrelation_time
+from pam_sim.gap.fit.candidate import Setting
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.subsystems.effects import shows
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.rig import Rig
+from scipy.optimize import least_squares
+
+FREE_BOX = 60.0
+HELD_BOX = 1e-3
+SHAPE_SD = 2.0               # of the logarithm of a shape; where data say nothing, it is typical
+FREE_SD = 30.0               # factor on the deviation of the prior of a free number
+EFFECT_STEP = 0.01           # of a parameter of an effect, relative
+ROUNDS = 4
+SETTLED = 0.3                # relative change of the weights that ends the rounds
+EVALUATIONS = 12
+FTOL, XTOL = 1e-3, 1e-2      # slopes of known numbers are from elsewhere; polishing does the rest
+SCORE_BLOCKS = 4             # test blocks whose scores are summed
+REFUSED = 1e3                # error of a model that cannot be simulated, in floors
+
+
+class SolverSettings(Protocol):
+    """What a least-squares problem is given by an estimator."""
+
+    slopes: dict[str, FloatArray]
+    use: tuple[int, ...]
+    box: float
+
+    def with_effects(self, effects: Sequence[Setting]) -> Rig:
+        """Return the given model with entries of a model file added."""
+
+
+class Solver:
+    """
+    One least-squares problem; x holds the effects' parameters, then each subsystem's numbers.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        With the slopes for known numbers, the parts that are fitted and the box of numbers.
+    hypothesis : Hypothesis
+    problems : list of SubsystemProblem
+        That are fitted.
+    temper : dict of str -> numpy.ndarray
+        By how much the weight of each signal is lowered at first, by subsystem.
+    hold : bool
+        Whether latency and skew of the measurement stay at their prior.
+
+    """
+
+    def __init__(self, estimator: SolverSettings, hypothesis: Hypothesis,
+                 problems: Sequence[SubsystemProblem], temper: dict[str, FloatArray],
+                 hold: bool = False) -> None:
+        self.estimator, self.hypothesis = estimator, hypothesis
+        self.problems, self.temper = problems, temper
+        self.free = [f for c in hypothesis.effects for f in c.free]
+        self.owner = [c.effect for c in hypothesis.effects for _ in c.free]
+        self.masks = {c.subsystem: np.isin(c.part, estimator.use) for c in problems}
+        low = [f.coordinate(f.lower) for f in self.free]
+        high = [f.coordinate(f.upper) for f in self.free]
+        self.prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
+        for problem in problems:
+            lowest, highest = problem.bounds()
+            for k, at_least, at_most in zip(problem.known, lowest, highest):
+                free = k.name in hypothesis.numbers
+                box = FREE_BOX if free or not k.of_rig else estimator.box
+                if hold and k.unit == 's' and not k.of_rig:
+                    box = HELD_BOX
+                low.append(max(at_least, -box))
+                high.append(min(at_most, box))
+                self.prior.append(FREE_SD if free else 1.0)
+        self.bounds = (np.array(low, float), np.array(high, float))
+        self.prior = np.array(self.prior)
+        self._last = {}
+
+    def join(self, theta: FloatArray, known_z: Mapping[str, FloatArray]) -> FloatArray:
+        """Return what ``split`` takes apart."""
+        return np.concatenate([theta] + [known_z[problem.subsystem] for problem in self.problems])
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, list[tuple[str, FloatArray]]]:
+        """Return (parameters of the effects, [(subsystem, known numbers)])."""
+        first, found = len(self.free), []
+        for problem in self.problems:
+            found.append((problem.subsystem, x[first:first + len(problem.known)]))
+            first += len(problem.known)
+        return x[:len(self.free)], found
+
+    def errors(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Return the errors of every touched subsystem, by subsystem."""
+        key = x.tobytes()
+        if self._last.get('key') != key:
+            self._last = {'key': key, 'errors': self._simulated(x)}
+        return self._last['errors']
+
+    def _simulated(self, x: FloatArray, effect: str | None = None) -> dict[str, FloatArray]:
+        """Return the errors of the subsystems, or of those alone in which an effect shows."""
+        theta, known = self.split(x)
+        rig = self.estimator.with_effects(Fit(
+            self.hypothesis, theta, {}, {}, {}).settings())
+        return {s: simulated_errors(problem, rig, z)
+                for problem, (s, z) in zip(self.problems, known)
+                if effect is None or shows(effect, problem)}
+
+    def residuals(self, x: FloatArray) -> FloatArray:
+        """Return weighted errors, then the priors."""
+        errors = self.errors(x)
+        return np.concatenate([self._weighted(c, errors[c.subsystem]) for c in self.problems]
+                              + [x / self.prior])
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of ``residuals``."""
+        base, count = self.errors(x), len(self.free)
+        columns = np.zeros((self.residuals(x).size, x.size))
+        rows = columns.shape[0] - self.prior.size
+        columns[rows:] = np.diag(1.0 / self.prior)
+        for j in range(count):
+            step = EFFECT_STEP * max(abs(x[j]), 0.3)
+            if x[j] + step > self.bounds[1][j]:
+                step = -step
+            moved = np.array(x)
+            moved[j] += step
+            # An effect of one subsystem leaves the other one as it is.
+            errors = {**base, **self._simulated(moved, self.owner[j])}
+            columns[:rows, j] = np.concatenate([
+                self._weighted(c, errors[c.subsystem] - base[c.subsystem])
+                for c in self.problems]) / step
+        row, column = 0, count
+        for problem in self.problems:
+            slope = self._weighted(problem, self.estimator.slopes[problem.subsystem])
+            columns[row:row + len(slope), column:column + len(problem.known)] = slope
+            row, column = row + len(slope), column + len(problem.known)
+        return columns
+
+    def blocks(self) -> IntArray:
+        """Return the number of the block of every weighted error, rising."""
+        found, first = [np.zeros(0, int)], 0
+        for problem in self.problems:
+            found.append(first + problem.block[self.masks[problem.subsystem]] // SCORE_BLOCKS)
+            first = int(found[-1].max()) + 1
+        return np.concatenate(found)
+
+    def run(self, x: FloatArray) -> FloatArray:
+        """Return the solution from a start."""
+        low, high = self.bounds
+        if not x.size:
+            return x
+        margin = 1e-6 * (high - low)
+        start = np.clip(x, low + margin, high - margin)
+        return least_squares(self.residuals, start, self.slopes, (low, high), x_scale='jac',
+                             ftol=FTOL, xtol=XTOL, max_nfev=EVALUATIONS).x
+
+    def settle(self, x: FloatArray, rounds: int = ROUNDS
+               ) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """Return (solution, errors by subsystem) once weights and errors agree."""
+        for _ in range(rounds):
+            x = self.run(x)
+            errors = dict(self.errors(x))
+            if self.retemper(errors):
+                break
+        return x, errors
+
+    def retemper(self, errors: Mapping[str, FloatArray]) -> bool:
+        """Set the weights after the errors; return whether they had settled."""
+        settled = True
+        for problem in self.problems:
+            fresh = tempering(problem, errors[problem.subsystem], self.estimator.use)
+            old = self.temper[problem.subsystem]
+            settled = settled and bool(np.all(np.abs(fresh / old - 1.0) < SETTLED))
+            self.temper[problem.subsystem] = fresh
+        return settled
+
+    def _weighted(self, problem: SubsystemProblem, errors: FloatArray) -> FloatArray:
+        mask = self.masks[problem.subsystem]
+        weight = 1.0 / np.sqrt(self.temper[problem.subsystem][problem.signal[mask]])
+        return errors[mask] * (weight if errors.ndim == 1 else weight[:, np.newaxis])
+
+
+def tempering(problem: SubsystemProblem, errors: FloatArray, use: tuple[int, ...]) -> FloatArray:
+    """Return by signal by how much its weight must fall: misfit times memory."""
+    found = []
+    for s in range(len(problem.signals)):
+        chosen = errors[np.isin(problem.part, use) & (problem.signal == s)]
+        found.append(max(float(np.mean(chosen ** 2)), 1.0) * autocorrelation_time(chosen))
+    return np.array(found)
+
+
+def simulated_errors(problem: SubsystemProblem, rig: Rig, known_z: FloatArray) -> FloatArray:
+    """Return the errors of a subsystem; far off where the numbers cannot be simulated."""
+    try:
+        return problem.errors(rig, known_z)
+    except InputError:
+        return np.full(problem.part.size, REFUSED)

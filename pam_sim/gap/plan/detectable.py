@@ -1,0 +1,46 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The smallest size of each effect that shows in a recording."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.select.screening import Screened
+from pam_sim.rig import Rig
+
+
+def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
+                ) -> dict[str, dict[str, Any]]:
+    """
+    Return the smallest size of each effect that shows, as ``minimum_detectable`` of gap.json.
+
+    A size shows when its signature, freed of what the known numbers can do, has an rms of
+    ``floors`` noise floors. Effects whose response is not about proportional to their
+    size are left out.
+    """
+    found = {}
+    for s in screened:
+        effect = get_effect(s.candidate.effect)
+        if effect.variant_of or not s.candidate.amplitudes or s.seen <= 0.0:
+            continue
+        factor = floors / s.seen
+        values = {f.name: s.size[f.name] * (1.0 if f.shape else factor)
+                  for f in s.candidate.free}
+        values = {f.name: min(max(values[f.name], f.lower), f.upper) for f in s.candidate.free}
+        report = effect.report(effect.values(s.candidate.setting(values)['parameters']), rig)
+        quantity, (value, unit) = next(iter(report.items()))
+        found[effect.name] = {'value': float(value), 'unit': unit, 'quantity': quantity}
+    return found

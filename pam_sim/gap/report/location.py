@@ -1,0 +1,178 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Where the gap sits: which subsystem makes it, and under which condition.
+
+Subsystems are cut at measured signals. With the measured pressure as input the
+valve is out of the loop, so what is left of the gap belongs to muscle and load;
+with the measured contraction as input too, the load cell shows what the muscle
+alone misses; force and measured motion show what the load misses. The subsystem needs
+no knowledge of what is missing.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.result import Share
+from pam_sim.gap.subsystems.simulation import pressure_driven, run_from_pressure, simulate_driven
+from pam_sim.rig import Rig
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from scipy.signal import savgol_filter
+
+SMOOTH_S = 0.1               # window of the derivatives of measured contraction
+MOVING_M_PER_S = 1e-3
+AT_STOP_M = 3e-4             # nearer to the lower stop the force balance is not the muscle's
+BANDS = 3
+ROUND_PA = 10e3
+
+
+def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
+           floor: Mapping[str, float]) -> list[Share]:
+    """
+    Return the shares of the squared gap.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The given model.
+    recording : Recording
+        The measurements.
+    simulated : dict of str -> numpy.ndarray
+        Whole-chain free run of the given model at the stamps.
+    floor : dict of str -> float
+        Noise floor of each signal.
+
+    Returns
+    -------
+    list of Share
+        Condition ``all``: for each signal with a gap the shares of the subsystems, which
+        add to 1. Other conditions: shares by direction and by pressure band, each
+        adding to 1, under the subsystem with the largest share.
+
+    """
+    found = []
+    by_pressure = run_from_pressure(rig, recording)
+    muscle_share = muscle_part(rig, recording, floor)
+    for signal in recording.signals:
+        residual = simulated[signal] - recording.measured[signal]
+        if _squared(residual, floor[signal]) <= 0.0:
+            continue
+        if signal == 'pressure':
+            parts = {'valve': 1.0}
+        else:
+            parts = _split(residual, by_pressure[signal] - recording.measured[signal],
+                           floor[signal], muscle_share, rig.load)
+        found += [Share(name, signal, 'all', share) for name, share in parts.items()]
+        main = max(parts, key=parts.get)
+        for conditions in (_directions(recording, signal), _bands(recording, signal)):
+            found += _by_condition(residual, floor[signal], conditions, main, signal)
+    return found
+
+
+def _squared(residual: FloatArray, floor: float) -> float:
+    """Return the mean squared residual beyond the noise floor."""
+    return max(float(np.mean(residual ** 2)) - floor ** 2, 0.0)
+
+
+def _split(whole: FloatArray, without_valve: FloatArray, floor: float, muscle_share: float | None,
+           load: str) -> dict[str, float]:
+    """Return the share of each subsystem in the gap of contraction or force."""
+    rest = _squared(without_valve, floor)
+    valve = _squared(whole - without_valve, 0.0)
+    total = rest + valve
+    if total <= 0.0:
+        return {'valve': 1.0}
+    if load != 'hanging_mass':
+        return {'valve': valve / total, 'muscle': rest / total}
+    if muscle_share is None:          # no load cell: muscle and load cannot be told apart
+        return {'valve': valve / total, 'muscle': rest / total}
+    return {'valve': valve / total, 'muscle': rest / total * muscle_share,
+            'load': rest / total * (1.0 - muscle_share)}
+
+
+def muscle_part(rig: Rig, recording: Recording, floor: Mapping[str, float]) -> float | None:
+    """
+    Return which part (0 to 1) of the force error belongs to the muscle, not to the load.
+
+    Muscle: tension of the model at measured pressure and contraction against the load
+    cell. Load: m (a + g) of the measured motion against the load cell. None without
+    a load cell or where the mass never leaves its stop.
+    """
+    if 'force' not in recording.signals or rig.load != 'hanging_mass':
+        return None
+    grid = recording.grid_s
+    cell = np.interp(grid, recording.time_s['force'], recording.measured['force'])
+    x, _, a = smooth_motion(recording)
+    lifted = x > AT_STOP_M
+    if lifted.mean() < 0.05:
+        return None
+    tension = simulate_driven(pressure_driven(rig), recording, x).force_n
+    external = recording.external_force_n
+    weight = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
+    if external is not None:
+        weight = weight + np.append(external, external[-1])
+    muscle = _averaged(tension - cell)[lifted]
+    load = _averaged(weight - cell)[lifted]
+    # Averaging over the window leaves this much of the cell's noise.
+    left = floor['force'] * np.sqrt(max(GRID_S / SMOOTH_S, 1e-3))
+    muscle, load = _squared(muscle, left), _squared(load, left)
+    return float(muscle / (muscle + load)) if muscle + load > 0.0 else None
+
+
+def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return contraction [m], its rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
+    x = np.interp(recording.grid_s, recording.time_s['contraction'],
+                  recording.measured['contraction'])
+    window = 2 * int(0.5 * SMOOTH_S / GRID_S) + 1
+    return tuple(savgol_filter(x, window, 3, deriv=k, delta=GRID_S) for k in range(3))
+
+
+def _averaged(values: FloatArray) -> FloatArray:
+    window = int(SMOOTH_S / GRID_S)
+    return np.convolve(values, np.ones(window) / window, mode='same')
+
+
+def _directions(recording: Recording, signal: str) -> dict[str, BoolArray]:
+    """Return condition name -> mask of the samples of a signal, by direction of motion."""
+    _, v, _ = smooth_motion(recording)
+    v = np.interp(recording.time_s[signal], recording.grid_s, v)
+    return {'contracting': v > MOVING_M_PER_S, 'extending': v < -MOVING_M_PER_S,
+            'at rest': np.abs(v) <= MOVING_M_PER_S}
+
+
+def _bands(recording: Recording, signal: str) -> dict[str, BoolArray]:
+    """Return condition name -> mask, by thirds of the range of the pressure."""
+    p = np.interp(recording.time_s[signal], recording.time_s['pressure'],
+                  recording.measured['pressure']) - P_ATM_PA
+    low, high = np.percentile(recording.measured['pressure'] - P_ATM_PA, [1, 99])
+    edges = np.round(np.linspace(low, high, BANDS + 1)[1:-1] / ROUND_PA) * ROUND_PA
+    if edges[0] == edges[1]:
+        return {}
+    first, second = (f'{edge * 1e-3:.0f}' for edge in edges)
+    return {f'below {first} kPa': p < edges[0],
+            f'{first} to {second} kPa': (p >= edges[0]) & (p < edges[1]),
+            f'above {second} kPa': p >= edges[1]}
+
+
+def _by_condition(residual: FloatArray, floor: float, conditions: Mapping[str, BoolArray],
+                  subsystem: str, signal: str) -> list[Share]:
+    sums = {name: max(float(np.sum(residual[mask] ** 2)) - floor ** 2 * mask.sum(), 0.0)
+            for name, mask in conditions.items()}
+    total = sum(sums.values())
+    if total <= 0.0:
+        return []
+    return [Share(subsystem, signal, name, float(value / total)) for name, value in sums.items()]

@@ -1,0 +1,123 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verdict in sentences for a person."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from pam_sim.effects.registry import effects
+from pam_sim.gap.data.signals import READABLE
+from pam_sim.gap.result import Calibrated, GapResult, SignalGap
+from pam_sim.gap.select.search import Outcome
+
+SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
+ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
+LEAST_SHARE = 0.005
+
+
+def explain(result: GapResult, outcome: Outcome) -> str:
+    """Return the reason of a verdict, two or three sentences."""
+    if result.verdict == 'no_gap':
+        return 'The model follows the recording within sensor noise and stamps, its numbers ' \
+            'calibrated within their tolerance.'
+    if result.verdict == 'parameter':
+        return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
+    if result.verdict == 'unknown':
+        missed = _sizes(result.signals, 'rmse_refit')
+        return f'The calibrated model misses {missed}{_nearest(outcome)}.{_mistaken(outcome)}'
+    # Of several that are named, some may be certain.
+    open_sets = [w.names for w in outcome.named if len(w.names) > 1]
+    doubtful = {name for names in open_sets for name in names}
+    if result.verdict == 'ambiguous':
+        apart = ', nor '.join(join(names) for names in open_sets)
+        certain = _found(result, lambda name: name not in doubtful)
+        parts = [f'These data cannot tell {apart} apart.', 'Likeliest:',
+                 *_found(result, lambda name: name in doubtful),
+                 *(['Certain:', *certain] if certain else [])]
+    else:
+        parts = _found(result, lambda name: True)
+    text = ' '.join(parts) + f' With this {_shrink(result)}.'
+    if result.unexplained_fraction >= 0.2:
+        text += (f' {100 * result.unexplained_fraction:.0f} % of the squared gap remain '
+                 'unexplained.')
+    return text
+
+
+def _found(result: GapResult, chosen: Callable[[str], bool]) -> list[str]:
+    """Return a sentence for each effect, and one for the numbers, whose names are chosen."""
+    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}).'
+             for e in result.effects if chosen(e['name'])]
+    numbers = [c for c in result.parameters if chosen(c.name)]
+    return [*parts, *([_numbers(numbers) + '.'] if numbers else [])]
+
+
+def join(parts: Iterable[str]) -> str:
+    """Return a list in words."""
+    parts = list(parts)
+    return parts[0] if len(parts) == 1 else ', '.join(parts[:-1]) + ' and ' + parts[-1]
+
+
+def _sentence(name: str) -> str:
+    return effects()[name].sentence.rstrip('.')
+
+
+def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
+    return join([f'{n} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to '
+                 f'{q["ci95"][1]:.3g}' for n, q in equivalent.items()])
+
+
+def _numbers(parameters: Iterable[Calibrated]) -> str:
+    return join([f'{c.name} = {c.value:.4g} {c.unit} instead of {c.nominal:.4g} {c.unit} '
+                 f'({100 * (c.value / c.nominal - 1):+.1f} %)' for c in parameters])
+
+
+def _shrink(result: GapResult) -> str:
+    """Return in words how the gap of every signal that had or has one changes."""
+    parts = []
+    for name, s in result.signals.items():
+        factor, unit = READABLE[name]
+        if max(s.rmse_refit, s.rmse_after) > SEEN * s.noise_floor:
+            before, after = (f'{value * factor:.3g}' for value in (s.rmse_refit, s.rmse_after))
+            if before == after:
+                parts.append(f'the gap in {name} stays at {after} {unit}')
+            else:
+                verb = 'rises' if s.rmse_after > s.rmse_refit else 'falls'
+                parts.append(f'the gap in {name} {verb} from {before} to {after} {unit}')
+    return join(parts) if parts else 'every signal stays within its noise floor'
+
+
+def _sizes(signals: Mapping[str, SignalGap], name: str) -> str:
+    return join([f'{getattr(s, name) * READABLE[k][0]:.3g} {READABLE[k][1]} of {k}'
+                 for k, s in signals.items() if getattr(s, name) > 1.1 * s.noise_floor]
+                or ['little'])
+
+
+def _mistaken(outcome: Outcome) -> str:
+    return ''.join(f' It looks like {name}, but {relative} fits better: '
+                   f'{_sentence(relative)[:1].lower()}{_sentence(relative)[1:]}.'
+                   for name, relative in outcome.mistaken.items())
+
+
+def _nearest(outcome: Outcome) -> str:
+    """Return in words what was fitted, and why it is no explanation."""
+    shares = {s: share for s, share in outcome.share.items() if share >= LEAST_SHARE}
+    parts = [f'{100 * share:.0f} % in the {s}' for s, share in shares.items()]
+    if not parts:
+        return ' and no known effect explains it'
+    if max(shares.values()) < ENOUGH:
+        return f' and no known effect explains it: the best fit explains {join(parts)}'
+    return (f'. A fit explains {join(parts)} of the data that were searched, but it does not '
+            'hold: it needs numbers far from their nominal values, or fails on the data of '
+            'the proof. So nothing is named')

@@ -1,0 +1,98 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What may be missing: formulations of effects with the parameters that are fitted.
+
+Each effect of the registry is a candidate; formulations with ``variant_of`` carry the
+name of that effect. What is fitted of each, from where and how far, is declared in its file.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from pam_sim.effects.registry import effects, get_effect
+from pam_sim.gap.fit.candidate import Candidate
+from pam_sim.rig import Rig
+
+
+def is_limit(simple: str, name: str) -> bool:
+    """Return whether an effect is a limit of another: where both explain the data, it is named."""
+    other = effects().get(name)
+    return other is not None and simple in other.fitting.limits
+
+
+def same_as(name: str) -> str | None:
+    """Return the number of the model that does the same as an effect, None where there is none."""
+    effect = effects().get(name)
+    return effect.fitting.same_as or None if effect else None
+
+
+def is_limit_at(candidate: Candidate, values: Mapping[str, float]) -> bool:
+    """Return whether values turn a formulation into a limit of its effect."""
+    turned = get_effect(candidate.effect).fitting.is_limit
+    return turned is not None and turned(values)
+
+
+def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = None
+               ) -> list[Candidate]:
+    """
+    Return the candidates that can show on a rig.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The model; an effect it already has is refitted, not added.
+    outputs : tuple of str
+        Signals that are compared.
+    only : sequence of str, optional
+        Names to try, canonical or of a formulation.
+
+    Returns
+    -------
+    list of Candidate
+
+    """
+    found = []
+    for name, effect in effects().items():
+        candidate = Candidate(name, effect.free_parameters(rig.valve))
+        if effect.relative_of and name not in (only or ()):
+            continue
+        if rig.valve not in effect.valves or rig.effect(name) is not None:
+            continue
+        if only is not None and name not in only and candidate.name not in only:
+            continue
+        if effect.subsystem == 'load' and rig.load != 'hanging_mass':
+            continue
+        if effect.subsystem == 'sensor' and effect.fitting.sensor_signal not in outputs:
+            continue
+        found.append(candidate)
+    return found
+
+
+def relatives(rig: Rig, outputs: Sequence[str], name: str) -> list[Candidate]:
+    """Return what may be taken for a name on a rig, and is named only by who asks for it."""
+    return candidates(rig, outputs, [
+        effect.name for effect in effects().values() if name in effect.relative_of])
+
+
+def split_refinements(pool: Iterable[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """
+    Return (candidates to begin with, refinements of some of them).
+
+    A refinement differs little from another formulation of its name and is tried after that;
+    where the other is not in the pool, it is one to begin with.
+    """
+    names = {c.name for c in pool if not c.is_refinement}
+    refined = [c for c in pool if c.is_refinement and c.name in names]
+    return [c for c in pool if c not in refined], refined

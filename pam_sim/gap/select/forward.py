@@ -1,0 +1,99 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forward selection: one effect after another, the best on held-out blocks, then the rest."""
+
+from collections.abc import Sequence
+
+from pam_sim.effects.registry import effects
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.select.comparison import gap
+from pam_sim.gap.select.context import SearchContext
+from pam_sim.gap.select.refit import fit_with, other_formulations
+from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.select.rivals import rivals_of
+from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+
+MAX_EFFECTS = 3              # effort: so many are added one by one
+
+
+def forward_selection(context: SearchContext, current: Fit, named: list[NamedEffect]
+                      ) -> tuple[Fit, list[NamedEffect]]:
+    """Return (fit, named effects) with more of them, as long as a subsystem is open for one."""
+    closed: dict[str, Fit] = {}
+    while len(named) < MAX_EFFECTS and not context.out_of_time():
+        open_problems = [p for p in context.problems
+                         if p.subsystem not in closed and context.is_open(p, current)]
+        added = _round(context, current, open_problems, closed) if open_problems else []
+        if not added and named and closed:
+            added = _reopened(context, current, closed)
+        if not added:
+            break
+        current = other_formulations(context, fit_with(context.estimator, current, added))
+        named = [*named, *added]
+        context.estimator.take_slopes(current.settings(), current.known_z)
+    return current, named
+
+
+def _round(context: SearchContext, current: Fit, open_problems: Sequence[SubsystemProblem],
+           closed: dict[str, Fit]) -> list[NamedEffect]:
+    """Return what is added in the open subsystems; ``closed`` tells at which fit one was not."""
+    rivals, fitted = rivals_of(context, current, open_problems)
+    joint = context.ranking.joint_winner(rivals, current, open_problems, fitted)
+    if joint is not None:
+        return [joint]
+    winners = [context.ranking.winner(rivals, current, p, fitted) for p in open_problems]
+    added = [w for w in winners if w and not mends_a_formulation(context, w, current)]
+    won = {w.subsystem for w in added}
+    closed.update((p.subsystem, current) for p in open_problems if p.subsystem not in won)
+    return [w for i, w in enumerate(added) if w.name not in [o.name for o in added[:i]]]
+
+
+def mends_a_formulation(context: SearchContext, winner: NamedEffect, current: Fit) -> bool:
+    """
+    Return whether what wins a small rest is of a family that is in.
+
+    Then it mends the formulation of that one: two kinds of friction make a third.
+    """
+    s = winner.subsystem
+    rest = gap(context.problem_of(s), current.errors[s])
+    if rest > context.criteria.formulation_share * context.first_gap[s]:
+        return False
+    families = {effects()[c.effect].family for c in current.hypothesis.effects
+                if acts_on(c.effect, s)}
+    return winner.name in effects() and effects()[winner.name].family in families
+
+
+def _reopened(context: SearchContext, current: Fit, closed: dict[str, Fit]
+              ) -> list[NamedEffect]:
+    """
+    Return what is added in a subsystem that found no winner before others found theirs.
+
+    An effect of a sensor that two of them share explains neither as long as another effect,
+    too, acts in one of them; beside that one it may.
+    """
+    problems = context.problems
+    if len(problems) < 2:
+        return []
+    shared = [c for c in context.pool if all(acts_on(c.effect, p.subsystem) for p in problems)]
+    for problem in problems:
+        s = problem.subsystem
+        if closed.get(s, current) is not current and context.is_open(problem, current):
+            rivals, fitted = rivals_of(context, current, [problem], shared)
+            winner = context.ranking.winner(rivals, current, problem, fitted)
+            if winner is not None:
+                del closed[s]
+                return [winner]
+    return []

@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where effects act: in which subsystem, and on which reading of a sensor."""
+
+from typing import Protocol, TypeVar
+
+from pam_sim.annotations import FloatArray
+from pam_sim.effects.registry import get_effect
+from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
+
+SENSOR_CHANGES = ('bias', 'gain', 'lag')
+
+Reading = TypeVar('Reading', float, FloatArray)
+SensorChanges = tuple[float | None, ...]
+
+
+class SubsystemNamed(Protocol):
+    """Something of one subsystem."""
+
+    subsystem: str
+
+
+def true_value(signal: str, rig: Rig, value: Reading, rate: Reading) -> Reading:
+    """
+    Return what a reading means once the sensor effects of the rig are taken out.
+
+    Parameters
+    ----------
+    signal : {'pressure', 'contraction'}
+        Which reading.
+    rig : pam_sim.Rig
+        Its bias, gain and lag of that sensor count.
+    value, rate : float or numpy.ndarray
+        What is read, and how fast that changes [1/s].
+
+    """
+    return undone(signal, sensor_changes(signal, rig), value, rate)
+
+
+def sensor_changes(signal: str, rig: Rig) -> SensorChanges:
+    """Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none."""
+    found = {}
+    for setting in rig.effects:
+        fitting = get_effect(setting.name).fitting
+        if fitting.sensor_signal == signal and setting.parameters:
+            found[fitting.sensor_change] = next(iter(setting.parameters.values()))
+    return tuple(found.get(change) for change in SENSOR_CHANGES)
+
+
+def undone(signal: str, changes: SensorChanges, value: Reading, rate: Reading) -> Reading:
+    """Return what a reading means, given the ``sensor_changes``; other arguments see above."""
+    bias, gain_error, lag_s = changes
+    zero = P_ATM_PA if signal == 'pressure' else 0.0
+    if bias is not None:
+        value = value - bias
+    if gain_error is not None:
+        value = zero + (value - zero) / (1.0 + gain_error)
+    if lag_s is not None:
+        value = value + lag_s * rate
+    return value
+
+
+def acts_on(effect: str, subsystem: str) -> bool:
+    """Return whether an effect (by name) shows in a subsystem: ``valve`` or ``muscle``."""
+    found = get_effect(effect)
+    if found.subsystem != 'sensor':
+        return (found.subsystem == 'valve') == (subsystem == 'valve')
+    return found.fitting.sensor_signal == 'pressure' or subsystem != 'valve'
+
+
+def shows(effect: str, problem: SubsystemNamed) -> bool:
+    """
+    Return whether an effect changes the errors of a subsystem.
+
+    What is read of the contraction, the volume behind the valve is taken from, too.
+    """
+    return (acts_on(effect, problem.subsystem)
+            or get_effect(effect).fitting.sensor_signal == 'contraction')

@@ -1,0 +1,56 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Numbers with a prior: of the rig, and of the measurement of a recording."""
+
+from dataclasses import dataclass
+
+from pam_sim.rig import Rig
+from pam_sim.valve import hsv, ppr
+
+LATENCY_PRIOR_S, LATENCY_SD_S, LATENCY_MAX_S = 1e-3, 1e-3, 3e-3
+SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
+
+
+@dataclass(frozen=True)
+class Known:
+    """
+    A number with a Gaussian prior; ``of_rig`` False for one of the measurement alone.
+
+    ``step`` is that of the slope, in deviations: a time needs whole steps of the grid.
+    """
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+    lower: float
+    upper: float
+    of_rig: bool = True
+    step: float = 0.05
+
+
+def known_numbers(rig: Rig) -> list[Known]:
+    """Return the numbers of a rig with a tolerance that act with its valve, as Known."""
+    other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
+    return [Known(p.name, p.unit, rig.parameters[p.name],
+                  abs(rig.parameters[p.name]) * rig.tolerance[p.name], p.lower, p.upper)
+            for p in rig.parameter_list
+            if rig.tolerance[p.name] > 0.0 and rig.parameters[p.name] != 0.0
+            and p.name not in other]
+
+
+def of_run(name: str, index: int) -> str:
+    """Return what a number of the measurement is called in a recording: each has its own."""
+    return name if index == 0 else f'{name}_{index + 1}'

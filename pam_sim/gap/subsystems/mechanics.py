@@ -1,0 +1,107 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Muscle and load: measured pressure in, contraction and force out."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.noise import noise_of
+from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.subsystems.effects import sensor_changes, SensorChanges, true_value, undone
+from pam_sim.gap.subsystems.known import Known, known_numbers, of_run, SKEW_MAX_S, SKEW_SD_S
+from pam_sim.gap.subsystems.problem import KEPT, smoothed, SubsystemProblem
+from pam_sim.gap.subsystems.simulation import (
+    FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, simulate_driven)
+from pam_sim.response import Response
+from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
+from pam_sim.valve import hsv, ppr
+
+
+class MechanicsProblem(SubsystemProblem):
+    """Measured pressure in; contraction and force out. A prescribed contraction is an input."""
+
+    subsystem = 'muscle'
+
+    def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+                 seed: int = 0, criteria: Criteria = CRITERIA) -> None:
+        self._noise_pa = [0.0] * len(recordings)
+        self._command = lru_cache(maxsize=KEPT)(self._command_of)
+        self._noise = [noise_of(r.time_s['pressure'], r.measured['pressure'])
+                       for r in recordings]
+        self._pressure = [tuple(np.interp(r.time_s['pressure'], r.grid_s, y)
+                                for y in smoothed(r, 'pressure')) for r in recordings]
+        super().__init__(rig, recordings, holds_certify, seed, criteria)
+
+    @staticmethod
+    def outputs(recording: Recording) -> tuple[str, ...]:
+        """Return the signals of a recording that this subsystem gives."""
+        return tuple(s for s in recording.signals if s != 'pressure')
+
+    @staticmethod
+    def _rig_numbers(rig: Rig) -> list[Known]:
+        valve = {p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)}
+        return [k for k in known_numbers(rig) if k.name not in valve]
+
+    @staticmethod
+    def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
+        late = [of_run(name, index) for index, r in enumerate(recordings)
+                for name in ('pressure_skew', 'force_skew')
+                if name == 'pressure_skew' or 'force' in r.signals]
+        return [Known(n, 's', 0.0, SKEW_SD_S, -SKEW_MAX_S, SKEW_MAX_S, False) for n in late]
+
+    def _coarse(self, rig: Rig) -> FloatArray:
+        self._noise_pa = [
+            np.interp(r.time_s['pressure'], r.time_s['pressure'][::2],
+                      r.measured['pressure'][::2]) - r.measured['pressure']
+            for r in self.recordings]
+        self._command.cache_clear()
+        found = super()._coarse(rig)
+        self._disturb(None)
+        return found
+
+    def _disturb(self, random: np.random.Generator | None) -> None:
+        self._command.cache_clear()
+        self._noise_pa = [0.0 if random is None else noise.draw(r.time_s['pressure'], random)
+                          for r, noise in zip(self.recordings, self._noise)]
+
+    def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
+        recording = self.recordings[index]
+        rig = pressure_driven(rig)
+        command = self._command(index, numbers[of_run('pressure_skew', index)],
+                                sensor_changes('pressure', rig))
+        start = max(true_value('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
+        if recording.driven:
+            x = np.interp(recording.grid_s, recording.time_s['contraction'],
+                          recording.measured['contraction'])
+            return simulate_driven(rig, recording, x, command, start)
+        x = true_value('contraction', rig, self._start[index]['contraction'], 0.0)
+        return rig.simulate(
+            command, external_force_n=recording.external_force_n, initial_pressure_pa=start,
+            initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S)
+
+    def _command_of(self, index: int, skew_s: float, changes: SensorChanges) -> FloatArray:
+        """Return the voltage at which the stand-in for the valve gives the measured pressure."""
+        recording = self.recordings[index]
+        time_s, rate = recording.time_s['pressure'], self._pressure[index][1]
+        p = undone('pressure', changes,
+                   recording.measured['pressure'] + self._noise_pa[index], rate)
+        # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
+        at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
+        command = (np.interp(at, time_s, p) - P_ATM_PA) / FAST_GAIN_PA_PER_V
+        return np.clip(command, 0.0, 6.0)

@@ -1,0 +1,183 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One subsystem with the recordings it is compared with."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+import threading
+
+import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.noise import sensor_floor
+from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.data.signals import FIELD, SIGNALS
+from pam_sim.gap.data.split import part_of
+from pam_sim.gap.subsystems.known import of_run
+from pam_sim.rig import Rig
+from scipy.signal import savgol_filter
+
+RATE_HZ = 200.0              # of the samples that are compared
+TEST_BLOCK_S = 0.5           # of the paired tests between rivals
+INPUT_DRAWS = 3
+COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
+SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
+KEPT = 16                    # inputs and instants that many simulations in a row share
+
+
+class SubsystemProblem:
+    """
+    One subsystem with the recordings it is compared with.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The given model.
+    recordings : list of Recording
+        Inputs and measured signals.
+    holds_certify : bool
+        Whether the recordings hold the certify part too.
+    seed : int
+        Of the draws that carry input noise into the floor.
+    criteria : Criteria
+        Decision thresholds, for those who compare errors.
+
+    Attributes
+    ----------
+    known : list of Known
+        Numbers of the rig and of the measurement that act here.
+    floor : dict of str -> float
+        Standard deviation of what noise and stamps explain, by signal.
+    level : float
+        Mean squared error in floors squared that noise alone leaves: 1, or less where the
+        floor turned out too careful.
+    simulations : int
+        Made so far.
+    part, block, signal : numpy.ndarray of int, shape (N,)
+        Part, test block and signal (index into ``signals``) of every compared sample.
+    time_s, run : numpy.ndarray, shape (N,)
+        Its time in its recording, and which of them that is.
+
+    """
+
+    subsystem = ''
+    criteria = CRITERIA
+
+    def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+                 seed: int = 0, criteria: Criteria = CRITERIA) -> None:
+        self.recordings, self.criteria = recordings, criteria
+        self._place = lru_cache(maxsize=KEPT)(self._place_of)
+        self.signals = tuple(s for s in SIGNALS
+                             if any(s in self.outputs(r) for r in recordings))
+        self.level = 1.0
+        self.simulations, self._lock = 0, threading.Lock()
+        self.known = self._rig_numbers(rig) + self._nuisances(recordings)
+        self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
+        self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
+        first = 0
+        for index, recording in enumerate(recordings):
+            chosen = {}
+            for name in self.outputs(recording):
+                s = self.signals.index(name)
+                time_s = recording.time_s[name]
+                every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
+                chosen[name] = at = time_s[::every]
+                parts.append(part_of(at, recording.grid_s[-1], holds_certify))
+                blocks.append(first + (at // TEST_BLOCK_S).astype(int))
+                signals.append(np.full(at.size, s))
+                times.append(at)
+                runs.append(np.full(at.size, index))
+                measured.append(recording.measured[name][::every])
+            self._index.append(chosen)
+            first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
+        self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
+        self.signal, self._measured = np.concatenate(signals), np.concatenate(measured)
+        self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
+        self.floor = self._floors(rig, seed)
+        self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
+
+    def errors(self, rig: Rig, known_z: FloatArray) -> FloatArray:
+        """
+        Return simulated minus measured in noise floors, shape (N,).
+
+        Parameters
+        ----------
+        rig : pam_sim.Rig
+            Model with the effects to try; its numbers are replaced.
+        known_z : numpy.ndarray
+            Normalised values of ``known``.
+
+        """
+        return (self.values(rig, known_z) - self._measured) / self._scale
+
+    def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
+        """Return the simulated values of all compared samples, shape (N,)."""
+        numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
+        rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
+        found = []
+        for index, instants in enumerate(self._index):
+            response = self._simulate(rig, index, numbers)
+            with self._lock:                 # several threads count at once
+                self.simulations += 1
+            for name in instants:
+                late = numbers.get(of_run('force_skew', index), 0.0) if name == 'force' else 0.0
+                row, ahead = self._place(index, name, late, len(response))
+                value = getattr(response, FIELD[name])
+                before = value[row]
+                found.append(before + ahead * (value[row + 1] - before))
+        return np.concatenate(found)
+
+    def _place_of(self, index: int, name: str, late_s: float, count: int
+                  ) -> tuple[IntArray, FloatArray]:
+        """Return (row before every instant that is compared, steps from there)."""
+        place = np.clip((self._index[index][name] - late_s) / GRID_S, 0.0, count - 1.001)
+        row = place.astype(int)
+        return row, place - row
+
+    def chi2(self, errors: FloatArray, part: int) -> float:
+        """Return the mean squared error in a part, each signal with the same weight."""
+        return float(np.mean([np.mean(errors[(self.part == part) & (self.signal == s)] ** 2)
+                              for s in range(len(self.signals))]))
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return (lowest, highest) normalised values that are possible at all."""
+        return (np.array([(k.lower - k.value) / k.sd for k in self.known]),
+                np.array([(k.upper - k.value) / k.sd for k in self.known]))
+
+    def _floors(self, rig: Rig, seed: int) -> dict[str, float]:
+        random = np.random.default_rng(seed)
+        base = self.values(rig, np.zeros(len(self.known)))
+        squares = np.zeros(base.size)
+        for _ in range(INPUT_DRAWS):
+            self._disturb(random)
+            squares += (self.values(rig, np.zeros(len(self.known))) - base) ** 2 / INPUT_DRAWS
+        self._disturb(None)
+        squares += ((self._coarse(rig) - base) / COARSE_GAIN) ** 2
+        floor = {}
+        for s, name in enumerate(self.signals):
+            own = np.mean([sensor_floor(r.time_s[name], r.measured[name], name) ** 2
+                           for r in self.recordings if name in self.outputs(r)])
+            floor[name] = float(np.sqrt(own + np.mean(squares[self.signal == s])))
+        return floor
+
+    def _coarse(self, rig: Rig) -> FloatArray:
+        """Return the values with every second sample of the measured input left out."""
+        return self.values(rig, np.zeros(len(self.known)))
+
+
+def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:
+    """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
+    y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
+    return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))

@@ -1,0 +1,121 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The model on the recorded valve signal, or on the measured pressure.
+
+The valve signal holds between its header stamps. On the physics grid each step gets the
+mean of the held signal over the step, so that a shift of the whole signal acts smoothly.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.subsystems.effects import true_value
+from pam_sim.response import Response
+from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
+
+# Feeding a measured pressure: a regulator this fast follows it exactly enough.
+FAST_T_S = 0.001
+FAST_GAIN_PA_PER_V = 200e3   # so that 6 V reach 1.2 MPa gauge
+
+
+def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
+             stamp_shift_s: FloatArray | None = None, start_error_pa: float = 0.0,
+             late_s: Mapping[str, float] | None = None) -> dict[str, FloatArray]:
+    """
+    Return the model's outputs at the measured stamps, by signal name.
+
+    The run starts from the recorded pressure and contraction.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        The model.
+    recording : Recording
+        Inputs and stamps.
+    delay_s, stamp_shift_s :
+        See ``Recording.valve_signal``.
+    start_error_pa : float
+        Added to the recorded pressure at the start; what fills a closed volume keeps
+        the error of its start.
+    late_s : dict of str -> float, optional
+        By how much the stamps of a signal are late.
+
+    """
+    return recording.at_stamps(simulate(
+        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa), late_s)
+
+
+def run_from_pressure(rig: Rig, recording: Recording) -> dict[str, FloatArray]:
+    """
+    Return contraction and force with the measured pressure as input, by signal name.
+
+    A fast ideal regulator takes the place of the valve, so that only muscle and
+    load remain; valve effects of the model are left out.
+    """
+    return recording.at_stamps(simulate(
+        pressure_driven(rig), recording, _fast_command(recording)))
+
+
+def simulate_driven(rig: Rig, recording: Recording, contraction_m: FloatArray,
+                    valve_signal: FloatArray | None = None, start_pa: float | None = None
+                    ) -> Response:
+    """
+    Run the rig with the contraction prescribed on the grid; return its Response.
+
+    Without a valve signal the measured pressure is the input, for a rig from
+    ``pressure_driven``. Force is then the tension of the muscle alone. It starts from
+    ``start_pa``, by default the recorded pressure.
+    """
+    if valve_signal is None:
+        valve_signal = _fast_command(recording)
+    start_pa = recording.start('pressure') if start_pa is None else start_pa
+    return rig.with_(load='driven').simulate(
+        valve_signal, contraction_m=np.maximum(contraction_m, 0.0),
+        initial_pressure_pa=max(start_pa, P_ATM_PA), dt_s=GRID_S)
+
+
+def _fast_command(recording: Recording) -> FloatArray:
+    """Return the voltage at which the fast regulator gives the measured pressure."""
+    # Midpoint of each step, ahead by the lag of the regulator.
+    wanted = np.interp(recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S,
+                       recording.time_s['pressure'], recording.measured['pressure'])
+    return (wanted - P_ATM_PA) / FAST_GAIN_PA_PER_V
+
+
+def pressure_driven(rig: Rig) -> Rig:
+    """Return the rig with a regulator that follows its command at once."""
+    kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load', 'sensor')]
+    return rig.with_(valve='ppr', effects=kept, parameters={
+        'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
+
+
+def simulate(rig: Rig, recording: Recording, valve_signal: FloatArray, start_error_pa: float = 0.0
+             ) -> Response:
+    """Run the rig on the recording's grid from the recorded start; return its Response."""
+    # What the sensors add is not in the muscle: a closed volume would keep it.
+    p = true_value('pressure', rig, recording.start('pressure') + start_error_pa, 0.0)
+    if recording.driven:
+        x = np.interp(recording.grid_s, recording.time_s['contraction'],
+                      recording.measured['contraction'])
+        return simulate_driven(rig, recording, x, valve_signal, p)
+    x = true_value('contraction', rig, recording.start('contraction'), 0.0)
+    return rig.simulate(
+        valve_signal, external_force_n=recording.external_force_n,
+        initial_pressure_pa=max(p, P_ATM_PA), initial_contraction_m=max(x, 0.0), dt_s=GRID_S)

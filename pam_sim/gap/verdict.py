@@ -1,0 +1,160 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The verdict of a search and its validation, and the numbers that go with it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
+
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Precision
+from pam_sim.gap.result import Calibrated, GapResult
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.select.search import Outcome
+from pam_sim.gap.verify.materiality import is_material
+from pam_sim.gap.verify.model import held_without, model_of, numbers_of
+from pam_sim.gap.verify.spread import spread_of_numbers
+from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
+from pam_sim.gap.verify.validation import Validation
+from scipy.stats import norm
+
+
+def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
+         validation: Validation) -> None:
+    """Put signals, numbers, effects and the model into a result."""
+    result.signals = validation.signals()
+    precision = estimator.precision(final)
+    result.calibration = _calibrated(estimator, final, precision)
+    free = set(final.hypothesis.numbers)
+    result.parameters = [c for c in result.calibration if c.name in free]
+    model = model_of(estimator, final)
+    settings = list(model.effects)
+    for w in outcome.named:
+        place = next((i for i, c in enumerate(final.hypothesis.effects) if c.name == w.name), None)
+        if place is None:
+            continue
+        parameters, equivalent = effect_numbers(
+            model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
+        effect = get_effect(w.name)
+        formulation = final.hypothesis.effects[place].effect
+        result.effects.append({
+            'name': w.name, 'family': effect.family, 'subsystem': effect.subsystem,
+            'confidence': _confidence(w, outcome, estimator.criteria),
+            'formulation': formulation, 'parameters': parameters, 'equivalent': equivalent})
+        settings = [replace(s, source={'ci95': {n: p['ci95'] for n, p in parameters.items()}})
+                    if s.name == formulation else s for s in settings]
+    result.model_yaml = model.with_(effects=settings).to_yaml()
+
+
+def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation: Validation,
+          base: Fit, final: Fit, materiality: float, whole: bool) -> None:
+    """Set verdict, ambiguity set and the unexplained fraction of a result."""
+    named, criteria = outcome.named, estimator.criteria
+    result.moved = validation.moved(base, whole) if named else {}
+    own = validation.moved(held_without(final), whole) if named else {}
+    again = validation.fall(validation.refit, validation.after)[0] > criteria.refuted_fall
+
+    def is_worth_a_name(least: float) -> bool:
+        return is_material(own, result.moved, least, again, criteria)
+
+    # Too small is only what certainly is.
+    material = is_worth_a_name(materiality) or (
+        bool(named) and is_worth_a_name(materiality / _at_most(estimator, final, named)))
+    result.noise = validation.noise
+    unsure = next((w for w in named if len(w.names) > 1), None)
+    if unsure is not None:
+        by_name = {r.name: r.found for r in unsure.rivals}
+        result.rivals = [(name, model_of(estimator, by_name[name]), by_name[name].hypothesis,
+                          by_name[name].theta) for name in unsure.names]
+    result.evidence = [
+        {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
+         't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
+    wrong = [c for c in result.parameters if abs(c.prior_deviation) > criteria.max_prior_sd]
+    least = max(criteria.unnamed_factor * materiality, criteria.least_unnamed_sd)
+    if not outcome.share or (not material and not wrong and (
+            named or not _is_left(result, estimator, validation, base, least, whole))):
+        result.verdict, result.effects, result.parameters = 'no_gap', [], []
+        return
+    result.unexplained_fraction = validation.unexplained()
+    if not named:
+        result.verdict, result.unexplained_fraction = 'unknown', 1.0
+        return
+    result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
+    if any(len(w.names) > 1 for w in named):
+        result.verdict = 'ambiguous'
+    else:
+        result.verdict = 'effects' if result.effects else 'parameter'
+
+
+def _at_most(estimator: Estimator, final: Fit, named: Sequence[NamedEffect]) -> float:
+    """Return how many times as large as fitted the effects may be, with 95 % certainty."""
+    names = [c.name for c in final.hypothesis.effects]
+    return 1.0 + NORMAL_95 / min((estimator.certainty(final, names.index(w.name))
+                                  for w in named if w.name in names), default=math.inf)
+
+
+def _is_left(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,
+             least: float, whole: bool) -> bool:
+    """Return whether calibration leaves more than noise and the doubt about the numbers may."""
+    def left(spread: Mapping[str, float]) -> float:
+        return max((_beyond(s.rmse_refit, math.hypot(
+            estimator.criteria.floor_error * validation.highest_floor[name],
+            NORMAL_95 * spread.get(name, 0.0))) / max(validation.noise[name], 1e-12)
+            for name, s in result.signals.items()), default=0.0)
+
+    return left({}) > least and left(
+        spread_of_numbers(validation, estimator, base, whole)) > least
+
+
+def _beyond(value: float, floor: float) -> float:
+    """Return the part of an rms that the noise floor does not explain."""
+    return math.sqrt(max(value ** 2 - floor ** 2, 0.0))
+
+
+def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[Calibrated]:
+    """Return every known number of the rig as Calibrated."""
+    count, free = len(found.theta), list(found.hypothesis.numbers)
+    numbers, _ = numbers_of(estimator, found)
+    listed = []
+    for problem in estimator.problems:
+        for known, z in zip(problem.known, found.known_z[problem.subsystem]):
+            if not known.of_rig:
+                continue
+            value = numbers[known.name]
+            half = NORMAL_95 * known.sd
+            if known.name in free:
+                half = math.hypot(NUMERICS * value, known.sd * half_width(
+                    precision, count + free.index(known.name), float(z)))
+            listed.append(Calibrated(known.name, known.unit, known.value, value,
+                                     (value - half, value + half), float(z)))
+    return listed
+
+
+def _tested(rival: Rival, subsystem: str) -> float | None:
+    """Return by how many deviations the best was better, None where no test was possible."""
+    t = rival.t.get(subsystem, math.nan)
+    return t if math.isfinite(t) else None
+
+
+def _confidence(named: NamedEffect, outcome: Outcome, criteria: Criteria) -> float:
+    """Return how sure a name is, 0 to 1: against its nearest rival, and by what is left."""
+    s = named.subsystem
+    best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
+    rivals = [_tested(r, s) for r in named.rivals if r.name not in named.names
+              and r.share.get(s, 0.0) > criteria.rival_share * best]
+    sure = float(norm.cdf(min([t for t in rivals if t is not None], default=6.0) - 1.0))
+    return round(sure / len(named.names) * math.sqrt(max(outcome.share.get(s, 1.0), 0.0)), 3)

@@ -1,0 +1,65 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether effects move a signal by enough to be worth a name."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.noise import noise_of
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import SETTLE_S
+
+
+def is_material(own: Mapping[str, float], refitted: Mapping[str, float], materiality: float,
+                found_again: bool = False, criteria: Criteria = CRITERIA) -> bool:
+    """
+    Return whether effects are worth a name.
+
+    That is, whether they move a signal by more than ``materiality`` where the numbers of the
+    model do what they can to replace them; or while these stay, and still by ``visible_sd`` where
+    they do not, or by ``found_again_sd`` if the certify data confirm it. Numbers that were bent by
+    one motion are wrong in another, though the effect itself may do nothing there.
+
+    Parameters
+    ----------
+    own, refitted : dict of str -> float
+        How far each signal moves, in standard deviations of its sensor.
+    materiality : float
+        Of a sensor, in its standard deviations.
+    found_again : bool
+        Whether the errors of the certify data fall as those of a true effect do.
+    criteria : Criteria
+        Decision thresholds.
+
+    """
+    left = max(refitted.values(), default=0.0)
+    return left > materiality or (
+        max(own.values(), default=0.0) > materiality
+        and left > min(materiality,
+                       criteria.found_again_sd if found_again else criteria.visible_sd))
+
+
+def moved(recording: Recording, first: Mapping[str, FloatArray], second: Mapping[str, FloatArray],
+          chosen: Mapping[str, BoolArray] | None = None) -> dict[str, float]:
+    """Return by signal how far two runs are apart (rms), in standard deviations of its sensor."""
+    found = {}
+    for s in recording.signals:
+        noise = noise_of(recording.time_s[s], recording.measured[s]).sd
+        apart = first[s] - second[s]
+        apart = apart[recording.time_s[s] > SETTLE_S] if chosen is None else apart[chosen[s]]
+        found[s] = float(np.sqrt(np.mean(apart ** 2)) / max(noise, 1e-12))
+    return found

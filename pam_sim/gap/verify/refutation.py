@@ -1,0 +1,151 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Which names of a set the certify data contradict.
+
+Where two of a set differ on the certify data, the errors of the true one are the noise alone,
+and those of the other are larger by just what the two are apart. As a name needs to explain
+90 % of a gap and no more, for no formulation is the muscle's own, a smaller difference says
+nothing.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+import math
+
+from pam_sim.annotations import FloatArray
+from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.verify.model import held_without
+from pam_sim.gap.verify.validation import Validation
+
+
+def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
+           validation: Validation, whole: bool) -> tuple[list[NamedEffect], Fit]:
+    """
+    Drop from sets of names those that the certify data contradict.
+
+    Parameters
+    ----------
+    named : list of NamedEffect
+        What was added.
+    estimator : Estimator
+        That they were fitted to.
+    base, final : Fit
+        Numbers calibrated alone, and the final model, with the first name of every set.
+    validation : Validation
+        Of the final model.
+    whole : bool
+        As of the Validation.
+
+    Returns
+    -------
+    named : list of NamedEffect
+        With shorter sets, the likeliest name first.
+    final : Fit
+        The final model with these.
+
+    """
+    criteria, kept = estimator.criteria, []
+    for w in named:
+        fits = _comparable(w, estimator, final)
+        runs = {name: validation.run(found, whole) for name, found in fits.items()}
+        before = validation.run(_less(w.name, estimator, base, final), whole) if runs else {}
+        told = {name: validation.fall(before, run) for name, run in runs.items()}
+        best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2, default=None)
+        gone = {name for name in runs if name != best and _contradicted(
+            validation, runs[name], runs[best], told[best][1], criteria)}
+        names = tuple(n for n in w.names if n not in gone)
+        # The recordings hardly tell them apart: where the certify data do not find the first
+        # again, but another, that one is likelier.
+        if w.name in gone or (
+                w.name in told and told[best][1] > criteria.visible_sd
+                and told[w.name][0] < criteria.confirmed_fall <= told[best][0]):
+            names = (best, *(n for n in names if n != best))
+            final = fits[best]
+            w = replace(w, name=best, formulations=[r for r in w.rivals if r.name == best])
+        kept.append(replace(w, names=names))
+    return kept, final
+
+
+def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
+                validation: Validation, whole: bool) -> tuple[str | None, Fit]:
+    """
+    Return the name that the certify data speak against most, and the fit without it.
+
+    Parameters
+    ----------
+    named, estimator, base, final, validation, whole
+        As of ``refute``.
+
+    Returns
+    -------
+    name : str or None
+        None where the squared errors fall with every name by more than ``confirmed_fall`` of what
+        it moves, the other names in the model. One that moves nothing that could be seen there, or
+        less than what all of them leave, or of which stamps and the start may hide the fall, is
+        not judged.
+    without : Fit
+        The other names, everything refitted; the final model where there is no such name.
+
+    """
+    criteria = estimator.criteria
+    fits = {w.name: _less(w.name, estimator, base, final) for w in named}
+    runs = {name: validation.run(fit, whole) for name, fit in fits.items()}
+    told = {name: validation.fall(run, validation.after) for name, run in runs.items()}
+    # Beside a large effect whose form leaves more than that, a small one cannot be judged.
+    least = max(criteria.visible_sd, validation.left() if len(named) > 1 else 0.0)
+    # Were it true, the fall would be 1, but for what stamps and start move.
+    against = {name: fell for name, (fell, apart) in told.items()
+               if fell < criteria.confirmed_fall and apart > least
+               and 1.0 - fell > criteria.certain_t * validation.doubt(
+                   runs[name], validation.after)}
+    if not against:
+        return None, final
+    name = min(against, key=against.get)
+    return name, fits[name]
+
+
+def _contradicted(validation: Validation, run: Mapping[str, FloatArray],
+                  best: Mapping[str, FloatArray], moved: float, criteria: Criteria) -> bool:
+    """
+    Return whether the certify data speak against a run, and for the best one beyond doubt.
+
+    ``moved`` is how far the best one is from none.
+    """
+    fell, apart = validation.fall(run, best)
+    form = math.sqrt(1.0 - criteria.named_share) * moved
+    # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
+    return (fell > criteria.refuted_fall and apart > max(criteria.visible_sd, form)
+            and fell + 1.0 > criteria.certain_t * validation.doubt(run, best))
+
+
+def _comparable(w: NamedEffect, estimator: Estimator, final: Fit) -> dict[str, Fit]:
+    """Return by name the fits that differ from the final one in this name alone."""
+    if len(w.names) < 2:
+        return {}
+    beside = set(final.hypothesis.names) - {w.name}
+    return {r.name: final if r.name == w.name else estimator.polish(r.found) for r in w.rivals
+            if r.name in w.names and set(r.found.hypothesis.names) - {r.name} == beside}
+
+
+def _less(name: str, estimator: Estimator, base: Fit, final: Fit) -> Fit:
+    """Return the fit without one name, its numbers refitted."""
+    h = final.hypothesis
+    bare = held_without(final, set(h.names) - {name})
+    left = Hypothesis(bare.hypothesis.effects, tuple(f for f in h.numbers if f != name))
+    return estimator.fit(left, bare.theta, final) if left.names else base

@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the doubt about the numbers of a model leaves on the certify data."""
+
+import math
+
+import numpy as np
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.verify.validation import Validation
+
+SMALL_STEP = 0.3             # of a number, in its standard deviation
+
+
+def spread_of_numbers(validation: Validation, estimator: Estimator, base: Fit, whole: bool
+                      ) -> dict[str, float]:
+    """
+    Return what the calibrated model may be off on the certify data by its numbers alone.
+
+    Parameters
+    ----------
+    validation : Validation
+        Of the final model.
+    estimator : Estimator
+        That it was fitted to.
+    base : Fit
+        Numbers calibrated alone.
+    whole : bool
+        As of the Validation.
+
+    Returns
+    -------
+    dict of str -> float
+        By signal the rms, in its unit.
+
+    """
+    covariances, at = estimator.spread(base)
+    changes = []
+    for j, step in enumerate(SMALL_STEP * np.sqrt(np.diag(covariances[0]))):
+        moved = validation.run(at(j, step), whole)
+        changes.append({s: (moved[s] - validation.refit[s]) / step for s in moved})
+    validation.simulations += len(changes)
+    found = {}
+    for s, chosen in validation.part.items():
+        by_number = np.column_stack([change[s][chosen] for change in changes])
+        found[s] = max(math.sqrt(float(np.mean(np.einsum(
+            'nk,kl,nl->n', by_number, c, by_number)))) for c in covariances)
+    return found

@@ -1,0 +1,210 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The validation: whole-chain free runs on data that neither fit nor ranking has seen.
+
+The given model, the same with its numbers calibrated, and the final one run on the
+recorded valve signal alone.
+"""
+
+from collections.abc import Mapping
+import math
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.gap.data.noise import noise_of, sensor_floor, STAMP_SD_S
+from pam_sim.gap.data.recording import Recording, START_S
+from pam_sim.gap.data.signals import UNIT
+from pam_sim.gap.data.split import CERTIFY, part_of, SETTLE_S
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.result import SignalGap, Trace
+from pam_sim.gap.subsystems.known import SKEW_MAX_S
+from pam_sim.gap.subsystems.simulation import free_run
+from pam_sim.gap.verify.materiality import moved
+from pam_sim.gap.verify.model import free_run_of, late_by, numbers_of
+
+INPUT_DRAWS = 8
+MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
+
+
+def start_error_sd(recording: Recording) -> float:
+    """Return the standard deviation [Pa] of the pressure that a free run starts from."""
+    time_s = recording.time_s['pressure']
+    noise = noise_of(time_s, recording.measured['pressure'])
+    white = MEDIAN_SD * noise.white_sd / np.sqrt(max(np.sum(time_s <= START_S), 1))
+    return float(np.hypot(white, noise.slow_sd * min(1.0, np.sqrt(
+        2.0 * noise.memory_s / START_S))))
+
+
+class Validation:
+    """
+    Free runs of a model before and after on one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording the validation is made on.
+    whole : bool
+        All of it is the certify part; otherwise its certify blocks.
+    estimator : Estimator
+        With the given model.
+    base, final : Fit
+        Numbers calibrated alone, and the final model.
+    seed : int
+        Of the draws that carry stamp errors of the valve signal, and the error of the pressure
+        that a run of its own starts from, into the floor.
+
+    """
+
+    def __init__(self, recording: Recording, whole: bool, estimator: Estimator, base: Fit,
+                 final: Fit, seed: int = 0) -> None:
+        self.recording, self.estimator = recording, estimator
+        self.part = {s: recording.time_s[s] > SETTLE_S if whole else
+                     part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY
+                     for s in recording.signals}
+        self.before = free_run(estimator.rig, recording)
+        self.refit, self.after = self.run(base, whole), self.run(final, whole)
+        self.simulations = 3
+        seen = {s: noise_of(recording.time_s[s], recording.measured[s]) for s in recording.signals}
+        # It is the same sensor, and a recording without rest hides its slow noise.
+        self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
+        self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
+        self.drift = self._drift(final, whole, seed)
+        # A valve that adds up its errors drifts: one run may be off by far more than the mean.
+        self.floor, self.highest_floor = self._floors()
+
+    def run(self, found: Fit, whole: bool, stamp_shift_s: FloatArray | None = None,
+            start_error_pa: float = 0.0) -> dict[str, FloatArray]:
+        """Return the free run of a fit at the stamps, by signal."""
+        _, measurement = numbers_of(self.estimator, found)
+        start = start_error_pa if whole else measurement.get('start_error', 0.0)
+        run = free_run_of(self.estimator, found, self.recording, start, stamp_shift_s)
+        return self._aligned(run, late_by(measurement)) if whole else run
+
+    def _aligned(self, run: Mapping[str, FloatArray], late_s: Mapping[str, float]
+                 ) -> dict[str, FloatArray]:
+        """
+        Return a run with the skew that this recording, which was not fitted, has itself.
+
+        It is no part of the model, and in a fast motion a fraction of a millisecond is more than
+        what an effect moves; the bounds are those of the fit.
+        """
+        aligned = dict(run)
+        for s, late in late_s.items():
+            if s not in run:
+                continue
+            chosen = self.part[s]
+            slope = np.gradient(run[s], self.recording.time_s[s])
+            wrong = run[s][chosen] - self.recording.measured[s][chosen]
+            square = float(np.sum(slope[chosen] ** 2))
+            shift_s = float(np.sum(slope[chosen] * wrong)) / square if square > 0.0 else 0.0
+            most_s = SKEW_MAX_S * (2.0 if s == 'force' else 1.0)
+            shift_s = min(max(late + shift_s, -most_s), most_s) - late
+            aligned[s] = run[s] - shift_s * slope
+        return aligned
+
+    def signals(self) -> dict[str, SignalGap]:
+        """Return the SignalGap of every signal."""
+        return {s: SignalGap(UNIT[s], self.floor[s], self._rms(self.before, s),
+                             self._rms(self.refit, s), self._rms(self.after, s))
+                for s in self.recording.signals}
+
+    def traces(self) -> dict[str, Trace]:
+        """Return the Trace of every signal."""
+        r = self.recording
+        return {s: Trace(r.stamp_ns[s], r.measured[s], self.before[s], self.refit[s],
+                         self.after[s]) for s in r.signals}
+
+    def moved(self, found: Fit, whole: bool) -> dict[str, float]:
+        """Return by signal how far the final model moves it from a fit's, in sensor noise."""
+        return moved(self.recording, self.after, self.run(found, whole), self.part)
+
+    def fall(self, worse: Mapping[str, FloatArray], better: Mapping[str, FloatArray]
+             ) -> tuple[float, float]:
+        """
+        Return by how much the squared errors fall from one free run to another.
+
+        In what the two are apart, squared; all signals in deviations of their sensors. 1 for a
+        true effect, -1 for one that is not there, whatever the noise: the errors of the true
+        model have nothing in common with either. And how far the two are apart (rms).
+        """
+        fell = apart = 0.0
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            first, last = (r[s][chosen] - self.recording.measured[s][chosen]
+                           for r in (worse, better))
+            fell += float(np.mean(first ** 2 - last ** 2)) / variance
+            apart += float(np.mean((first - last) ** 2)) / variance
+        return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
+
+    def doubt(self, worse: Mapping[str, FloatArray], better: Mapping[str, FloatArray]) -> float:
+        """Return the standard deviation of ``fall`` by stamps and the start of this recording."""
+        _, apart = self.fall(worse, better)
+        by_draw = np.zeros(len(self.drift))
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            between = (worse[s] - better[s])[chosen]
+            by_draw += [2.0 * float(np.mean(d[s][chosen] * between)) / variance
+                        for d in self.drift]
+        return float(np.sqrt(np.mean(by_draw ** 2))) / apart ** 2 if apart > 0.0 else 0.0
+
+    def left(self) -> float:
+        """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
+        return math.sqrt(sum(
+            max(self._rms(self.after, s) ** 2 - self.floor[s] ** 2, 0.0) / max(
+                self.noise[s], 1e-12) ** 2 for s in self.recording.signals))
+
+    def unexplained(self) -> float:
+        """
+        Return the share of the squared gap left after calibration that is still there.
+
+        Of signals that show one: where both are within the error of the floor, nothing is said.
+        """
+        before = after = 0.0
+        floor_error = self.estimator.criteria.floor_error
+        for s in self.signals().values():
+            if max(s.rmse_refit, s.rmse_after) > floor_error * s.noise_floor:
+                before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+                after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+        return min(after / before, 1.0) if before > 0.0 else 0.0
+
+    def _rms(self, simulated: Mapping[str, FloatArray], signal: str) -> float:
+        error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
+        return float(np.sqrt(np.mean(error ** 2)))
+
+    def _drift(self, final: Fit, whole: bool, seed: int) -> list[dict[str, FloatArray]]:
+        """Return by signal, for some draws, how far stamps and the start move the final run."""
+        random, r = np.random.default_rng(seed), self.recording
+        found, start_sd = [], start_error_sd(r)
+        for _ in range(INPUT_DRAWS):
+            shift = STAMP_SD_S * random.standard_normal(r.messages)
+            moved = self.run(final, whole, shift, start_sd * random.standard_normal())
+            self.simulations += 1
+            found.append({s: moved[s] - self.after[s] for s in r.signals})
+        return found
+
+    def _floors(self) -> list[dict[str, float]]:
+        r = self.recording
+        squares = {s: [float(np.mean(d[s] ** 2)) for d in self.drift] for s in r.signals}
+        return [{s: sensor_floor(r.time_s[s], r.measured[s], s,
+                                 float(np.sqrt(of(squares[s]) + self._slow[s] ** 2)))
+                 for s in r.signals} for of in (np.mean, np.max)]
+
+    def _slow_elsewhere(self, signal: str) -> float:
+        """Return the slow noise that the fitted recordings show at rest, 0.0 if none does."""
+        recordings = self.estimator.problems[0].recordings
+        return max((noise_of(o.time_s[signal], o.measured[signal]).slow_sd
+                    for o in recordings if signal in o.signals), default=0.0)
