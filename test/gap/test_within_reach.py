@@ -19,8 +19,7 @@ import numpy as np
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.fit.hypothesis import Hypothesis
-from pam_sim.gap.fit.hypothesis import within_reach
+from pam_sim.gap.fit.hypothesis import Hypothesis, within_reach
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
@@ -37,7 +36,7 @@ def estimator():
         Recording(recorded(rig, voltages(12.0)), 'ppr')]))
 
 
-@pytest.mark.parametrize('known, names, freed, reached', [
+@pytest.mark.parametrize('known, names, free, reached', [
     (['tube_lag'], ['tube_lag', 'end_taper'], (), ['muscle']),
     (['tube_lag', 'end_taper'], ['end_taper'], (), ['valve']),
     (['tube_lag'], ['tube_lag', 'pressure_bias'], (), ['valve', 'muscle']),
