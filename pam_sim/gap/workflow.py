@@ -84,7 +84,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
 
     """
     started = time.perf_counter()
-    runs = list(runs) if isinstance(runs, (list, tuple)) else [runs]
+    runs = [runs] if isinstance(runs, Run) else list(runs)
     if certify is not None:
         check_apart(runs, certify, criteria)
     health = [check_health(run, rig.valve, criteria)

@@ -151,7 +151,7 @@ def rms_rate(time_s: FloatArray, values: FloatArray, noise: float = 0.0) -> floa
         return 0.0
     seconds = np.maximum(time_s[span:] - time_s[:-span], 1e-6)
     change = np.asarray(values)[span:] - np.asarray(values)[:-span]
-    squared = np.mean((change / seconds) ** 2) - 2.0 * (noise / (span * period)) ** 2
+    squared = float(np.mean((change / seconds) ** 2)) - 2.0 * (noise / (span * period)) ** 2
     return float(np.sqrt(max(squared, 0.0)))
 
 

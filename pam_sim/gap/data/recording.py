@@ -70,9 +70,8 @@ class Recording:
             self.stamp_ns[signal] = stamp[inside]
             self.time_s[signal] = seconds[inside]
             self.measured[signal] = value[inside]
-        self._valve = [_ordered(run.topics['valve_signal'], name)
-                       for name in VALVE_FIELDS[valve]]
-        self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in self._valve]
+        stamped = [_ordered(run.topics['valve_signal'], name) for name in VALVE_FIELDS[valve]]
+        self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
         self.external_force_n = None
         if 'external_force' in run:
             stamp, value = _ordered(run.topics['external_force'], 'force_n')

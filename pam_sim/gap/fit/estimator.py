@@ -73,7 +73,7 @@ class Estimator:
                  criteria: Criteria = CRITERIA) -> None:
         self.rig, self.problems, self.use = rig, problems, use
         self.criteria, self.box = criteria, criteria.max_prior_sd
-        self.slopes = {}
+        self.slopes: dict[str, FloatArray] = {}
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in problems})
         self.base = self.fit_base()
 
@@ -147,8 +147,8 @@ class Estimator:
         x, errors = search.settle(search.join(theta[free], {
             s: np.where((near is self.base) & (np.abs(z) > FAR_START), 0.0, z)
             for s, z in near.known_z.items()}), rounds)
-        theta[free], known_z = search.split(x)
-        known_z, temper = dict(known_z), search.temper
+        theta[free], numbers = search.split(x)
+        known_z, temper = dict(numbers), search.temper
         for problem in self.problems:
             if problem not in fitted:       # untouched ones are as without any effect
                 s, kept = problem.subsystem, near if problem in touched else self.base
@@ -271,8 +271,10 @@ class Estimator:
 
     def fit_base(self) -> Fit:
         """Return the baseline: known numbers fitted to the parts that are used now."""
-        known = {c.subsystem: np.zeros(len(c.known)) for c in self.problems}
-        temper = {c.subsystem: np.ones(len(c.signals)) for c in self.problems}
+        known: dict[str, FloatArray] = {
+            c.subsystem: np.zeros(len(c.known)) for c in self.problems}
+        temper: dict[str, FloatArray] = {
+            c.subsystem: np.ones(len(c.signals)) for c in self.problems}
         for _ in range(BASE_PASSES):
             search = Solver(self, Hypothesis(), self.problems, dict(temper))
             x, errors = search.settle(search.join(np.zeros(0), known))

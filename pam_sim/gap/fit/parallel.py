@@ -20,7 +20,8 @@ from typing import TypeVar
 
 from pam_sim.rollout.batch import default_workers
 
-Item, Result = TypeVar('Item'), TypeVar('Result')
+Item = TypeVar('Item')
+Result = TypeVar('Result')
 
 
 def parallel_map(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

@@ -20,7 +20,7 @@ are lowered by misfit and memory until they agree with the errors.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
@@ -85,7 +85,7 @@ class Solver:
         self.masks = {c.subsystem: np.isin(c.part, estimator.use) for c in problems}
         low = [f.coordinate(f.lower) for f in self.free]
         high = [f.coordinate(f.upper) for f in self.free]
-        self.prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
+        prior = [SHAPE_SD if f.shape else np.inf for f in self.free]
         for problem in problems:
             lowest, highest = problem.bounds()
             for k, at_least, at_most in zip(problem.known, lowest, highest):
@@ -95,10 +95,10 @@ class Solver:
                     box = HELD_BOX
                 low.append(max(at_least, -box))
                 high.append(min(at_most, box))
-                self.prior.append(FREE_SD if free else 1.0)
+                prior.append(FREE_SD if free else 1.0)
         self.bounds = (np.array(low, float), np.array(high, float))
-        self.prior = np.array(self.prior)
-        self._last = {}
+        self.prior: FloatArray = np.array(prior)
+        self._last: dict[str, Any] = {}
 
     def join(self, theta: FloatArray, known_z: Mapping[str, FloatArray]) -> FloatArray:
         """Return what ``split`` takes apart."""

@@ -87,7 +87,7 @@ def look_alikes(run: Run, rig: Rig, name: str) -> dict[str, Any]:
 def _signatures(estimator: Estimator, candidate: Candidate, spaces: Mapping[str, ErrorSpace]
                 ) -> FloatArray:
     """Return the signature over all subsystems as one vector, zeros where it does not act."""
-    parts = []
+    parts: list[FloatArray] = []
     for problem in estimator.problems:
         space = spaces[problem.subsystem]
         if not acts_on(candidate.effect, problem.subsystem):

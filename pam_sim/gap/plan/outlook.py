@@ -127,7 +127,7 @@ def least_factors(pieces: Sequence[Sensitivities], floors: float = 1.0
 
     """
     probes = pieces[0].probes
-    tried = {n: {} for n in probes}
+    tried: dict[str, dict[float, float]] = {n: {} for n in probes}
     factors = dict.fromkeys(probes, 1.0)
     for _ in range(STEPS):
         inners = [p.inner(factors, with_rivals=False) for p in pieces]
@@ -161,7 +161,7 @@ def _nearer(candidate: Candidate, tried: Mapping[float, float]) -> float:
     if close:
         return close[0]
     if low is None or high is None:
-        start = high if low is None else low
+        start = low if low is not None else high if high is not None else 1.0
         step = min(max(1.0 / max(tried[start], 1e-12), 0.03), 30.0)
         return min(max(start * step, SMALLEST_FACTOR), _largest(candidate))
     # Between the two, on a straight line of the logarithms; numbers at their limit bend it.

@@ -95,7 +95,7 @@ class InnerProducts:
             to ``max_prior_sd`` times, with a standard normal prior.
 
         """
-        whole, box = sum(self.products.values()), self.criteria.max_prior_sd
+        whole, box = np.asarray(sum(self.products.values())), self.criteria.max_prior_sd
         rest = np.zeros(len(whole))
         rest[column] = 1.0
         out = np.concatenate([np.arange(self.priors), np.asarray(free, dtype=int)])

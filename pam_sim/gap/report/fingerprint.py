@@ -199,8 +199,9 @@ def fingerprint(estimator: Estimator, base: Fit, final: Fit) -> dict[str, dict[s
     found, criteria = {}, estimator.criteria
     for problem in estimator.problems:
         for subsystem, make in _errors_of(estimator, problem):
-            parts = [make(index, (base, final)) for index in range(len(problem.recordings))]
-            if any(p is None for p in parts):
+            made = [make(index, (base, final)) for index in range(len(problem.recordings))]
+            parts = [p for p in made if p is not None]
+            if len(parts) < len(made):
                 continue
             conditions = {n: np.concatenate([p[0][n] for p in parts]) for n in CONDITIONS}
             part, before, after = (np.concatenate([p[k] for p in parts]) for k in (1, 2, 3))
@@ -225,7 +226,7 @@ def fingerprint(estimator: Estimator, base: Fit, final: Fit) -> dict[str, dict[s
 def _strongest(shares: Mapping[str, float], criteria: Criteria) -> str:
     """Return the condition that alone explains most; rates tell directions too."""
     alone = {n: shares[n] for n in CONDITIONS}
-    most = max(alone, key=alone.get)
+    most = max(alone, key=lambda name: alone[name])
     near = alone[most] - criteria.simpler_condition_share
     return 'direction' if most == 'rate' and alone['direction'] > near else most
 
@@ -287,6 +288,7 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
         cell = np.interp(recording.grid_s, recording.time_s['force'],
                          recording.measured['force'])
     noise = [noise_sd(recording.measured['force'])] if cell is not None else []
+    weight = np.zeros(0)
     if subsystem == 'load' or cell is None:
         weight = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
         if recording.external_force_n is not None:
@@ -296,4 +298,5 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
         tension = simulate_driven(pressure_driven(rig), recording, x).force_n
         noise.append(noise_sd(tension))
         return tension, weight if cell is None else cell, float(np.linalg.norm(noise))
+    assert cell is not None              # without one there is no error of the load
     return cell, weight, float(np.linalg.norm(noise))

@@ -77,7 +77,7 @@ def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
             parts = _split(residual, by_pressure[signal] - recording.measured[signal],
                            floor[signal], muscle_share, rig.load)
         found += [Share(name, signal, 'all', share) for name, share in parts.items()]
-        main = max(parts, key=parts.get)
+        main = max(parts, key=lambda name: parts[name])
         for conditions in (_directions(recording, signal), _bands(recording, signal)):
             found += _by_condition(residual, floor[signal], conditions, main, signal)
     return found
@@ -129,8 +129,9 @@ def muscle_part(rig: Rig, recording: Recording, floor: Mapping[str, float]) -> f
     load = _averaged(weight - cell)[lifted]
     # Averaging over the window leaves this much of the cell's noise.
     left = floor['force'] * np.sqrt(max(GRID_S / SMOOTH_S, 1e-3))
-    muscle, load = _squared(muscle, left), _squared(load, left)
-    return float(muscle / (muscle + load)) if muscle + load > 0.0 else None
+    of_muscle, of_load = _squared(muscle, left), _squared(load, left)
+    whole = of_muscle + of_load
+    return float(of_muscle / whole) if whole > 0.0 else None
 
 
 def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:

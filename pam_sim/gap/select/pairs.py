@@ -97,7 +97,7 @@ def promising_pairs(estimator: Estimator, base: Fit, screened: Iterable[Screened
     most = noise + (1.0 - estimator.criteria.promised_share) * gap
     tried = []
     for s in screened:
-        if not acts_on(s.candidate.effect, problem.subsystem):
+        if s.flat is None or not acts_on(s.candidate.effect, problem.subsystem):
             continue
         values = {f.name: f.value(t) for f, t in zip(s.candidate.free, s.flat.start)}
         try:
@@ -106,16 +106,16 @@ def promising_pairs(estimator: Estimator, base: Fit, screened: Iterable[Screened
             continue
         if change @ change > 0.0:
             tried.append(_Tried(s.candidate, s.flat.start, change))
-    best = {}
+    best: dict[tuple[str, str], tuple[float, Pair]] = {}
     for one, other in itertools.combinations(tried, 2):
         names = (one.candidate.name, other.candidate.name)
         if names[0] == names[1]:
             continue
         factors, left = _joint(one, other, space.left)
-        if factors is not None and left < min(most, best.get(names, (np.inf,))[0]):
-            best[names] = (left, (one.candidate, other.candidate),
-                           one.theta(factors[0]) + other.theta(factors[1]))
-    return [pair[1:] for pair in sorted(best.values(), key=lambda p: p[0])[:FITTED]]
+        if factors is not None and left < min(most, best[names][0] if names in best else np.inf):
+            best[names] = (left, ((one.candidate, other.candidate),
+                                  one.theta(factors[0]) + other.theta(factors[1])))
+    return [pair for _, pair in sorted(best.values(), key=lambda p: p[0])[:FITTED]]
 
 
 def _joint(one: _Tried, other: _Tried, left: FloatArray) -> tuple[FloatArray | None, float]:
@@ -156,11 +156,12 @@ def pair_of(context: SearchContext, problem: SubsystemProblem
         return Rival(' + '.join(c.name for c in pair[0]), found, context.ranking.shares(found))
 
     s = problem.subsystem
-    rivals = parallel_map(fitted, promising_pairs(
+    fits = parallel_map(fitted, promising_pairs(
         context.estimator, context.base, context.screened, problem))
-    if None in rivals:
+    found = [r for r in fits if r is not None]
+    if len(found) < len(fits):
         return None
-    rivals = [r for r in rivals if not any(
+    rivals = [r for r in found if not any(
         Rival(c.name, r.found).at_edge for c in r.found.hypothesis.effects)]
     if not rivals:
         return None

@@ -135,7 +135,7 @@ def _change(estimator: Estimator, near: Fit, candidate: Candidate, values: Mappi
 def _screened(estimator: Estimator, near: Fit, candidate: Candidate,
               spaces: Mapping[str, ErrorSpace], flat: Mapping[str, ErrorSpace]) -> Screened:
     """Return a Screened; each start is simulated once for both weights."""
-    changes = []
+    changes: list[tuple[Mapping[str, float], dict[str, FloatArray]]] = []
     for values in candidate.starts():
         changes.append((values, {}))
         for problem in estimator.problems:

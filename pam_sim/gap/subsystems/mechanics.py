@@ -40,7 +40,7 @@ class MechanicsProblem(SubsystemProblem):
 
     def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
-        self._noise_pa = [0.0] * len(recordings)
+        self._noise_pa: list[float | FloatArray] = [0.0] * len(recordings)
         self._command = lru_cache(maxsize=KEPT)(self._command_of)
         self._noise = [noise_of(r.time_s['pressure'], r.measured['pressure'])
                        for r in recordings]

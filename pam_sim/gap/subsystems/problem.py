@@ -14,7 +14,7 @@
 
 """One subsystem with the recordings it is compared with."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 import threading
 
@@ -25,7 +25,8 @@ from pam_sim.gap.data.noise import sensor_floor
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import part_of
-from pam_sim.gap.subsystems.known import of_run
+from pam_sim.gap.subsystems.known import Known, of_run
+from pam_sim.response import Response
 from pam_sim.rig import Rig
 from scipy.signal import savgol_filter
 
@@ -73,7 +74,7 @@ class SubsystemProblem:
     """
 
     subsystem = ''
-    criteria = CRITERIA
+    criteria: Criteria = CRITERIA
 
     def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
@@ -107,6 +108,26 @@ class SubsystemProblem:
         self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
         self.floor = self._floors(rig, seed)
         self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
+
+    @staticmethod
+    def outputs(recording: Recording) -> tuple[str, ...]:
+        """Return the signals of a recording that this subsystem gives."""
+        raise NotImplementedError
+
+    @staticmethod
+    def _rig_numbers(rig: Rig) -> list[Known]:
+        raise NotImplementedError
+
+    @staticmethod
+    def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
+        raise NotImplementedError
+
+    def _disturb(self, random: np.random.Generator | None) -> None:
+        """Disturb the measured inputs as their noise does, or no more."""
+        raise NotImplementedError
+
+    def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
+        raise NotImplementedError
 
     def errors(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """

@@ -33,7 +33,8 @@ from pam_sim.rig import Rig
 def subsystem_problems(rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                        seed: int = 0, criteria: Criteria = CRITERIA) -> list[SubsystemProblem]:
     """Return the subsystems that these recordings allow, the valve first."""
-    found = [ValveProblem(rig, recordings, holds_certify, seed, criteria)]
+    found: list[SubsystemProblem] = [
+        ValveProblem(rig, recordings, holds_certify, seed, criteria)]
     if any(MechanicsProblem.outputs(r) for r in recordings):
         found.append(MechanicsProblem(rig, recordings, holds_certify, seed, criteria))
     return found

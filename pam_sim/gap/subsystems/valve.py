@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd, SMALLEST, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
@@ -40,7 +41,7 @@ class ValveProblem(SubsystemProblem):
 
     def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
-        self._shift_s = None
+        self._shift_s: list[FloatArray] | None = None
         self._signal = lru_cache(maxsize=KEPT)(
             lambda index, late_s: recordings[index].valve_signal(late_s))
         self._motion = [smoothed(r, 'contraction') for r in recordings]

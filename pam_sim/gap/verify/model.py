@@ -28,7 +28,8 @@ from pam_sim.rig import Rig
 
 def numbers_of(estimator: Estimator, found: Fit) -> tuple[dict[str, float], dict[str, float]]:
     """Return (numbers of the rig, numbers of the measurement) of a fit, name -> value."""
-    rig, measurement = {}, {}
+    rig: dict[str, float] = {}
+    measurement: dict[str, float] = {}
     for problem in estimator.problems:
         for known, z in zip(problem.known, found.known_z[problem.subsystem]):
             (rig if known.of_rig else measurement)[known.name] = known.value + known.sd * float(z)

@@ -63,10 +63,13 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
     criteria, kept = estimator.criteria, []
     for w in named:
         fits = _comparable(w, estimator, final)
+        if not fits:
+            kept.append(w)
+            continue
         runs = {name: validation.run(found, whole) for name, found in fits.items()}
-        before = validation.run(_less(w.name, estimator, base, final), whole) if runs else {}
+        before = validation.run(_less(w.name, estimator, base, final), whole)
         told = {name: validation.fall(before, run) for name, run in runs.items()}
-        best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2, default=None)
+        best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2)
         gone = {name for name in runs if name != best and _contradicted(
             validation, runs[name], runs[best], told[best][1], criteria)}
         names = tuple(n for n in w.names if n not in gone)
@@ -116,7 +119,7 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
                    runs[name], validation.after)}
     if not against:
         return None, final
-    name = min(against, key=against.get)
+    name = min(against, key=lambda name: against[name])
     return name, fits[name]
 
 

@@ -138,7 +138,7 @@ def _formulation_spread(rig: Rig, candidate: Candidate, named: NamedEffect) -> d
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.formulations), default=0.0)
     limit = AS_GOOD * (1.0 - best) + AS_GOOD_SHARE
-    spread = {}
+    spread: dict[str, float] = {}
     mine = next((r for r in named.formulations if candidate in r.found.hypothesis.effects), None)
     if mine is None:
         return spread

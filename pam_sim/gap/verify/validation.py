@@ -188,7 +188,8 @@ class Validation:
     def _drift(self, final: Fit, whole: bool, seed: int) -> list[dict[str, FloatArray]]:
         """Return by signal, for some draws, how far stamps and the start move the final run."""
         random, r = np.random.default_rng(seed), self.recording
-        found, start_sd = [], start_error_sd(r)
+        found: list[dict[str, FloatArray]] = []
+        start_sd = start_error_sd(r)
         for _ in range(INPUT_DRAWS):
             shift = STAMP_SD_S * random.standard_normal(r.messages)
             moved = self.run(final, whole, shift, start_sd * random.standard_normal())
