@@ -171,7 +171,7 @@ class Criteria:
         'Simulated records.')
     rival_share: float = _criterion(
         0.5, 'of the best share', 'ranking',
-        'Less is no rival.',
+        'Less is no rival; a relative that leaves less is likelier.',
         'Half.')
     better_t: float = _criterion(
         2.0, 'normal deviations', 'ranking',
@@ -197,14 +197,6 @@ class Criteria:
         0.5, 'of the rest', 'ranking',
         'How much better a first fit may still be than it seems.',
         'What polishing gained on simulated records.')
-    prior_cost: float = _criterion(
-        9.0, 'squared prior deviations', 'ranking',
-        'More than a rival needs counts against it.',
-        'Three deviations.')
-    almost_all: float = _criterion(
-        0.9, 'of the best share', 'ranking',
-        'A simpler name that explains as much stands for its limit.',
-        'As named_share.')
     done_share: float = _criterion(
         0.0035, 'of the gap', 'elimination',
         'Rest that formulations may leave.',
@@ -223,7 +215,7 @@ class Criteria:
         'Simulated records with switching valves.')
     named_share: float = _criterion(
         0.9, 'of the gap', 'plausibility',
-        'Least that all effects of a subsystem explain for a name.',
+        'Least to explain for a name, and for a simpler one to stand for its limit.',
         'No formulation is the muscle itself; simulated records.')
     named_clearly_share: float = _criterion(
         0.95, 'of the gap', 'plausibility',
@@ -249,10 +241,6 @@ class Criteria:
         0.98, 'of the gap', 'plausibility',
         'What plausible numbers must explain to be preferred.',
         'Simulated records.')
-    relative_rest: float = _criterion(
-        0.5, 'of what a name leaves', 'plausibility',
-        'Less makes a relative the likelier cause.',
-        'Half.')
     visible_sd: float = _criterion(
         0.3, 'sensor deviations', 'materiality',
         'Less cannot be told from none.',
@@ -261,18 +249,10 @@ class Criteria:
         0.1, 'sensor deviations', 'materiality',
         'The same where the certify data confirm the effect.',
         'Simulated records.')
-    confirmed_fall: float = _criterion(
-        0.0, 'of the squared difference', 'refutation',
-        'Fall of the errors from which on a name is confirmed.',
-        'Half-way between a true effect (1) and none (-1).')
     refuted_fall: float = _criterion(
         0.5, 'of the squared difference', 'refutation',
         'Fall by which another name refutes it.',
         'Half of that of a true effect.')
-    apart_floors: float = _criterion(
-        0.3, 'floors', 'planning',
-        'What the best rival must leave to be told apart.',
-        'As visible_sd.')
     inseparable_factor: float = _criterion(
         10.0, 'visible sizes', 'planning',
         'Rivals that need more are called inseparable.',
@@ -281,10 +261,6 @@ class Criteria:
         0.9, '-', 'planning',
         'Cosine of two signatures from which on they look alike.',
         'Prototype.')
-    mapped_gap: float = _criterion(
-        0.25, 'floors squared', 'planning',
-        'Gap below which no condition is read from it.',
-        'As near_floor.')
     simpler_condition_share: float = _criterion(
         0.1, '-', 'planning',
         'A simpler condition as near as this is named instead.',

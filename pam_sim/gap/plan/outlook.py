@@ -148,7 +148,7 @@ def in_proportion(inner: InnerProducts, factors: Mapping[str, float], floors: fl
     for name, seen in inner.seen().items():
         visible = factors[name] * floors / max(seen, 1e-12)
         left = min(inner.confused(name).values(), default=math.inf)
-        named = factors[name] * inner.criteria.apart_floors / max(left, 1e-12)
+        named = factors[name] * inner.criteria.visible_sd / max(left, 1e-12)
         found.append((visible, max(visible, named)))
     return found
 
@@ -173,7 +173,7 @@ def _nearer(candidate: Candidate, tried: Mapping[float, float]) -> float:
 def _outlook(probe: Candidate, inner: InnerProducts, factor: float, seen: float) -> Outlook:
     if seen < 1.0 - 4.0 * CLOSE_ENOUGH:
         return Outlook(probe.name, None, None, (math.inf, math.inf))
-    apart, largest = inner.criteria.apart_floors, inner.criteria.inseparable_factor
+    apart, largest = inner.criteria.visible_sd, inner.criteria.inseparable_factor
     rivals = [(rival, apart / max(left, 1e-12))
               for rival, left in inner.confused(probe.name).items() if left < apart]
     rivals.sort(key=lambda pair: -pair[1])

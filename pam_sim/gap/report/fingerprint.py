@@ -161,7 +161,7 @@ def explained(conditions: Mapping[str, FloatArray], errors: FloatArray, learn: B
 
     """
     gap = float(np.mean(errors[judge] ** 2)) - 1.0
-    if gap < criteria.mapped_gap:
+    if gap < criteria.near_floor:
         return None
     errors = errors - np.mean(errors[learn])
     centred = float(np.mean(errors[judge] ** 2)) - 1.0
@@ -172,7 +172,7 @@ def explained(conditions: Mapping[str, FloatArray], errors: FloatArray, learn: B
         left = errors[judge] - model.at([c[judge] for c in columns])
         gained = centred + 1.0 - float(np.mean(left ** 2))
         found[' x '.join(names)] = float(np.clip(
-            gained / centred, 0.0, 1.0)) if centred > criteria.mapped_gap else 0.0
+            gained / centred, 0.0, 1.0)) if centred > criteria.near_floor else 0.0
     return found
 
 

@@ -130,6 +130,6 @@ def _simpler(context: SearchContext, current: Fit, w: NamedEffect, without: Fit,
     for other in named:
         if is_limit(w.name, other.name) and Rival(other.name, without).at_edge:
             alone = fit_without(context.estimator, current, other.name)
-            if shares(alone)[s] > context.criteria.almost_all * shares(current)[s]:
+            if shares(alone)[s] > context.criteria.named_share * shares(current)[s]:
                 return other, alone
     return w, without

@@ -85,7 +85,7 @@ def likelier_relative(context: SearchContext, current: Fit, w: NamedEffect) -> s
         found = context.estimator.polish(fit_without(
             context.estimator, current, w.name, Rival(c.name, alone)))
         less = gap(problem, found.errors[s]) < (
-            criteria.relative_rest * gap(problem, current.errors[s]))
+            criteria.rival_share * gap(problem, current.errors[s]))
         if less and preference(problem, context.base.errors[s], found.errors[s],
                                current.errors[s]) >= criteria.certain_t:
             return c.effect

@@ -110,7 +110,7 @@ class Ranking:
             self._cross_validate(tied, current, problem)
             tied = self._elsewhere([r for r in tied if is_tied(r)], current, problem)
         cost = min(self._prior_cost(r.found) for r in tied)
-        tied = [r for r in tied if self._prior_cost(r.found) < cost + criteria.prior_cost]
+        tied = [r for r in tied if self._prior_cost(r.found) < cost + criteria.implausible_sd ** 2]
         names = {r.name for r in tied}
         # A simpler one stands for the other only where it was tested and explains as much.
         close = top - criteria.close_share * max(top - before, 0.0)
@@ -267,7 +267,7 @@ def without_limits(rivals: Sequence[Rival], current: Fit, subsystem: str, criter
     """
     ranked = sorted(rivals, key=lambda r: -r.share[subsystem])
     simple = {r.name for r in ranked if r.share[subsystem] > (
-        criteria.almost_all * ranked[0].share[subsystem])}
+        criteria.named_share * ranked[0].share[subsystem])}
     simple |= set(current.hypothesis.names)
     return [r for r in ranked if not r.at_edge
             or not any(is_limit(name, r.name) for name in simple)]

@@ -94,7 +94,7 @@ def _plainer(context: SearchContext, w: NamedEffect, current: Fit) -> Fit | None
     s, shares = w.subsystem, context.ranking.shares
     for r in sorted(fewer, key=lambda r: -r.share[s]):
         found = context.estimator.polish(fit_without(context.estimator, current, w.name, r))
-        if (shares(found)[s] > context.criteria.almost_all * shares(current)[s]
+        if (shares(found)[s] > context.criteria.named_share * shares(current)[s]
                 and _stands(context, w.name, found)):
             return found
     return None

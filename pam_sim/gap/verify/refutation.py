@@ -77,7 +77,7 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
         # again, but another, that one is likelier.
         if w.name in gone or (
                 w.name in told and told[best][1] > criteria.visible_sd
-                and told[w.name][0] < criteria.confirmed_fall <= told[best][0]):
+                and told[w.name][0] < 0.0 <= told[best][0]):
             names = (best, *(n for n in names if n != best))
             final = fits[best]
             w = replace(w, name=best, formulations=[r for r in w.rivals if r.name == best])
@@ -98,10 +98,10 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
     Returns
     -------
     name : str or None
-        None where the squared errors fall with every name by more than ``confirmed_fall`` of what
-        it moves, the other names in the model. One that moves nothing that could be seen there, or
-        less than what all of them leave, or of which stamps and the start may hide the fall, is
-        not judged.
+        None where the squared errors fall with every name, the other names in the model: 0 lies
+        half-way between the fall of a true effect, 1, and that of none, -1. One that moves
+        nothing that could be seen there is not judged, nor one that moves less than what all of
+        them leave, nor one of which stamps and the start may hide the fall.
     without : Fit
         The other names, everything refitted; the final model where there is no such name.
 
@@ -114,7 +114,7 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
     least = max(criteria.visible_sd, validation.left() if len(named) > 1 else 0.0)
     # Were it true, the fall would be 1, but for what stamps and start move.
     against = {name: fell for name, (fell, apart) in told.items()
-               if fell < criteria.confirmed_fall and apart > least
+               if fell < 0.0 and apart > least
                and 1.0 - fell > criteria.certain_t * validation.doubt(
                    runs[name], validation.after)}
     if not against:
