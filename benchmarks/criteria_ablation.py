@@ -25,8 +25,8 @@ kept. On these all thresholds of a group are halved, then doubled. Where that ch
 each threshold of the group is changed by itself. A case in which a threshold never came within
 a factor of two of a decision cannot change, and is not asked again.
 
-A share above one half is varied by its distance to one, and a threshold of zero by 0.25. Answers
-are kept one by one, so an interrupted run goes on where it stopped.
+A share above one half is varied by its distance to one. Answers are kept one by one, so an
+interrupted run goes on where it stopped.
 """
 
 import argparse
@@ -138,10 +138,8 @@ class Watched(float):
 
 
 def varied(name, up):
-    """Return a threshold halved or doubled; see the head of this file for shares and zero."""
+    """Return a threshold halved or doubled; see the head of this file for shares."""
     value = CRITERION[name].value
-    if value == 0.0:
-        return 0.25 if up else -0.25
     if is_near_one(name):
         return 1.0 - (1.0 - value) * (0.5 if up else 2.0)
     return type(value)(value * (FACTOR if up else 1.0 / FACTOR))
@@ -184,7 +182,7 @@ def is_within_reach(name, log):
     """Return whether a factor of two on a threshold can change anything in a case."""
     count, between = log.get(name, (0, math.inf))
     return name in NOT_LOGGED or bool(count) and (
-        between <= FACTOR or is_near_one(name) or CRITERION[name].value == 0.0)
+        between <= FACTOR or is_near_one(name))
 
 
 def ask(folder, label, names, up):
