@@ -187,7 +187,8 @@ class _Ahead:
     def __init__(self, lag_s, period_s):
         self._lag_s, self._period_s = lag_s, period_s
         fading = math.exp(-period_s / _MEMORY_S)
-        self._gains = 1.0 - fading * fading, (1.0 - fading) ** 2 / period_s
+        self._value_gain = 1.0 - fading * fading
+        self._rate_gain = (1.0 - fading) ** 2 / period_s
         self.forget()
 
     def forget(self):
@@ -200,6 +201,6 @@ class _Ahead:
             self._value = value
         self._value += self._rate * self._period_s
         residual = value - self._value
-        self._value += self._gains[0] * residual
-        self._rate += self._gains[1] * residual
+        self._value += self._value_gain * residual
+        self._rate += self._rate_gain * residual
         return self._value + self._lag_s * self._rate
