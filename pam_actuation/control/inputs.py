@@ -19,10 +19,11 @@ All laws share it, so that the loop, the replay and the compiled closed loops ne
 which law they drive. Optional values are NaN.
 """
 
+from collections.abc import Callable
 import struct
 
 from pam_sim.annotations import FloatArray
-from pam_sim.records import record
+from pam_sim.records import record, size_of
 
 INPUT = record(
     'contraction_m',                  # measured
@@ -36,7 +37,7 @@ INPUT = record(
     'force_n',                        # measured; NaN = not known
     'held_back',                      # 0 = the driver follows the command; else see ``following``
 )
-_write = struct.Struct(f'{len(INPUT.names)}d').pack_into
+_write: Callable[..., None] = struct.Struct(f'{size_of(INPUT)}d').pack_into
 
 
 def write_inputs(
