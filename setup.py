@@ -133,9 +133,8 @@ setup(
     python_requires='>=3.11,<3.13',
     install_requires=RUN_REQUIRES,
     extras_require={
-        'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES, 'cluster': CLUSTER_REQUIRES,
-        'ray': RAY_REQUIRES,
-        'bench': BENCH_REQUIRES},
+        'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES,
+        'cluster': CLUSTER_REQUIRES, 'ray': RAY_REQUIRES, 'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',
     maintainer_email='pam_actuation@example.org',

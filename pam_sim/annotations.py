@@ -14,13 +14,11 @@
 
 """Names for the types that annotations of both packages share."""
 
-import os
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-StrPath = str | os.PathLike[str]
 # float64 everywhere; numpy's own annotations are this wide for what it calculates.
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]

@@ -29,8 +29,9 @@ import shutil
 import stat
 import tempfile
 
-from pam_sim.annotations import StrPath
 from pam_sim.errors import InputError
+
+StrPath = str | os.PathLike[str]
 
 LONGEST_NAME = 100            # of an experiment or muscle: the file system takes 255 bytes in all
 LONGEST_PART_BYTES = 255      # that file systems take between two slashes

@@ -26,9 +26,8 @@ import os
 import re
 from typing import Any, Self
 
-from pam_sim.annotations import StrPath
 from pam_sim.errors import did_you_mean, InputError
-from pam_sim.files import refuse_pipe
+from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.units import allowed_range
 import yaml
 

@@ -16,9 +16,9 @@
 
 from collections.abc import Callable, Iterable
 
-from pam_sim.annotations import StrPath
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.files import StrPath
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import Located, LocatedList
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle

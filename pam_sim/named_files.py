@@ -17,8 +17,8 @@
 import os
 from pathlib import Path
 
-from pam_sim.annotations import StrPath
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.files import StrPath
 from pam_sim.located_yaml import load_yaml, Located
 
 _HERE = Path(__file__).parent

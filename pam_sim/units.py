@@ -14,7 +14,10 @@
 
 """Physical constants of the rig and the few unit conversions people need (SI inside)."""
 
-from pam_sim.annotations import Number
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:      # shell completion reads units without numpy
+    from pam_sim.annotations import Number
 
 P_ATM_PA = 101_325.0          # atmospheric pressure; gauge = absolute - P_ATM_PA
 GRAVITY_M_PER_S2 = 9.80665
@@ -29,12 +32,12 @@ _UNIT_OF_ENDING = (
     ('_nanosec', 'ns'), ('_v', 'V'))
 
 
-def gauge_pa(absolute_pa: Number) -> Number:
+def gauge_pa(absolute_pa: 'Number') -> 'Number':
     """Return gauge pressure [Pa] of an absolute pressure [Pa]; scalar or array."""
     return absolute_pa - P_ATM_PA
 
 
-def absolute_pa(gauge_pressure_pa: Number) -> Number:
+def absolute_pa(gauge_pressure_pa: 'Number') -> 'Number':
     """Return absolute pressure [Pa] of a gauge pressure [Pa]; scalar or array."""
     return gauge_pressure_pa + P_ATM_PA
 

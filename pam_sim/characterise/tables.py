@@ -24,11 +24,12 @@ kept as the source.
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import FloatArray, StrPath
+from pam_sim.annotations import FloatArray
 from pam_sim.characterise.fixed_load import FixedLoad
 from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator

@@ -117,10 +117,10 @@ run = Run({'valve_signal': Series(stamp, {'ppr_voltage': volts}), **{
     topic: Series(stamp, {field: getattr(seen, field)[:-1:5] + sd * random.normal(size=400)})
     for topic, field, sd in (('pressure', 'pressure_pa', 300.0),
                              ('contraction', 'contraction_m', 1e-5))}}, {}, '', '')
-problem = Problem(rig, cuts_of(rig, [Recording(run, 'ppr')]))
+estimator = Estimator(rig, subsystem_problems(rig, [Recording(run, 'ppr')]))
 names = ('notched_rail', 'coulomb_friction', 'guide_friction')
 pool = candidates(rig, ('pressure', 'contraction'), names)
-found = screen(problem, problem.base, [c for c in pool if c.effect in names])
+found = screen(estimator, estimator.base, [c for c in pool if c.effect in names])
 print(max(found, key=lambda s: s.promise.get('muscle', 0.0)).candidate.name,
       is_limit('guide_friction', 'notched_rail'))
 """

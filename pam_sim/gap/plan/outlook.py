@@ -102,7 +102,7 @@ def outlooks(sensitivities: Sensitivities, floors: float = 1.0) -> list[Outlook]
 
     Parameters
     ----------
-    looks : Sensitivities
+    sensitivities : Sensitivities
         Of the protocol.
     floors : float
         An effect shows when it moves some signal by so many noise floors (rms).

@@ -43,6 +43,7 @@ def rivals_of(context: SearchContext, current: Fit, problems: Sequence[Subsystem
     Parameters
     ----------
     context : SearchContext
+        What the search works with.
     current : Fit
         Where the search stands.
     problems : sequence of SubsystemProblem
