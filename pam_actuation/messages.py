@@ -21,6 +21,7 @@ them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
 ``header.stamp``: the time of the measurement, integer nanoseconds.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 import math
 from typing import Protocol
@@ -32,7 +33,7 @@ VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
 SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 
 
-def valve_of(names):
+def valve_of(names: Iterable[str]) -> str:
     """Return 'ppr' or 'hsv' by the names of the efforts of a valve signal, '' for others."""
     return next((valve for valve, own in VALVE_NAMES.items() if {*own} & {*names}), '')
 
@@ -98,10 +99,10 @@ class ReferenceTrajectory:
     """
 
     stamp_ns: int
-    time_from_start_ns: tuple
-    contraction_m: tuple = ()
-    velocity_m_per_s: tuple = ()
-    force_n: tuple = ()
+    time_from_start_ns: tuple[int, ...]
+    contraction_m: tuple[float, ...] = ()
+    velocity_m_per_s: tuple[float, ...] = ()
+    force_n: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +132,9 @@ class AngleTrajectory:
     """
 
     stamp_ns: int
-    time_from_start_ns: tuple
-    angle_rad: tuple = ()
-    rate_rad_per_s: tuple = ()
+    time_from_start_ns: tuple[int, ...]
+    angle_rad: tuple[float, ...] = ()
+    rate_rad_per_s: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +147,8 @@ class NamedTrajectory:
     """
 
     stamp_ns: int
-    names: tuple
-    points: tuple
+    names: tuple[str, ...]
+    points: tuple[tuple[int, tuple[float, ...], tuple[float, ...]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +156,8 @@ class NamedEfforts:
     """Wanted torques [N m] of the tendons of joints, by name, flexion positive: joint_effort."""
 
     stamp_ns: int
-    names: tuple
-    efforts: tuple
+    names: tuple[str, ...]
+    efforts: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,8 +170,8 @@ class ValveSignal:
     """
 
     stamp_ns: int
-    names: tuple
-    efforts: tuple
+    names: tuple[str, ...]
+    efforts: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,8 +179,8 @@ class ControllerState:
     """Every internal of one controller tick as named numbers: topic controller_state."""
 
     stamp_ns: int
-    names: tuple
-    values: tuple
+    names: tuple[str, ...]
+    values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,4 +195,4 @@ class Status:
     level: int
     name: str
     message: str
-    values: tuple = ()
+    values: tuple[tuple[str, str], ...] = ()

@@ -73,15 +73,16 @@ class SlowRise:
 
     """
 
-    def __init__(self, rate_pa_per_s=RISE_PA_PER_S, until_followed_s=UNTIL_FOLLOWED_S,
-                 active=True, lag_s=math.inf, dead_time_s=0.0):
+    def __init__(self, rate_pa_per_s: float = RISE_PA_PER_S,
+                 until_followed_s: float = UNTIL_FOLLOWED_S, active: bool = True,
+                 lag_s: float = math.inf, dead_time_s: float = 0.0) -> None:
         self._rate_pa_per_s = rate_pa_per_s
         self._until_followed_s = until_followed_s
         self._lag_s, self._dead_time_s = lag_s, dead_time_s
         self.begin()
         self.active = active
 
-    def begin(self):
+    def begin(self) -> None:
         """Begin anew at atmospheric pressure: the muscle is vented."""
         self.active = True
         self.limiting = False
@@ -89,14 +90,15 @@ class SlowRise:
         self._allowed_pa = P_ATM_PA
         self._followed_s = 0.0
         self._time_s = 0.0
-        self._measured = deque()        # (time [s], pressure) within the dead time
+        # (time [s], pressure) within the dead time
+        self._measured: deque[tuple[float, float]] = deque()
 
-    def hold(self):
+    def hold(self) -> None:
         """Begin anew where something else than a pressure is commanded."""
         if self.active:
             self.begin()
 
-    def limited(self, command_pa, elapsed_s, measured_pa=math.nan):
+    def limited(self, command_pa: float, elapsed_s: float, measured_pa: float = math.nan) -> float:
         """
         Return the pressure [absolute Pa] that a command may have now.
 
@@ -125,7 +127,7 @@ class SlowRise:
             self.active = self._followed_s < self._until_followed_s
         return self._allowed_pa
 
-    def _near_muscle(self, measured_pa, elapsed_s):
+    def _near_muscle(self, measured_pa: float, elapsed_s: float) -> float:
         """Return the highest pressure that the muscle follows at the rate, inf if not known."""
         if not math.isfinite(measured_pa):
             return math.inf

@@ -19,6 +19,7 @@ The names are those of the ROS parameters: safety limits by their own name, law
 parameters behind ``ppr.`` or ``hsv.``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 import math
 
@@ -32,7 +33,7 @@ from pam_sim.units import allowed_range
 VALVE_TYPES = ('ppr', 'hsv')
 
 
-def check_valve_type(valve_type, where='valve_type'):
+def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
     """
     Return the valve type if it is known.
 
@@ -120,7 +121,9 @@ class DriverConfig:
     hsv: HsvConfig = field(default_factory=HsvConfig)
 
     @classmethod
-    def from_parameters(cls, values=(), base=None, where='parameter'):
+    def from_parameters(cls, values: Mapping[str, object] | None = None,
+                        base: 'DriverConfig | None' = None,
+                        where: str = 'parameter') -> 'DriverConfig':
         """
         Return a configuration with some parameters changed.
 
@@ -134,8 +137,8 @@ class DriverConfig:
 
         """
         config = base or cls()
-        changes = {'': {}, 'ppr': {}, 'hsv': {}}
-        for name, value in dict(values).items():
+        changes: dict[str, dict[str, float]] = {'': {}, 'ppr': {}, 'hsv': {}}
+        for name, value in dict(values or {}).items():
             number = _checked(name, value, where)
             group, _, key = name.rpartition('.')
             changes[group][key] = number
@@ -147,15 +150,15 @@ class DriverConfig:
         config.hsv.par()
         return config
 
-    def as_parameters(self):
+    def as_parameters(self) -> dict[str, float]:
         """Return all parameters as a flat dict name -> value."""
-        flat = {}
-        for group, part in (('', self.safety), ('ppr.', self.ppr), ('hsv.', self.hsv)):
-            flat.update({group + item.name: getattr(part, item.name) for item in fields(part)})
-        return flat
+        groups: dict[str, SafetyLimits | PprConfig | HsvConfig] = {
+            '': self.safety, 'ppr.': self.ppr, 'hsv.': self.hsv}
+        return {group + item.name: getattr(part, item.name)
+                for group, part in groups.items() for item in fields(part)}
 
 
-def _checked(name, value, where):
+def _checked(name: str, value: object, where: str) -> float:
     if name not in _RANGES:
         hint = did_you_mean(name, _RANGES, '', ', did you mean {}?')
         raise InputError(f'unknown parameter {name!r}{hint}', where)

@@ -149,7 +149,7 @@ FAULT_TABLE = (
 FAULTS = {fault.key: fault for fault in FAULT_TABLE}
 
 
-def fault_table_markdown():
+def fault_table_markdown() -> str:
     """Return the table as Markdown text, one row per fault."""
     lines = ['| fault | noticed by | reaction | latched | ends |', '|---|---|---|---|---|']
     for fault in FAULT_TABLE:

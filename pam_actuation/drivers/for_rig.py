@@ -20,11 +20,16 @@ same with its own rig's model file. Effects that no data sheet lists (hysteresis
 leak) stay unknown to the driver.
 """
 
+from collections.abc import Mapping
 import math
+from typing import TYPE_CHECKING
 
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import HsvConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 _UNKNOWN_SWING_HZ = 5.9
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
@@ -32,7 +37,8 @@ _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
 _GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
 
 
-def driver_config(rig, changes=(), where='parameter'):
+def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
+                  where: str = 'parameter') -> DriverConfig:
     """
     Return the DriverConfig for a rig.
 
@@ -72,12 +78,12 @@ def driver_config(rig, changes=(), where='parameter'):
     return DriverConfig.from_parameters(changes, config, where)
 
 
-def _effect(rig, name, parameter):
+def _effect(rig: 'Rig', name: str, parameter: str) -> float:
     setting = rig.effect(name)
     return 0.0 if setting is None else setting.parameters[parameter]
 
 
-def _load(rig):
+def _load(rig: 'Rig') -> dict[str, float]:
     """Return volume and swing of the load on the muscle, from the statics of the rig."""
     if rig.load != 'hanging_mass':
         # The contraction is prescribed: nothing swings with the pressure.
@@ -108,11 +114,11 @@ def _load(rig):
     }
 
 
-def _volume(rig, gauge_pa):
+def _volume(rig: 'Rig', gauge_pa: float) -> float:
     return float(rig.volume_m3(rig.static_contraction_m(P_ATM_PA + gauge_pa)))
 
 
-def _swing_hz(rig, gauge_pa):
+def _swing_hz(rig: 'Rig', gauge_pa: float) -> float:
     """Return the natural frequency [Hz] of the load at constant pressure."""
     x_m = rig.static_contraction_m(P_ATM_PA + gauge_pa)
     weight_n = rig.parameters['mass_kg'] * GRAVITY_M_PER_S2

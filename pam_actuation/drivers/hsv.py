@@ -25,6 +25,7 @@ import math
 
 from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step, OUTPUT
 from pam_actuation.drivers.hsv_model import PARAMETERS, SENT_SIZE, STATE
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, values_of, zeros
 from pam_sim.units import P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K
@@ -80,7 +81,7 @@ class HsvConfig:
     supply_margin_pa: float = 5_000.0
     slope_share: float = 1.0
 
-    def par(self):
+    def par(self) -> FloatArray:
         """
         Return the parameter array of ``hsv_step``.
 
@@ -115,11 +116,11 @@ class HsvConfig:
             'close_part': self.close_time_s / self.period_s,
             'pulse_margin_part': self.pulse_margin_s / self.period_s,
             'drift_limit_pa_per_period': self.drift_limit_pa_per_s * self.period_s}
-        same = {name: given[name] for name in PARAMETERS.names if name in given}
+        same = {name: given[name] for name in PARAMETERS.names or () if name in given}
         return values_of(PARAMETERS, {**same, **derived})
 
 
-def initial_state():
+def initial_state() -> FloatArray:
     """Return the state array of ``hsv_step`` before the first measurement."""
     state = zeros(STATE)
     start = fields(state, STATE)
@@ -134,7 +135,7 @@ def initial_state():
 class HsvLaw:
     """The law as an object: ``step`` each PWM period, ``hold`` for imposed duties."""
 
-    def __init__(self, config=None):
+    def __init__(self, config: HsvConfig | None = None) -> None:
         """Start without a measurement, both valves shut."""
         self.config = config or HsvConfig()
         self.par = self.config.par()
@@ -149,7 +150,8 @@ class HsvLaw:
         hsv_hold(spare, self.par, 0.0, 0.0, P_ATM_PA, math.nan)
         self.out[:] = 0.0
 
-    def step(self, p_cmd_pa, p_meas_pa, supply_pa=math.nan, age_s=0.0):
+    def step(self, p_cmd_pa: float, p_meas_pa: float, supply_pa: float = math.nan,
+             age_s: float = 0.0) -> tuple[float, float]:
         """
         Return (fill duty, vent duty) for the next PWM period.
 
@@ -160,35 +162,36 @@ class HsvLaw:
         hsv_step(self.state, self.par, p_cmd_pa, p_meas_pa, supply_pa, self.out)
         return self._out.fill_duty.item(), self._out.vent_duty.item()
 
-    def hold(self, fill_duty, vent_duty, p_meas_pa=math.nan, supply_pa=math.nan, age_s=0.0):
+    def hold(self, fill_duty: float, vent_duty: float, p_meas_pa: float = math.nan,
+             supply_pa: float = math.nan, age_s: float = 0.0) -> None:
         """Note a period in which these duties were sent whatever the law says."""
         self._state.age_s[...] = age_s
         hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
         self._out.saturated[...] = 0.0
 
-    def lasted(self, periods):
+    def lasted(self, periods: float) -> None:
         """Tell how long [PWM periods] the newest opening was held before the next tick came."""
         self._state.sent[0] *= periods
         self._state.through_pa[0] *= periods
 
     @property
-    def saturated(self):
+    def saturated(self) -> int:
         """Return -1, 0 or +1: vent fully open, free, fill fully open."""
         return int(self._out.saturated.item())
 
     @property
-    def predicted_pa(self):
+    def predicted_pa(self) -> float:
         """Return the pressure [Pa] predicted for when the newest opening begins to act."""
         return self._out.predicted_pa.item()
 
     @property
-    def dead_time_s(self):
+    def dead_time_s(self) -> float:
         """Return the dead time [s] as learned so far."""
         periods = (self._par.dead_time_periods.item()
                    + self._state.dead_time_shift_periods.item())
         return max(periods, 0.0) * self.config.period_s
 
     @property
-    def flow_pa(self):
+    def flow_pa(self) -> float:
         """Return the pressure change [Pa] the valves made in the last period (model)."""
         return self._state.flow_pa.item()

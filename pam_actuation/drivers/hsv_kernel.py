@@ -26,15 +26,17 @@ valves open in the same period and the difference of their pulses is the dose
 part of the shortest pulse's effect is left alone.
 """
 
+from collections.abc import Callable
 import math
 
-from numba import njit
+import numpy as np
 from pam_actuation.drivers.hsv_model import (
     advance, full_rate, observe, PARAMETERS, predict, SENT_SIZE, STATE)
 from pam_actuation.drivers.hsv_pulses import (
     duty_of_opening, joined_opening, LONGEST_OF_A_PAIR, opening_of_duty, pair_openings,
     shortest_opening)
-from pam_sim.compiled import compiled, source_key
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 
@@ -48,7 +50,7 @@ OUTPUT = record(
 
 
 @compiled
-def _push(state, opening, through_pa):
+def _push(state: np.record, opening: float, through_pa: float) -> None:
     for i in range(SENT_SIZE - 1, 0, -1):
         state.sent[i] = state.sent[i - 1]
         state.through_pa[i] = state.through_pa[i - 1]
@@ -57,7 +59,7 @@ def _push(state, opening, through_pa):
 
 
 @compiled
-def _command_slope(state, par, p_cmd_pa):
+def _command_slope(state: np.record, par: np.record, p_cmd_pa: float) -> float:
     """
     Return the change [Pa per period] to feed forward.
 
@@ -76,7 +78,8 @@ def _command_slope(state, par, p_cmd_pa):
 
 
 @compiled
-def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
+def _free_error(state: np.record, par: np.record, p_pa: float, volume_m3: float, rate_m3: float,
+                target_pa: float, supply_pa: float) -> float:
     """
     Return the error [Pa] that stays if the valves do nothing from now on.
 
@@ -98,7 +101,8 @@ def _free_error(state, par, p_pa, volume_m3, rate_m3, target_pa, supply_pa):
 
 
 @compiled
-def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
+def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: float, error: float,
+                     slope_pa: float, supply_pa: float) -> tuple[float, float]:
     """
     Return the openings (fill, vent) for the next period.
 
@@ -139,7 +143,8 @@ def _wanted_openings(state, par, p_pa, volume_m3, error, slope_pa, supply_pa):
 
 
 @compiled
-def _joined(state, par, p_pa, volume_m3, supply_pa, fill_duty, vent_duty):
+def _joined(state: np.record, par: np.record, p_pa: float, volume_m3: float, supply_pa: float,
+            fill_duty: float, vent_duty: float) -> tuple[float, float]:
     """Return the signed opening that acts like two duties, and the air through both [Pa]."""
     fill = opening_of_duty(fill_duty, par.open_part, par.close_part)
     vent = opening_of_duty(vent_duty, par.open_part, par.close_part)
@@ -153,7 +158,7 @@ def _joined(state, par, p_pa, volume_m3, supply_pa, fill_duty, vent_duty):
 
 
 @compiled
-def _duty(par, opening):
+def _duty(par: np.record, opening: float) -> float:
     """Return the duty of an opening, exactly 0 for none."""
     if opening <= 0.0:
         return 0.0
@@ -161,7 +166,8 @@ def _duty(par, opening):
 
 
 @compiled
-def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+def _step(state: np.record, par: np.record, p_cmd_pa: float, p_meas_pa: float, supply_pa: float,
+          out: np.record) -> None:
     if not math.isfinite(supply_pa):
         supply_pa = par.supply_pa
     observe(state, par, p_meas_pa, supply_pa)
@@ -189,7 +195,8 @@ def _step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
 
 
 @compiled
-def _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
+def _hold(state: np.record, par: np.record, fill_duty: float, vent_duty: float, p_meas_pa: float,
+          supply_pa: float) -> None:
     if not math.isfinite(supply_pa):
         supply_pa = par.supply_pa
     observe(state, par, p_meas_pa, supply_pa)
@@ -200,10 +207,11 @@ def _hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
     state.command_change_pa = 0.0
 
 
-def _entries(key):
+def _entries(key: int) -> tuple[Callable[..., None], Callable[..., None]]:
     """Return both entry points as units of compiled code, stored under ``key``."""
-    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-    def hsv_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+    @entry_point
+    def hsv_step(state: FloatArray, par: FloatArray, p_cmd_pa: float, p_meas_pa: float,
+                 supply_pa: float, out: FloatArray) -> None:
         """
         One PWM period of the pressure loop.
 
@@ -221,8 +229,9 @@ def _entries(key):
             _step(state.view(STATE)[0], par.view(PARAMETERS)[0], p_cmd_pa, p_meas_pa, supply_pa,
                   out.view(OUTPUT)[0])
 
-    @njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-    def hsv_hold(state, par, fill_duty, vent_duty, p_meas_pa, supply_pa):
+    @entry_point
+    def hsv_hold(state: FloatArray, par: FloatArray, fill_duty: float, vent_duty: float,
+                 p_meas_pa: float, supply_pa: float) -> None:
         """One PWM period with imposed duties (vent, missed tick): only the model goes on."""
         if key >= 0:
             _hold(state.view(STATE)[0], par.view(PARAMETERS)[0], fill_duty, vent_duty,

@@ -25,6 +25,8 @@ Source: ISO 6358 (flow).
 
 import math
 
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.records import record
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
@@ -102,7 +104,8 @@ STATE = record(
 
 
 @compiled
-def full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
+def full_rate(state: np.record, par: np.record, p_pa: float, volume_m3: float, supply_pa: float,
+              filling: bool) -> float:
     """Return the pressure change [Pa] in one period with one valve fully open."""
     if filling:
         flow = mass_flow_kg_per_s(
@@ -116,7 +119,7 @@ def full_rate(state, par, p_pa, volume_m3, supply_pa, filling):
 
 
 @compiled
-def _volume_pull(par, p_pa, volume_m3, rate_m3):
+def _volume_pull(par: np.record, p_pa: float, volume_m3: float, rate_m3: float) -> float:
     """
     Return the volume's acceleration [m^3 per period^2].
 
@@ -131,7 +134,8 @@ def _volume_pull(par, p_pa, volume_m3, rate_m3):
 
 
 @compiled
-def advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
+def advance(state: np.record, par: np.record, p_pa: float, volume_m3: float, rate_m3: float,
+            opening: float, periods: float, supply_pa: float) -> tuple[float, float, float, float]:
     """
     Bring the model forward by a part of a period with a constant opening.
 
@@ -162,7 +166,7 @@ def advance(state, par, p_pa, volume_m3, rate_m3, opening, periods, supply_pa):
 
 
 @compiled
-def _delay(state, par):
+def _delay(state: np.record, par: np.record) -> tuple[int, float]:
     """Return the dead time as whole periods and the part of one that is left."""
     delay = min(max(par.dead_time_periods + state.dead_time_shift_periods, 0.0), SENT_SIZE - 2.0)
     whole = min(int(delay), SENT_SIZE - 3)
@@ -170,7 +174,7 @@ def _delay(state, par):
 
 
 @compiled
-def _learn_delay(state, par, error):
+def _learn_delay(state: np.record, par: np.record, error: float) -> None:
     """
     Move the dead time where a change of the flow shows earlier or later than expected.
 
@@ -191,13 +195,13 @@ def _learn_delay(state, par, error):
 
 
 @compiled
-def _bounded_gain(par, gain):
+def _bounded_gain(par: np.record, gain: float) -> float:
     """Return the gain of a flow within its limits."""
     return min(max(gain, 1.0 / par.gain_limit), par.gain_limit)
 
 
 @compiled
-def observe(state, par, p_meas_pa, supply_pa):
+def observe(state: np.record, par: np.record, p_meas_pa: float, supply_pa: float) -> None:
     """
     Bring the model one period further and correct it by a measurement.
 
@@ -260,7 +264,8 @@ def observe(state, par, p_meas_pa, supply_pa):
 
 
 @compiled
-def predict(state, par, supply_pa):
+def predict(state: np.record, par: np.record,
+            supply_pa: float) -> tuple[float, float, float]:
     """
     Run the model over all openings under way.
 

@@ -27,7 +27,7 @@ LONGEST_OF_A_PAIR = 0.5   # opening and duty beyond which two valves do not open
 
 
 @compiled
-def duty_of_opening(opening, open_part, close_part, margin):
+def duty_of_opening(opening: float, open_part: float, close_part: float, margin: float) -> float:
     """Return the duty whose pulse is effectively open for ``opening`` (0..1) of a period."""
     # A valve that has no time to shut before the next pulse stays open: between the
     # longest pulse that still shuts and fully open there is nothing.
@@ -39,7 +39,7 @@ def duty_of_opening(opening, open_part, close_part, margin):
 
 
 @compiled
-def opening_of_duty(duty, open_part, close_part):
+def opening_of_duty(duty: float, open_part: float, close_part: float) -> float:
     """Return the effective opening (0..1 of a period) of a duty."""
     if duty <= 0.0:
         return 0.0
@@ -51,7 +51,7 @@ def opening_of_duty(duty, open_part, close_part):
 
 
 @compiled
-def shortest_opening(open_part, close_part, margin):
+def shortest_opening(open_part: float, close_part: float, margin: float) -> float:
     """Return the effective opening of the shortest pulse, 0 where valves switch at once."""
     if open_part > 0.0 or close_part > 0.0:
         return min(close_part + margin, 1.0)
@@ -59,7 +59,8 @@ def shortest_opening(open_part, close_part, margin):
 
 
 @compiled
-def pair_openings(wanted_pa, fill_rate_pa, vent_rate_pa, shortest):
+def pair_openings(wanted_pa: float, fill_rate_pa: float, vent_rate_pa: float,
+                  shortest: float) -> tuple[float, float]:
     """
     Return the openings (fill, vent) that change the pressure by ``wanted_pa`` between them.
 
@@ -73,7 +74,8 @@ def pair_openings(wanted_pa, fill_rate_pa, vent_rate_pa, shortest):
 
 
 @compiled
-def joined_opening(fill, vent, fill_rate_pa, vent_rate_pa, more_pa=0.0):
+def joined_opening(fill: float, vent: float, fill_rate_pa: float, vent_rate_pa: float,
+                   more_pa: float = 0.0) -> float:
     """
     Return the one signed opening, fill > 0, that acts like both openings together.
 

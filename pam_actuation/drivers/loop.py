@@ -19,12 +19,14 @@ A node, the offline simulation and the tests feed it messages and call ``tick`` 
 ``rate_hz``; it never looks at a clock of its own.
 """
 
+from collections.abc import Callable, Mapping
 import math
+from typing import Any
 
 from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.ppr import PprLaw
-from pam_actuation.drivers.safety import SafetySupervisor
+from pam_actuation.drivers.safety import Decision, SafetySupervisor
 from pam_actuation.messages import Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
@@ -52,7 +54,8 @@ class DriverLoop:
 
     """
 
-    def __init__(self, valve_type, config=None):
+    def __init__(self, valve_type: str,
+                 config: DriverConfig | Mapping[str, object] | None = None) -> None:
         """Build supervisor and law (and compile the law, so that no tick waits for it)."""
         self.valve_type = check_valve_type(valve_type)
         if not isinstance(config, DriverConfig):
@@ -64,39 +67,43 @@ class DriverLoop:
         lag_s, dead_time_s = self._lag()
         self.safety = SafetySupervisor(config.safety, self.is_hsv, lag_s, dead_time_s)
         self.rate_hz = 1.0 / self.period_s
-        self._new_law().step(P_ATM_PA, *((P_ATM_PA,) if self.is_hsv else ()))
+        spare = self._new_law()
+        if isinstance(spare, HsvLaw):
+            spare.step(P_ATM_PA, P_ATM_PA)
+        else:
+            spare.step(P_ATM_PA)
         self.law = self._new_law()
         self.ticks = 0
         self.late_ticks = 0
         self.saturated_ticks = 0
         self.saturated_s = 0.0
-        self._last_ns = None
-        self._law_ns = None
-        self._used_stamp_ns = None
+        self._last_ns: int | None = None
+        self._law_ns: int | None = None
+        self._used_stamp_ns: int | None = None
         self._efforts = self._safe_efforts()
-        self._followed_pa = P_ATM_PA
-        self._rate_start = None
+        self._followed_pa: float | None = P_ATM_PA
+        self._rate_start: tuple[int, int] | None = None      # time, ticks
         self._rate_measured_hz = math.nan
 
-    def _lag(self):
+    def _lag(self) -> tuple[float, float]:
         """Return time constant and dead time [s] of the pressure behind a command that rises."""
         if self.is_hsv:     # the share ``gain`` of the error goes in each period
             return self.period_s / self.config.hsv.gain, self.config.hsv.dead_time_s
         return self.config.ppr.time_constant_s + _READING_AGE_S, self.config.ppr.dead_time_s
 
-    def _new_law(self):
+    def _new_law(self) -> HsvLaw | PprLaw:
         return HsvLaw(self.config.hsv) if self.is_hsv else PprLaw(self.config.ppr)
 
-    def takes(self):
+    def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by short name."""
         return {'pressure': self.on_pressure, 'supply_pressure': self.on_supply,
                 'pressure_command': self.on_command, 'valve_command': self.on_valve_command}
 
-    def on_command(self, message: Pressure, sequence=None):
+    def on_command(self, message: Pressure, sequence: int | None = None) -> None:
         """Take a pressure_command; ``sequence`` is the publisher's message number, if known."""
         self.safety.on_command(message.stamp_ns, message.pressure_pa, sequence)
 
-    def on_valve_command(self, message: ValveSignal):
+    def on_valve_command(self, message: ValveSignal) -> None:
         """
         Take a valve_command: the wanted raw signal, supervised like a pressure command.
 
@@ -112,49 +119,52 @@ class DriverLoop:
             pressure_pa = P_ATM_PA + self.config.ppr.gain_pa_per_v * wanted[0]
             self.safety.on_command(message.stamp_ns, pressure_pa)
 
-    def on_pressure(self, message: Pressure):
+    def on_pressure(self, message: Pressure) -> None:
         """Take a measured pressure."""
         self.safety.on_pressure(message.stamp_ns, message.pressure_pa)
 
-    def on_supply(self, message: Pressure):
+    def on_supply(self, message: Pressure) -> None:
         """Take a measured supply pressure."""
         self.safety.on_supply(message.stamp_ns, message.pressure_pa)
 
-    def on_device(self, problem):
+    def on_device(self, problem: str) -> None:
         """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
         self.safety.on_device(problem)
 
-    def set_command_publishers(self, count, names=''):
+    def set_command_publishers(self, count: int, names: str = '') -> None:
         """Tell how many publishers of pressure_command send or may yet, and their names."""
         self.safety.publishers = count
         self.safety.publisher_names = names and f': {names}'
 
-    def set_sender_fault(self, fault):
+    def set_sender_fault(self, fault: tuple[str, str] | None) -> None:
         """Tell of a second sender: (key in ``FAULTS``, sentence), None where there is none."""
         self.safety.sender_fault = fault
 
-    def vented_elsewhere(self, now_ns):
+    def vented_elsewhere(self, now_ns: int) -> None:
         """Tell that another node, such as the watchdog, sent the signal that vents."""
         self.safety.vented_elsewhere(now_ns)
 
-    def emergency_stop(self, why='requested'):
+    def emergency_stop(self, why: str = 'requested') -> tuple[bool, str]:
         """Latch the emergency stop; return (True, sentence). Vents from the next tick on."""
         self.safety.emergency_stop(why)
         return True, f'Emergency stop: {why}. Venting until the service reset is called.'
 
-    def reset(self):
+    def reset(self) -> tuple[bool, str]:
         """End a latched stop; return (done, sentence)."""
         return self.safety.reset()
 
-    def safe_signal(self, now_ns):
+    def safe_signal(self, now_ns: int) -> ValveSignal:
         """Return the signal that vents: PPR 0 V, HSV fill 0 and vent 1."""
         return self._signal(now_ns, self._safe_efforts())
 
-    def tick(self, now_ns):
+    def tick(self, now_ns: int) -> tuple[ValveSignal, Status]:
         """Return (ValveSignal, Status) for ``now_ns``."""
         decision = self.safety.tick(now_ns)
         self._count(now_ns)
-        efforts = self._hsv(decision, now_ns) if self.is_hsv else self._ppr(decision, now_ns)
+        if isinstance(self.law, HsvLaw):
+            efforts = self._hsv(self.law, decision, now_ns)
+        else:
+            efforts = self._ppr(self.law, decision, now_ns)
         self._efforts = efforts
         self._followed_pa = _followed_pa(decision)
         if decision.pressure_pa is not None and self.law.saturated:
@@ -164,7 +174,7 @@ class DriverLoop:
         self._last_ns = now_ns
         return self._signal(now_ns, efforts), self._status(now_ns, decision)
 
-    def followed(self):
+    def followed(self) -> Pressure | None:
         """
         Return the ``Pressure`` followed since the last tick, None where it is an opening.
 
@@ -176,21 +186,21 @@ class DriverLoop:
 
     # -- laws -----------------------------------------------------------------------
 
-    def _ppr(self, decision, now_ns):
+    def _ppr(self, law: PprLaw, decision: Decision, now_ns: int) -> tuple[float, ...]:
         target_pa = decision.pressure_pa
         dt_s = None if self._last_ns is None else max(now_ns - self._last_ns, 0) / _NS
         if target_pa is None:
             volts, = self._safe_efforts()
-            self.law.force(volts)
+            law.force(volts)
             target_pa = P_ATM_PA
         else:
-            volts = self.law.step(target_pa, dt_s)
+            volts = law.step(target_pa, dt_s)
         away_pa = target_pa - self.safety.pressure.pressure_pa
         if dt_s is not None and abs(away_pa) > _PPR_MOVE_PA:
             self.safety.flow(away_pa * dt_s / self.config.ppr.time_constant_s)
         return (float(volts),)
 
-    def _hsv(self, decision, now_ns):
+    def _hsv(self, law: HsvLaw, decision: Decision, now_ns: int) -> tuple[float, ...]:
         measured = self._new_measurement()
         age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / _NS, 0.0)
         supply_pa = self.safety.supply_pa(now_ns)
@@ -203,42 +213,43 @@ class DriverLoop:
         if elapsed == 0 and followed and self._efforts != self._safe_efforts():
             return self._efforts      # called within a period: the running one goes on
         if elapsed >= 1:
-            self.law.lasted(1.0 + late)     # a late tick leaves the valves as they are for longer
+            law.lasted(1.0 + late)     # a late tick leaves the valves as they are for longer
+        fill, vent = self._efforts
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
-            self.law.hold(*self._efforts, supply_pa=supply_pa)
-            self.safety.flow(self.law.flow_pa)
+            law.hold(fill, vent, supply_pa=supply_pa)
+            self.safety.flow(law.flow_pa)
         if decision.pressure_pa is None:
-            efforts = self._imposed(decision.duty)
+            fill, vent = self._imposed(decision.duty)
             if elapsed != 0:
-                self.law.hold(*efforts, measured, supply_pa, age_s)
+                law.hold(fill, vent, measured, supply_pa, age_s)
         else:
-            efforts = self.law.step(decision.pressure_pa, measured, supply_pa, age_s)
+            fill, vent = law.step(decision.pressure_pa, measured, supply_pa, age_s)
         if elapsed != 0:
             self._law_ns = now_ns
-            self.safety.flow(self.law.flow_pa)
+            self.safety.flow(law.flow_pa)
         self._used_stamp_ns = self.safety.pressure.stamp_ns
-        return tuple(float(effort) for effort in efforts)
+        return float(fill), float(vent)
 
-    def _imposed(self, duty):
+    def _imposed(self, duty: float | None) -> tuple[float, ...]:
         if duty is None:
             return self._safe_efforts()
         return max(duty, 0.0), max(-duty, 0.0)
 
-    def _new_measurement(self):
+    def _new_measurement(self) -> float:
         channel = self.safety.pressure
         if channel.stamp_ns is None or channel.stamp_ns == self._used_stamp_ns:
             return math.nan
         return channel.pressure_pa
 
-    def _safe_efforts(self):
+    def _safe_efforts(self) -> tuple[float, ...]:
         return SAFE_EFFORTS['hsv' if self.is_hsv else 'ppr']
 
-    def _signal(self, now_ns, efforts):
+    def _signal(self, now_ns: int, efforts: tuple[float, ...]) -> ValveSignal:
         return ValveSignal(now_ns, self._names, efforts)
 
     # -- status ---------------------------------------------------------------------
 
-    def _count(self, now_ns):
+    def _count(self, now_ns: int) -> None:
         self.ticks += 1
         if self._last_ns is not None and now_ns - self._last_ns > 1.5 * self.period_s * _NS:
             self.late_ticks += 1
@@ -249,7 +260,7 @@ class DriverLoop:
             self._rate_measured_hz = (self.ticks - self._rate_start[1]) / span_s
             self._rate_start = (now_ns, self.ticks)
 
-    def _status(self, now_ns, decision):
+    def _status(self, now_ns: int, decision: Decision) -> Status:
         safety = self.safety
         command_age_ms = math.nan
         if safety.command_stamp_ns is not None:
@@ -280,13 +291,13 @@ class DriverLoop:
         return Status(now_ns, decision.level, 'valve_driver', decision.message, tuple(values))
 
 
-def _followed_pa(decision):
+def _followed_pa(decision: Decision) -> float | None:
     if decision.duty is not None:
         return None
     return P_ATM_PA if decision.pressure_pa is None else decision.pressure_pa
 
 
-def _target_text(decision):
+def _target_text(decision: Decision) -> str:
     if decision.duty is not None:
         return f'duty {decision.duty:.3f}'
     return 'vent' if decision.pressure_pa is None else f'{gauge_kpa(decision.pressure_pa):.1f}'

@@ -32,7 +32,7 @@ _SAFE_ROOM = 1.5
 _LEAST_CHANGE, _SHORTEST = 0.1, 0.3
 
 
-def stamp_problem(stamp_ns, now_ns, oldest_s, ahead_s):
+def stamp_problem(stamp_ns: int, now_ns: int, oldest_s: float, ahead_s: float) -> str:
     """Return why a stamp cannot be used at ``now_ns``, or '' if it can."""
     age_ns = now_ns - stamp_ns
     if age_ns > oldest_s * NS_PER_S:
@@ -53,7 +53,8 @@ class Channel:
     ``refused`` how many were refused, ``received`` how many came.
     """
 
-    def __init__(self, oldest_s, ahead_s, lowest_pa, highest_pa):
+    def __init__(self, oldest_s: float, ahead_s: float, lowest_pa: float,
+                 highest_pa: float) -> None:
         """Accept readings of lowest_pa..highest_pa with stamps -ahead_s..oldest_s old."""
         self.oldest_s = oldest_s
         self.ahead_s = ahead_s
@@ -63,13 +64,13 @@ class Channel:
         self.refused = 0
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Drop the reading (clock change, pause); the counters go on."""
-        self.stamp_ns = None
+        self.stamp_ns: int | None = None
         self.pressure_pa = math.nan
         self.problem = ''
 
-    def offer(self, stamp_ns, pressure_pa, now_ns):
+    def offer(self, stamp_ns: int, pressure_pa: float, now_ns: int) -> bool:
         """Judge a reading; return True if it became the newest valid one."""
         self.received += 1
         problem = stamp_problem(stamp_ns, now_ns, self.oldest_s, self.ahead_s)
@@ -89,7 +90,7 @@ class Channel:
         self.problem = ''
         return True
 
-    def age_s(self, now_ns):
+    def age_s(self, now_ns: int) -> float:
         """Return the age of the newest valid reading [s], infinite before the first."""
         return math.inf if self.stamp_ns is None else (now_ns - self.stamp_ns) / NS_PER_S
 
@@ -102,20 +103,20 @@ class FrozenMonitor:
     since the reading last changed.
     """
 
-    def __init__(self, after_s, change_pa):
+    def __init__(self, after_s: float, change_pa: float) -> None:
         """Call it frozen after ``after_s`` [s] and ``change_pa`` [Pa] without a change."""
         self.after_s = after_s
         self.change_pa = change_pa
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Start anew with the next reading."""
-        self._value_pa = None
+        self._value_pa: float | None = None
         self._since_ns = 0
         self.expected_pa = 0.0
         self.frozen = False
 
-    def reading(self, stamp_ns, pressure_pa):
+    def reading(self, stamp_ns: int, pressure_pa: float) -> None:
         """Take a valid reading."""
         if pressure_pa != self._value_pa:
             self._value_pa = pressure_pa
@@ -123,7 +124,7 @@ class FrozenMonitor:
             self.expected_pa = 0.0
             self.frozen = False
 
-    def flow(self, change_pa):
+    def flow(self, change_pa: float) -> None:
         """
         Add the pressure change [Pa] expected from the flow of one tick.
 
@@ -134,7 +135,7 @@ class FrozenMonitor:
         if self._value_pa is not None:
             self.expected_pa = max(self.expected_pa, min(P_ATM_PA - self._value_pa, 0.0))
 
-    def check(self, stamp_ns, room_pa=math.inf):
+    def check(self, stamp_ns: int, room_pa: float = math.inf) -> bool:
         """
         Return True while the reading is frozen as of the newest stamp.
 
@@ -156,7 +157,7 @@ class FrozenMonitor:
                 self.frozen = True
         return self.frozen
 
-    def unchanged_s(self, stamp_ns):
+    def unchanged_s(self, stamp_ns: int) -> float:
         """Return for how long [s] the reading has not changed."""
         return 0.0 if self._value_pa is None else (stamp_ns - self._since_ns) / NS_PER_S
 
@@ -170,22 +171,23 @@ class CommandOrder:
     ``window_s`` are two publishers.
     """
 
-    def __init__(self, window_s, clear_s):
+    def __init__(self, window_s: float, clear_s: float) -> None:
         """Set the window [s] for two steps back and the quiet time [s] that ends it."""
         self.window_s = window_s
         self.clear_s = clear_s
         self.steps_back = 0
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Drop the history (clock change); the counter goes on."""
-        self._stamp_ns = None
+        self._stamp_ns: int | None = None
         self._pressure_pa = math.nan
-        self._sequence = None
-        self._recent_ns = deque(maxlen=2)
-        self._mixed_ns = None
+        self._sequence: int | None = None
+        self._recent_ns: deque[int] = deque(maxlen=2)
+        self._mixed_ns: int | None = None
 
-    def offer(self, stamp_ns, pressure_pa, sequence, now_ns):
+    def offer(self, stamp_ns: int, pressure_pa: float, sequence: int | None,
+              now_ns: int) -> bool:
         """Note a command; return True if its stamp is newer than all before."""
         newer = self._stamp_ns is None or stamp_ns > self._stamp_ns
         same = stamp_ns == self._stamp_ns and pressure_pa == self._pressure_pa
@@ -205,7 +207,7 @@ class CommandOrder:
             self._pressure_pa = pressure_pa
         return newer
 
-    def mixed(self, now_ns):
+    def mixed(self, now_ns: int) -> bool:
         """Return True while two publishers are evident at ``now_ns``."""
         if self._mixed_ns is not None and now_ns - self._mixed_ns > self.clear_s * NS_PER_S:
             self._mixed_ns = None

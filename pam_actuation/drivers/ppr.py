@@ -24,7 +24,9 @@ signature with ``hsv_step`` so that a closed-loop rollout can hold either.
 from dataclasses import dataclass
 import math
 
-import numba
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point
 from pam_sim.records import cells, record, values_of, zeros
 from pam_sim.units import P_ATM_PA
 
@@ -45,8 +47,8 @@ OUTPUT = record(
 )
 
 
-@numba.njit
-def _step(state, par, p_cmd_pa, out):
+@compiled
+def _step(state: np.record, par: np.record, p_cmd_pa: float, out: np.record) -> None:
     wanted = (p_cmd_pa - P_ATM_PA) * par.v_per_pa
     volts = min(max(wanted, par.lowest_v), par.highest_v)
     out.saturated = 0.0
@@ -63,8 +65,9 @@ def _step(state, par, p_cmd_pa, out):
     out.signal_v = volts
 
 
-@numba.njit(cache=True)
-def ppr_step(state, par, p_cmd_pa, p_meas_pa, supply_pa, out):
+@entry_point
+def ppr_step(state: FloatArray, par: FloatArray, p_cmd_pa: float, p_meas_pa: float,
+             supply_pa: float, out: FloatArray) -> None:
     """
     Turn a wanted absolute pressure [Pa] into the volts of the regulator.
 
@@ -101,7 +104,7 @@ class PprConfig:
     time_constant_s: float = 0.060
     dead_time_s: float = 0.030
 
-    def par(self):
+    def par(self) -> FloatArray:
         """Return the parameter array of ``ppr_step``."""
         slew = self.slew_v_per_s * self.period_s if self.slew_v_per_s > 0.0 else math.inf
         return values_of(PARAMETERS, {
@@ -112,7 +115,7 @@ class PprConfig:
 class PprLaw:
     """The law as an object: ``step`` for each tick, ``force`` for an imposed signal."""
 
-    def __init__(self, config=None):
+    def __init__(self, config: PprConfig | None = None) -> None:
         """Start at an unknown voltage, so that the first step is free of the slew limit."""
         self.config = config or PprConfig()
         self.par = self.config.par()
@@ -122,7 +125,7 @@ class PprLaw:
         self._state = cells(self.state, STATE)
         self._out = cells(self.out, OUTPUT)
 
-    def step(self, p_cmd_pa, dt_s=None):
+    def step(self, p_cmd_pa: float, dt_s: float | None = None) -> float:
         """
         Return the volts for a wanted absolute pressure [Pa].
 
@@ -133,7 +136,7 @@ class PprLaw:
         ppr_step(self.state, self.par, p_cmd_pa, math.nan, math.nan, self.out)
         return self._out.signal_v.item()
 
-    def force(self, volts):
+    def force(self, volts: float) -> None:
         """Note that ``volts`` were sent whatever the law says (venting)."""
         self._state.sent_v[...] = volts
         self._state.known[...] = 1.0
@@ -141,6 +144,6 @@ class PprLaw:
         self._out.signal_v[...] = volts
 
     @property
-    def saturated(self):
+    def saturated(self) -> int:
         """Return -1, 0 or +1: at the lower limit, free, at the upper limit."""
         return int(self._out.saturated.item())

@@ -23,9 +23,11 @@ certified safety function.
 """
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 import math
 import re
+from typing import TypeVar
 
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
 from pam_actuation.slow_rise import (
@@ -46,6 +48,8 @@ _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its 
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
 _GRACE_NS = 20_000_000
 _QUEUE = 256
+
+Fault = tuple[str, str]      # key in ``FAULTS``, sentence
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class SafetyLimits:
     supply_margin_pa: float = 20_000.0
 
     @property
-    def trip_gauge_pa(self):
+    def trip_gauge_pa(self) -> float:
         """Return the measured gauge pressure [Pa] above which the driver trips."""
         return 1.05 * self.max_pressure_gauge_pa + 10_000.0
 
@@ -91,18 +95,38 @@ class Decision:
     level: int
     message: str
     fault: str = ''
-    warnings: tuple = ()
+    warnings: tuple[str, ...] = ()
     duty: float | None = None
 
 
-def _without_figures(fault):
+def _without_figures(fault: Fault) -> tuple[str, str]:
     return fault[0], re.sub(r'[-\d.]', '', fault[1])
+
+
+Reading = tuple[int, float]                         # stamp [ns], pressure [Pa]
+Command = tuple[int, float, int | None, bool]       # and number, whether it is a duty
+Queued = TypeVar('Queued')
+
+
+@dataclass
+class _Pending:
+    """What arrived since the tick before, by topic; the oldest is lost where it is too much."""
+
+    command: deque[Command] = field(default_factory=lambda: deque(maxlen=_QUEUE))
+    pressure: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
+    supply: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
+
+
+def _taken(queue: deque[Queued]) -> Iterator[Queued]:
+    while queue:
+        yield queue.popleft()
 
 
 class SafetySupervisor:
     """Judge commands and measurements at each tick of the driver."""
 
-    def __init__(self, limits=None, needs_pressure=True, lag_s=math.inf, dead_time_s=0.0):
+    def __init__(self, limits: SafetyLimits | None = None, needs_pressure: bool = True,
+                 lag_s: float = math.inf, dead_time_s: float = 0.0) -> None:
         """
         Start in state waiting.
 
@@ -122,67 +146,69 @@ class SafetySupervisor:
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
         self.publishers = 1
         self.publisher_names = ''
-        self.sender_fault = None       # (key, sentence) of a second sender, as senders.py tells
-        self.command_stamp_ns = None
+        self.sender_fault: Fault | None = None      # of a second sender, as senders.py tells
+        self.command_stamp_ns: int | None = None
         self.command_pa = math.nan
-        self.command_duty = None       # of a pair of valves, where it is commanded itself
+        # of a pair of valves, where it is commanded itself
+        self.command_duty: float | None = None
         self.commands_received = 0
         self.commands_ignored = 0
         self.commands_clamped = 0
         self.vents = 0
-        self._pending = {name: deque(maxlen=_QUEUE) for name in ('command', 'pressure', 'supply')}
-        self._latched = None
+        self._pending = _Pending()
+        self._latched: Fault | None = None
         self._device_problem = ''
         self._seen_command = False
         self._seen_pressure = False
         self._command_problem = ''
-        self._warnings = {}
-        self._fault = ('no_command', '')
-        self._standing = None
+        self._warnings: dict[str, tuple[str, int]] = {}
+        self._fault: Fault | None = ('no_command', '')
+        self._standing: Fault | None = None
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
                               lag_s=lag_s, dead_time_s=dead_time_s)
-        self._now_ns = self._first_tick_ns = None
+        self._now_ns: int | None = None
+        self._first_tick_ns = 0
         self._grace_until_ns = 0
         self._grace_ns = 0
 
-    def on_command(self, stamp_ns, pressure_pa, sequence=None):
+    def on_command(self, stamp_ns: int, pressure_pa: float, sequence: int | None = None) -> None:
         """Queue a command for the next tick; ``sequence`` is its publisher's number, if known."""
-        self._pending['command'].append((stamp_ns, pressure_pa, sequence, False))
+        self._pending.command.append((stamp_ns, pressure_pa, sequence, False))
 
-    def on_duty(self, stamp_ns, duty):
+    def on_duty(self, stamp_ns: int, duty: float) -> None:
         """Queue a commanded opening of a pair of valves: -1 vents, 0 shuts, 1 fills."""
-        self._pending['command'].append((stamp_ns, duty, None, True))
+        self._pending.command.append((stamp_ns, duty, None, True))
 
-    def on_pressure(self, stamp_ns, pressure_pa):
+    def on_pressure(self, stamp_ns: int, pressure_pa: float) -> None:
         """Queue a measured absolute pressure [Pa] for the next tick."""
-        self._pending['pressure'].append((stamp_ns, pressure_pa))
+        self._pending.pressure.append((stamp_ns, pressure_pa))
 
-    def on_supply(self, stamp_ns, pressure_pa):
+    def on_supply(self, stamp_ns: int, pressure_pa: float) -> None:
         """Queue a measured absolute supply pressure [Pa] for the next tick."""
-        self._pending['supply'].append((stamp_ns, pressure_pa))
+        self._pending.supply.append((stamp_ns, pressure_pa))
 
-    def flow(self, change_pa):
+    def flow(self, change_pa: float) -> None:
         """Tell the pressure change [Pa] the valve should have made in the last tick."""
         self.frozen.flow(change_pa)
 
-    def emergency_stop(self, why='requested'):
+    def emergency_stop(self, why: str = 'requested') -> None:
         """Latch the emergency stop: vent at the next tick and until ``reset``."""
         if self._latched is None:
             self._latch('emergency_stop', f'emergency stop: {why}')
 
-    def vented_elsewhere(self, now_ns):
+    def vented_elsewhere(self, now_ns: int) -> None:
         """Tell that another node sent the signal that vents: the pressure rises slowly again."""
         self._rise.begin()
         self._warn('watchdog_vented', 'the watchdog vented, since this driver fell silent for a '
                    'moment (busy machine?)', now_ns)
 
-    def on_device(self, problem):
+    def on_device(self, problem: str) -> None:
         """Tell how the device took the last signal: a problem latches, '' is all right."""
         self._device_problem = problem
         if problem and self._latched is None:
             self._latch('device_refuses', f'the valve did not take its signal: {problem}')
 
-    def reset(self):
+    def reset(self) -> tuple[bool, str]:
         """
         End a latched stop; return (done, sentence).
 
@@ -204,14 +230,14 @@ class SafetySupervisor:
         self.command_stamp_ns = None
         self.command_pa = math.nan
         self.command_duty = None
-        self._pending['command'].clear()
+        self._pending.command.clear()
         return True, f'Reset; it was: {text}. Waiting for a new pressure_command.'
 
-    def take_over(self, former):
+    def take_over(self, former: 'SafetySupervisor') -> None:
         """Start with what is latched in the supervisor of the driver as it was before."""
         self._latched = former._latched
 
-    def tick(self, now_ns):
+    def tick(self, now_ns: int) -> Decision:
         """Take the queued messages and return the Decision for ``now_ns``."""
         fault = self._clock(now_ns)
         self._drain(now_ns)
@@ -223,12 +249,12 @@ class SafetySupervisor:
             return self._vent(self._latched_if_raw(fault))
         self._fault = None
         if self.command_duty is not None:
-            return self._follow_duty(now_ns)
+            return self._follow_duty(self.command_duty, now_ns)
         return self._follow(now_ns)
 
     # -- inputs ---------------------------------------------------------------------
 
-    def _clock(self, now_ns):
+    def _clock(self, now_ns: int) -> Fault | None:
         last, self._now_ns = self._now_ns, now_ns
         self._dt_s = 0.0 if last is None else max(now_ns - last, 0) / _NS
         if last is None:
@@ -250,41 +276,37 @@ class SafetySupervisor:
                               f'{gap_ns * 1e-6:.0f} ms, waiting for new messages')
         return self._standing
 
-    def _forget(self):
-        for queue in self._pending.values():
-            queue.clear()
+    def _forget(self) -> None:
+        self._pending = _Pending()
         for part in (self.pressure, self.supply, self.frozen, self.order):
             part.forget()
         self.command_stamp_ns = None
         self.command_pa = math.nan
 
-    def _drain(self, now_ns):
-        for stamp_ns, value in self._take('pressure'):
+    def _drain(self, now_ns: int) -> None:
+        for stamp_ns, value in _taken(self._pending.pressure):
             if self.pressure.offer(stamp_ns, value, now_ns):
                 self._seen_pressure = True
                 self.frozen.reading(stamp_ns, value)
                 self._check_over_pressure(value)
-        for stamp_ns, value in self._take('supply'):
+        for stamp_ns, value in _taken(self._pending.supply):
             self.supply.offer(stamp_ns, value, now_ns)
-        for stamp_ns, value, sequence, is_duty in self._take('command'):
+        for stamp_ns, value, sequence, is_duty in _taken(self._pending.command):
             self._take_command(stamp_ns, value, sequence, is_duty, now_ns)
 
-    def _take(self, name):
-        queue = self._pending[name]
-        while queue:
-            yield queue.popleft()
-
-    def _check_over_pressure(self, measured_pa):
+    def _check_over_pressure(self, measured_pa: float) -> None:
         trip = self.limits.trip_gauge_pa
         if measured_pa - P_ATM_PA > trip and self._latched is None:
             self._latch('over_pressure', (
                 f'over-pressure trip: {gauge_kpa(measured_pa):.0f} kPa gauge measured, '
                 f'trip at {trip * 1e-3:.0f} kPa'))
 
-    def _latch(self, key, text):
-        self._latched = (key, text + '; call the service reset to go on')
+    def _latch(self, key: str, text: str) -> Fault:
+        latched = self._latched = (key, text + '; call the service reset to go on')
+        return latched
 
-    def _take_command(self, stamp_ns, value, sequence, is_duty, now_ns):
+    def _take_command(self, stamp_ns: int, value: float, sequence: int | None, is_duty: bool,
+                      now_ns: int) -> None:
         lim = self.limits
         self.commands_received += 1
         problem = stamp_problem(stamp_ns, now_ns, lim.command_timeout_s, lim.stamp_ahead_s)
@@ -321,7 +343,7 @@ class SafetySupervisor:
 
     # -- faults ---------------------------------------------------------------------
 
-    def _standing_fault(self, now_ns):
+    def _standing_fault(self, now_ns: int) -> Fault | None:
         grace_s = self._grace_ns / _NS if now_ns <= self._grace_until_ns else 0.0
         fault = (self.sender_fault or self._pressure_fault(now_ns, grace_s)
                  or self._command_fault(now_ns, grace_s))
@@ -334,7 +356,7 @@ class SafetySupervisor:
             self._standing = None
         return fault
 
-    def _pressure_fault(self, now_ns, grace_s):
+    def _pressure_fault(self, now_ns: int, grace_s: float) -> Fault | None:
         lim = self.limits
         channel = self.pressure
         if not self._seen_pressure:
@@ -362,7 +384,7 @@ class SafetySupervisor:
             self._warn('pressure_frozen_ppr', text, now_ns)
         return None
 
-    def _command_fault(self, now_ns, grace_s):
+    def _command_fault(self, now_ns: int, grace_s: float) -> Fault | None:
         lim = self.limits
         if self.order.mixed(now_ns):
             return 'two_publishers', ('two publishers send pressure_command (stamps or sequence '
@@ -381,7 +403,7 @@ class SafetySupervisor:
 
     # -- outcome --------------------------------------------------------------------
 
-    def _vent(self, fault):
+    def _vent(self, fault: Fault) -> Decision:
         if self._fault is None:
             self.vents += 1
         # The first text stays while only its figures change: the reason must not flicker.
@@ -395,17 +417,16 @@ class SafetySupervisor:
             return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)
         return Decision(VENTED, None, LEVEL_ERROR, 'vented because ' + text, key)
 
-    def _latched_if_raw(self, fault):
+    def _latched_if_raw(self, fault: Fault) -> Fault:
         # What an opening does depends on all that went before: it is not taken up again.
         if self._latched is None and self._fault is None and (
                 self.command_duty is not None and self.command_duty > -1.0):
-            self._latch('valve_command_interrupted', (
+            return self._latch('valve_command_interrupted', (
                 f'{fault[1]}; an interrupted valve command is not taken up again'))
-            return self._latched
         return fault
 
-    def _follow_duty(self, now_ns):
-        duty, gauge_pa = self.command_duty, self.pressure.pressure_pa - P_ATM_PA
+    def _follow_duty(self, duty: float, now_ns: int) -> Decision:
+        gauge_pa = self.pressure.pressure_pa - P_ATM_PA
         self._rise.hold()
         if duty > 0.0 and gauge_pa >= self.limits.max_pressure_gauge_pa:
             duty = 0.0
@@ -414,14 +435,15 @@ class SafetySupervisor:
                 f'limit {self.limits.max_pressure_gauge_pa * 1e-3:.0f} kPa'), now_ns)
         return self._following('following the valve command', now_ns, duty=duty)
 
-    def _follow(self, now_ns):
+    def _follow(self, now_ns: int) -> Decision:
         lim = self.limits
         target = min(max(self.command_pa, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
         target = self._rise.limited(target, self._dt_s, self.pressure.pressure_pa)
         self._watch_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)
 
-    def _following(self, what, now_ns, target=None, duty=None):
+    def _following(self, what: str, now_ns: int, target: float | None = None,
+                   duty: float | None = None) -> Decision:
         lim = self.limits
         if self.publishers > 1:
             self._warn('second_publisher_seen', (
@@ -441,7 +463,7 @@ class SafetySupervisor:
         message = '; '.join(texts) if texts else what
         return Decision(OK, target, level, message, '', tuple(self._warnings), duty)
 
-    def _watch_supply(self, target_pa, now_ns):
+    def _watch_supply(self, target_pa: float, now_ns: int) -> None:
         channel = self.supply
         if channel.received == 0:
             return
@@ -454,13 +476,13 @@ class SafetySupervisor:
                 f'supply of {gauge_kpa(channel.pressure_pa):.0f} kPa gauge is too low for the '
                 f'command of {gauge_kpa(target_pa):.0f} kPa'), now_ns)
 
-    def supply_pa(self, now_ns):
+    def supply_pa(self, now_ns: int) -> float:
         """Return the measured supply pressure [Pa], NaN where none is valid."""
         if self.supply.age_s(now_ns) > self.limits.supply_timeout_s:
             return math.nan
         return self.supply.pressure_pa
 
-    def _warn(self, key, text, now_ns):
+    def _warn(self, key: str, text: str, now_ns: int) -> None:
         # Keep the first text while the warning lasts; only its time is renewed.
         if key in self._warnings and now_ns - self._warnings[key][1] <= _WARNING_HOLD_NS:
             text = self._warnings[key][0]

@@ -20,7 +20,9 @@ node that was killed stands for up to 20 s more. No clock and no ROS; a writer i
 can be a key of a dictionary, None where it is not known, which is not judged.
 """
 
-from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of
+from collections.abc import Callable, Hashable
+
+from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of, ValveSignal
 
 CLEAR_S = 1.0           # without a second sender, until the fault ends
 UNNAMED_S = 0.2         # how long the graph may take to tell the name of a new node
@@ -29,7 +31,7 @@ _REMEMBERED_NS = 60 * _NS       # longer than a dead node stays on the graph
 _MOST_UNNAMED = 32
 
 
-def told(names):
+def told(names: list[str]) -> str:
     """Return names as words: ``/a and /b``, ``two nodes named /a``; '' has none."""
     words = []
     for name in sorted(set(names)):
@@ -43,7 +45,7 @@ def told(names):
     return ' and '.join(words)
 
 
-def is_safe(message):
+def is_safe(message: ValveSignal) -> bool:
     """Tell whether a ``ValveSignal`` is the one that vents the valve it names."""
     valve = valve_of(message.names)
     efforts = dict(zip(message.names, message.efforts))
@@ -65,16 +67,18 @@ class Senders:
 
     """
 
-    def __init__(self, clear_s=CLEAR_S):
+    def __init__(self, clear_s: float = CLEAR_S) -> None:
         self._clear_ns = round(clear_s * _NS)
         self._forget()
 
-    def _forget(self):
-        self._heard_ns = {}         # writer to the time of its newest message
-        self._rival_ns = {}         # writer to the time when it was heard in turn with another
-        self._last = None
+    def _forget(self) -> None:
+        # writer to the time of its newest message
+        self._heard_ns: dict[Hashable, int] = {}
+        # writer to the time when it was heard in turn with another
+        self._rival_ns: dict[Hashable, int] = {}
+        self._last: Hashable = None
 
-    def heard(self, writer, now_ns):
+    def heard(self, writer: Hashable, now_ns: int) -> None:
         """Note a message that was taken at a time."""
         if writer is None:
             return
@@ -90,19 +94,19 @@ class Senders:
             self._last = writer
         self._heard_ns[writer] = now_ns
 
-    def _recent(self, time_ns, now_ns):
+    def _recent(self, time_ns: int | None, now_ns: int) -> bool:
         return time_ns is not None and 0 <= now_ns - time_ns <= self._clear_ns
 
-    def replaced(self, writer):
+    def replaced(self, writer: Hashable) -> bool:
         """Tell whether a writer has been heard before another one, and not since."""
         return writer in self._heard_ns and writer != self._last
 
-    def active(self, now_ns):
+    def active(self, now_ns: int) -> tuple[Hashable, ...]:
         """Return the writers that were heard lately."""
         return tuple(one for one, time_ns in self._heard_ns.items()
                      if self._recent(time_ns, now_ns))
 
-    def rivals(self, now_ns):
+    def rivals(self, now_ns: int) -> tuple[Hashable, ...]:
         """Return the writers that send at the same time, () for a single one."""
         return tuple(one for one, time_ns in self._rival_ns.items()
                      if self._recent(time_ns, now_ns))
@@ -123,12 +127,12 @@ class SignalSenders:
 
     """
 
-    def __init__(self, own, watchdog, clear_s=CLEAR_S):
+    def __init__(self, own: Hashable, watchdog: str, clear_s: float = CLEAR_S) -> None:
         self.own, self._watchdog = own, watchdog
         self._senders = Senders(clear_s)
-        self._first_ns = {}         # of writers without a name
+        self._first_ns: dict[Hashable, int] = {}          # of writers without a name
 
-    def heard(self, writer, name, safe, now_ns):
+    def heard(self, writer: Hashable, name: str, safe: bool, now_ns: int) -> bool:
         """
         Note a message; return whether it is a second sender's.
 
@@ -148,7 +152,7 @@ class SignalSenders:
         self._senders.heard(writer, now_ns)
         return True
 
-    def foreign(self, now_ns):
+    def foreign(self, now_ns: int) -> tuple[Hashable, ...]:
         """Return the writers beside driver and watchdog that were heard lately."""
         return self._senders.active(now_ns)
 
@@ -171,12 +175,13 @@ class DriverSenders:
     FOLLOWED = {'pressure_command': 'two_publishers', 'valve_command': 'two_publishers',
                 'pressure': 'two_sensors'}
 
-    def __init__(self, own, watchdog, name_of, own_name):
+    def __init__(self, own: Hashable, watchdog: str, name_of: Callable[[str, Hashable], str],
+                 own_name: str) -> None:
         self.signals = SignalSenders(own, watchdog)
         self.topics = {topic: Senders() for topic in self.FOLLOWED}
         self._name_of, self._own_name = name_of, own_name
 
-    def fault(self, now_ns):
+    def fault(self, now_ns: int) -> tuple[str, str] | None:
         """Return (key in ``FAULTS``, sentence), None while each topic has one sender."""
         foreign = self.signals.foreign(now_ns)
         if foreign:
@@ -193,7 +198,7 @@ class DriverSenders:
         return None
 
 
-def two_send(topic, names):
+def two_send(topic: str, names: list[str]) -> str:
     """Return the sentence on several nodes that send on one topic."""
     count = 'two' if len(names) == 2 else str(len(names))
     return f'{count} publishers send {topic}: {told(names)}, stop one of them'

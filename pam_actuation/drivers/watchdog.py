@@ -20,6 +20,7 @@ this one. It speaks only while the driver is silent or a second sender drives th
 says nothing but the safe signal.
 """
 
+from collections.abc import Callable, Hashable
 import os
 
 from pam_actuation.drivers.senders import CLEAR_S, is_safe, told, UNNAMED_S
@@ -36,12 +37,12 @@ _LATE_NS = 20_000_000           # between two of its own ticks: it was kept wait
 class _Other:
     """A writer that is not the driver's."""
 
-    def __init__(self, now_ns):
+    def __init__(self, now_ns: int) -> None:
         self.first_ns = self.last_ns = now_ns
         self.name = ''
         self.spoke = False          # with a name, or with an opening
 
-    def counts(self, now_ns):
+    def counts(self, now_ns: int) -> bool:
         """Tell whether it was heard lately, and is not just a node whose name is on its way."""
         lately = 0 <= now_ns - self.last_ns <= CLEAR_S * _NS
         return lately and (self.spoke or now_ns - self.first_ns >= UNNAMED_S * _NS)
@@ -79,24 +80,27 @@ class SignalWatchdog:
 
     """
 
-    def __init__(self, valve_type, timeout_s, name='', load=lambda: '', driver=''):
+    def __init__(self, valve_type: str, timeout_s: float, name: str = '',
+                 load: Callable[[], str] = lambda: '', driver: str = '') -> None:
         self.state = WAITING
         self.vents = 0
         self.valve_type = valve_type
         self._timeout_ns = round(timeout_s * 1e9)
         self._name, self._load, self._expected = name, load, driver
-        self._heard_ns = None
-        self._last = None
-        self._own_stamps = set()
-        self._driver, self._driver_name = None, ''
-        self._others = {}           # writer to _Other
-        self._former = set()        # writers of drivers that were replaced
-        self._ticked_ns = None
+        self._heard_ns = 0          # the newest signal of the driver
+        self._last: ValveSignal | None = None
+        self._own_stamps: set[int] = set()
+        self._driver: Hashable = None
+        self._driver_name = ''
+        self._others: dict[Hashable, _Other] = {}          # by writer
+        self._former: set[Hashable] = set()     # writers of drivers that were replaced
+        self._ticked_ns: int | None = None
         self._late_ns = 0, 0        # longest time between two ticks lately, and when it ended
         self._why = ''
         self._silent_ms = 0
 
-    def on_signal(self, message, now_ns, writer=None, name=''):
+    def on_signal(self, message: ValveSignal, now_ns: int, writer: Hashable = None,
+                  name: str = '') -> bool:
         """
         Take a ValveSignal that was on the topic at a time; its own do not count.
 
@@ -120,7 +124,7 @@ class SignalWatchdog:
         self.valve_type = valve_of(message.names) or self.valve_type
         return False
 
-    def _is_driver(self, writer, name, now_ns):
+    def _is_driver(self, writer: Hashable, name: str, now_ns: int) -> bool:
         """Tell whether a message is the driver's; let a writer take its place if it may."""
         if writer is None or writer == self._driver:
             self._driver_name = name or self._driver_name
@@ -143,14 +147,14 @@ class SignalWatchdog:
             return True
         return False
 
-    def tick(self, now_ns):
+    def tick(self, now_ns: int) -> ValveSignal | None:
         """Return the safe ValveSignal to send, None while there is nothing to say."""
         self._note_delay(now_ns)
         foreign = [one.name for one in self._others.values() if one.counts(now_ns)]
         if foreign:
             self._why = f'valve_signal is sent by {told([self._driver_name, *foreign])}'
             return self._vent(now_ns, CONTESTED)
-        if self._heard_ns is None:
+        if self._last is None:
             return None
         silent_ns = now_ns - self._heard_ns
         if silent_ns <= self._timeout_ns:
@@ -164,7 +168,7 @@ class SignalWatchdog:
                          f'or the machine too busy{self._known_of_load(now_ns)}')
         return self._vent(now_ns, VENTS)
 
-    def _vent(self, now_ns, state):
+    def _vent(self, now_ns: int, state: str) -> ValveSignal:
         if self.state not in (VENTS, CONTESTED):
             self.vents += 1
         silent_ns = now_ns - self._heard_ns
@@ -174,13 +178,13 @@ class SignalWatchdog:
         self.state = state
         return self.safe_signal(now_ns)
 
-    def safe_signal(self, now_ns):
+    def safe_signal(self, now_ns: int) -> ValveSignal:
         """Return the ValveSignal that vents, to be sent now."""
         self._own_stamps.add(now_ns)
         return ValveSignal(now_ns, VALVE_NAMES[self.valve_type], SAFE_EFFORTS[self.valve_type])
 
     @property
-    def text(self):
+    def text(self) -> str:
         """Return the state as a sentence, with what is known of the reason."""
         if self.state == CONTESTED:
             return f'{CONTESTED}: {self._why}, stop all but the driver'
@@ -188,7 +192,7 @@ class SignalWatchdog:
             return self.state
         return f'{VENTS} for {self._silent_ms} ms {self._why}'
 
-    def _note_delay(self, now_ns):
+    def _note_delay(self, now_ns: int) -> None:
         before_ns, self._ticked_ns = self._ticked_ns, now_ns
         longest_ns, since_ns = self._late_ns
         if not 0 <= now_ns - since_ns <= _NS:
@@ -198,20 +202,20 @@ class SignalWatchdog:
         elif not longest_ns:
             self._late_ns = 0, now_ns
 
-    def _known_of_load(self, now_ns):
+    def _known_of_load(self, now_ns: int) -> str:
         known = [self._load()]
         if self._late_ns[0]:
             known.append(f'this watchdog itself waited {self._late_ns[0] * 1e-6:.0f} ms for the '
                          'processor')
-        known = ', '.join(filter(None, known))
-        return known and f' ({known})'
+        words = ', '.join(filter(None, known))
+        return words and f' ({words})'
 
-    def _ended_in_order(self):
+    def _ended_in_order(self) -> bool:
         """Tell whether the last signal heard is the safe one."""
-        return is_safe(self._last)
+        return self._last is not None and is_safe(self._last)
 
 
-def machine_load():
+def machine_load() -> str:
     """Return what the system tells of its load, as words."""
     try:
         return f'load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores'
