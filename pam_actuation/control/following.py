@@ -68,6 +68,34 @@ class CommandFollowing:
         """Tell whether the driver ever told what it follows."""
         return self._followed is not None
 
+    @property
+    def followed_pa(self):
+        """Return the pressure [absolute Pa] that the driver told last, NaN before."""
+        return self._followed.pressure_pa if self.told else math.nan
+
+    def silent_ns(self, now_ns):
+        """Return for how long [ns] a driver that once told has told nothing; 0 before."""
+        return now_ns - self._followed.stamp_ns if self.told else 0
+
+    def vents(self, now_ns):
+        """Return whether the driver tells that it vents although pressure is commanded."""
+        # A slow rise is above the atmosphere from its first tick on.
+        if not self.told or self.followed_pa > P_ATM_PA + 1.0 or (
+                self.silent_ns(now_ns) > MAX_AGE_NS):
+            return False
+        sent = self._sent_before(self._followed.stamp_ns)
+        return bool(sent) and min(sent) > P_ATM_PA + TOLERANCE_PA
+
+    def _sent_before(self, stamp_ns):
+        """Return the commands [Pa] of which one was followed at a time, the newest first."""
+        oldest_ns, commands_pa = stamp_ns - ON_THE_WAY_NS, []
+        for time_ns, command_pa in reversed(self._sent):
+            if time_ns < oldest_ns:
+                break
+            if time_ns <= stamp_ns:
+                commands_pa.append(command_pa)
+        return commands_pa
+
     def sent(self, now_ns, command_pa):
         """Take note of a command [absolute Pa] sent now."""
         oldest_ns = now_ns - MAX_AGE_NS - ON_THE_WAY_NS
@@ -79,7 +107,7 @@ class CommandFollowing:
             self._first_ns = now_ns
         dt_s = (now_ns - self._sent[-1][0]) * 1e-9 if self._sent else 0.0
         self._sent.append((now_ns, command_pa))
-        arrives_pa = self._followed.pressure_pa if self.told else command_pa
+        arrives_pa = self.followed_pa if self.told else command_pa
         if not math.isfinite(self._expected_pa):
             self._expected_pa = arrives_pa
         self._expected_pa += dt_s / (_FILTER_S + dt_s) * (arrives_pa - self._expected_pa)
@@ -109,12 +137,10 @@ class CommandFollowing:
         age_ns = now_ns - self._followed.stamp_ns
         if not -MAX_AHEAD_NS <= age_ns <= MAX_AGE_NS:
             return UNKNOWN
-        stamp_ns = self._followed.stamp_ns
-        sent = [command_pa for time_ns, command_pa in self._sent
-                if stamp_ns - ON_THE_WAY_NS <= time_ns <= stamp_ns]
+        sent = self._sent_before(self._followed.stamp_ns)
         if not sent:
             return FOLLOWS
-        followed_pa = self._followed.pressure_pa
+        followed_pa = self.followed_pa
         if followed_pa < max(min(sent), P_ATM_PA) - TOLERANCE_PA:
             return LESS
         return MORE if followed_pa > max(max(sent), P_ATM_PA) + TOLERANCE_PA else FOLLOWS

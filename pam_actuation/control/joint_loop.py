@@ -18,8 +18,13 @@ The controller of a joint on a clock: messages in, two pressure commands and sta
 No ROS inside. The faults of its inputs are handled as by ``loop.ControllerLoop``, with the
 joint angle in place of the contraction; while it does not run, both muscles are vented. While
 a torque is followed the joint may well be blocked: a frozen angle is looked for only otherwise.
-A missing force of either muscle is not used, nor is a pressure that was never measured. Where
-one muscle is not under air although it should be, or its pressure is lost, both are vented.
+A missing force of either muscle is not used, nor is a pressure that was never measured.
+
+Neither muscle is left alone under air. Where the driver of one vents against its commands or
+falls silent, where its pressure is lost, or where it stays empty, both are vented until it has
+shown that it follows again (``slack_muscle``). While a law runs each is asked for 5 kPa at
+least, so that a driver that vents is always seen. After every vent the commands rise slowly.
+
 A wanted co-contraction counts until the next one; one that is not finite is ignored, one beyond
 the limits stops there.
 
@@ -45,12 +50,16 @@ from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.slack_muscle import SlackMuscle
 from pam_actuation.messages import ControllerState, Pressure
+from pam_actuation.slow_rise import SlowRise
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
+# Of a muscle while a law runs: a driver that vents shows by not following it.
+_LEAST_PA = P_ATM_PA + 5_000.0
+_MARGIN_RAD = 0.05           # of an encoder's zero and noise, where the joint lies on a stop
 _STOP_RAD = 0.01             # this near an end of its range the joint may lie on a stop
 _INPUT_NAMES = (
     'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced', 'joint_state_stamp_sec',
@@ -71,7 +80,7 @@ class JointControllerLoop:
     controller : JointController
         As ``load_controller`` gives it for a joint.
     joint : pam_sim.joint.JointRig
-        Measurements outside its range are implausible: the encoder is wrong, not the joint.
+        Measurements well outside its range are implausible: the encoder is wrong, not the joint.
         Wishes outside are refused. Its muscles turn wanted torques into pressures.
     name : str
         Of the joint, by which it is found in messages to several joints.
@@ -100,10 +109,14 @@ class JointControllerLoop:
         self.ticks = 0
         self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
         self._range = lower, upper
-        self._frozen = FrozenMeasurement(
-            lower + _STOP_RAD, upper - _STOP_RAD, JOINT_SWING_PA)
-        self._slack = SlackMuscle(), SlackMuscle()      # flexor, extensor
-        self._following = CommandFollowing(), CommandFollowing()
+        self._plausible = lower - _MARGIN_RAD, upper + _MARGIN_RAD
+        between = lower + _STOP_RAD, upper - _STOP_RAD
+        self._frozen = FrozenMeasurement(*between, JOINT_SWING_PA)
+        # Where a pressure reading stands still too, by the pressure that should be there.
+        self._frozen_both = FrozenMeasurement(*between, JOINT_SWING_PA)
+        self._following = CommandFollowing(), CommandFollowing()        # flexor, extensor
+        self._slack = tuple(SlackMuscle(following) for following in self._following)
+        self._rises = SlowRise(active=False), SlowRise(active=False)
         self._name = name
         self._trajectory = None     # that arrived since the last tick
         self._angle = None
@@ -127,7 +140,7 @@ class JointControllerLoop:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
-        for monitor in (self._frozen, *self._slack, *self._following):
+        for monitor in (self._frozen, self._frozen_both, *self._slack, *self._following):
             monitor.forget()
         self.follows_torque = False
         self._trajectory = self._angle = None
@@ -217,7 +230,8 @@ class JointControllerLoop:
         changed = self._choose_law(now_ns)
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
-        reason = self._reason(now_ns)
+        measured_pa = self._fresh_pressures_pa(now_ns)
+        reason = self._reason(now_ns, measured_pa)
         self.reason = reason_text(reason, self.two_sensors)
         running = reason in codes.RUNNING
         if stalled or not running:
@@ -226,12 +240,15 @@ class JointControllerLoop:
             self._commands_pa = None
         may_learn = bool(learning and reason == codes.OK and not self.follows_torque
                          and not controller.freeze_learning)
-        inputs, stamp_ns, commands_pa = (math.nan,) * 10, -1, (P_ATM_PA, P_ATM_PA)
-        held_back = self._held_back(now_ns)
+        inputs, stamp_ns = (math.nan,) * 10, -1
+        held_back = self._held_back(now_ns, measured_pa)
         if running:
             stamp_ns = self._angle.stamp_ns
-            inputs = self._inputs(now_ns, stamp_ns, changed)
-            commands_pa = self._commands_pa = self._run(inputs, may_learn, held_back)
+            inputs = self._inputs(now_ns, stamp_ns, measured_pa, changed)
+            commands_pa = self._commands_pa = self._risen(
+                self._run(inputs, may_learn, held_back))
+        else:
+            commands_pa = self._vented(now_ns, reason)
         for following, command_pa in zip(self._following, commands_pa):
             following.sent(now_ns, command_pa)
         self._used_ns = stamp_ns if running else None
@@ -257,15 +274,14 @@ class JointControllerLoop:
             self.follows_torque = True
         return self.follows_torque != before
 
-    def _reason(self, now_ns):
+    def _reason(self, now_ns, pressures_pa):
         """Return the code for the inputs of this tick, one of ``codes.RUNNING`` if usable."""
         if self.two_sensors:
             return codes.TWO_SENSORS
         angle = math.nan if self._angle is None else self._angle.angle_rad
-        reason = measurement_reason(self._angle, angle, self._range, _REASONS, now_ns)
+        reason = measurement_reason(self._angle, angle, self._plausible, _REASONS, now_ns)
         if reason != codes.OK:
             return reason
-        pressures_pa = self._fresh_pressures_pa(now_ns)
         wanted_pa = self._commands_pa or (P_ATM_PA, P_ATM_PA)
         # Into a list first: both are to be asked, also where the first one is slack.
         slack = [muscle.judge(now_ns, *pair) for muscle, *pair in zip(
@@ -273,26 +289,58 @@ class JointControllerLoop:
         if any(slack):
             return codes.MUSCLE_SLACK
         if self.follows_torque:
-            self._frozen.pause()
-            self._frozen.judge(now_ns, self._angle.stamp_ns, angle, math.nan)
+            for frozen in (self._frozen, self._frozen_both):
+                frozen.pause()
+                frozen.judge(now_ns, self._angle.stamp_ns, angle, math.nan)
             return codes.OK if self.efforts.fresh(now_ns) else codes.EFFORT_LOST
-        flexor_pa, extensor_pa = pressures_pa
-        if self._frozen.judge(now_ns, self._angle.stamp_ns, angle, flexor_pa - extensor_pa):
+        if self._stands_still(now_ns, self._angle.stamp_ns, angle, pressures_pa):
             return codes.ANGLE_FROZEN
         return REFERENCE_REASONS[self.references.state(now_ns)]
+
+    def _stands_still(self, now_ns, stamp_ns, angle, pressures_pa):
+        """Return whether the angle stands still although the pressures changed."""
+        expected_pa = [following.expected_pa(now_ns, pressure_pa) for following, pressure_pa in
+                       zip(self._following, pressures_pa)]
+        both_pa = math.nan
+        if all(map(math.isnan, expected_pa)):
+            self._frozen_both.pause()
+        else:
+            flexor_pa, extensor_pa = (
+                measured if math.isnan(expected) else expected
+                for expected, measured in zip(expected_pa, pressures_pa))
+            both_pa = flexor_pa - extensor_pa
+        # Both are to be asked, whatever the first one says.
+        frozen = self._frozen.judge(
+            now_ns, stamp_ns, angle, pressures_pa[FLEXOR] - pressures_pa[EXTENSOR])
+        return self._frozen_both.judge(now_ns, stamp_ns, angle, both_pa) or frozen
 
     def _fresh_pressures_pa(self, now_ns):
         """Return both measured pressures [Pa], NaN for one that is not fresh."""
         return tuple(message.pressure_pa if fresh(message, now_ns) else math.nan
                      for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
 
-    def _held_back(self, now_ns):
+    def _held_back(self, now_ns, pressures_pa):
         """Return ``UNKNOWN`` where a driver does not follow: one law moves both muscles."""
-        pressures_pa = self._fresh_pressures_pa(now_ns)
         # A list: both are to be asked.
         found = [following.judge(now_ns, pressure_pa) for following, pressure_pa in zip(
             self._following, pressures_pa)]
+        if any(rise.limiting for rise in self._rises):
+            return UNKNOWN
         return FOLLOWS if found == [FOLLOWS, FOLLOWS] else UNKNOWN
+
+    def _risen(self, commands_pa):
+        """Return the commands [Pa] that both muscles may have now."""
+        return tuple(
+            rise.limited(max(command_pa, _LEAST_PA), 1.0 / self.rate_hz)
+            for rise, command_pa in zip(self._rises, commands_pa))
+
+    def _vented(self, now_ns, reason):
+        """Return the commands [Pa] of a tick in which no law runs."""
+        for rise in self._rises:
+            rise.begin()
+        if reason != codes.MUSCLE_SLACK:
+            return P_ATM_PA, P_ATM_PA
+        return tuple(muscle.command_pa(now_ns) for muscle in self._slack)
 
     def _run(self, inputs, may_learn, held_back):
         """Return the commands [Pa] of the law that counts; the other one stands aside."""
@@ -309,7 +357,7 @@ class JointControllerLoop:
         controller.stand_aside(commands_pa)
         return commands_pa
 
-    def _inputs(self, now_ns, measured_ns, changed):
+    def _inputs(self, now_ns, measured_ns, pressures_pa, changed):
         """Return angle, references, time passed, pressures and forces as one tuple of floats."""
         reference = lead = (math.nan, math.nan)
         if not self.follows_torque:
@@ -319,9 +367,8 @@ class JointControllerLoop:
         elapsed_s = math.nan
         if self._used_ns is not None:
             elapsed_s = (measured_ns - self._used_ns) * 1e-9
-        pressures = self._fresh_pressures_pa(now_ns)
         if changed and self._commands_pa is not None:
-            pressures = self._commands_pa       # a law goes on from the commands of the other
+            pressures_pa = self._commands_pa    # a law goes on from the commands of the other
         forces = (self._forces[side].force_n if fresh(self._forces[side], now_ns)
                   else math.nan for side in (FLEXOR, EXTENSOR))
-        return (self._angle.angle_rad, *reference, *lead, elapsed_s, *pressures, *forces)
+        return (self._angle.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)

@@ -15,8 +15,8 @@
 """
 Notices that one muscle of a joint is not under air although the controller wants it to be.
 
-Its driver may have vented it (emergency stop, lost sensor, device refusing) or its supply is
-gone. The other muscle alone would then pull the limb to its stop.
+Its driver may have vented it (emergency stop, lost sensor, device refusing) or has fallen silent,
+or its supply is gone. The other muscle alone would then pull the limb to its stop.
 """
 
 import math
@@ -28,24 +28,36 @@ WANTED_PA = P_ATM_PA + 100_000.0    # commanded at least
 SLACK_PA = P_ATM_PA + 30_000.0      # measured at most
 AFTER_NS = 1_000_000_000            # a slow valve fills a large muscle beyond that in this time
 LOST_NS = 300_000_000               # its driver vents after 0.1 s
+VENTS_NS = 100_000_000              # beyond what a command needs to its driver
+PROOF_PA = P_ATM_PA + 50_000.0      # turns a limb by a few degrees
 
 
 class SlackMuscle:
     """
-    Compares the command of one muscle with its measured pressure.
+    Compares the command of one muscle with what its driver tells and with its pressure.
 
-    ``slack`` stays for 2 s at least: both muscles are vented meanwhile, and filling is then tried
-    again.
+    ``slack`` stays for 2 s at least, with both muscles vented. Then the slack muscle alone is
+    asked for a little pressure, until its driver follows and the pressure is there: a latched
+    stop may last, and the other muscle stays vented meanwhile.
+
+    Parameters
+    ----------
+    following : CommandFollowing
+        Of the muscle's driver.
+
     """
 
-    def __init__(self):
+    def __init__(self, following):
+        self._following = following
         self.forget()
 
     def forget(self):
         """Begin anew, as before the first reading."""
         self.slack = False
         self._measured_ns = None    # newest fresh reading
-        self._followed_ns = None    # when it was last under air, or not wanted to be
+        self._judged_ns = None
+        self._empty_ns = 0          # how long it was wanted under air and was not
+        self._obeyed_ns = None      # when its driver did not vent against a command
         self._noticed_ns = 0
 
     def judge(self, now_ns, command_pa, pressure_pa):
@@ -59,20 +71,47 @@ class SlackMuscle:
         command_pa : float
             Absolute pressure commanded last.
         pressure_pa : float
-            Measured absolute pressure, NaN where none is fresh. A muscle whose pressure was
-            never measured is not judged; one whose reading is lost counts as slack.
+            Measured absolute pressure, NaN where none is fresh. Of a muscle whose pressure was
+            never measured the word of its driver counts alone; one whose reading is lost
+            counts as slack.
 
         """
         if math.isfinite(pressure_pa):
             self._measured_ns = now_ns
-        if self._measured_ns is None:
-            return False
-        if self._followed_ns is None or command_pa < WANTED_PA or pressure_pa > SLACK_PA:
-            self._followed_ns = now_ns
-        lost = now_ns - self._measured_ns >= LOST_NS
-        if lost or now_ns - self._followed_ns >= AFTER_NS:
+        self._count(now_ns, command_pa, pressure_pa)
+        vents = self._following.vents(now_ns)
+        if self._obeyed_ns is None or not vents:
+            self._obeyed_ns = now_ns
+        lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS
+        silent = self._following.silent_ns(now_ns) >= LOST_NS
+        if self.slack:
+            if lost or silent:
+                self._noticed_ns = now_ns
+            self.slack = now_ns - self._noticed_ns < RESUME_NS or not self._proven(pressure_pa)
+        elif lost or silent or self._empty_ns >= AFTER_NS or (
+                now_ns - self._obeyed_ns >= VENTS_NS):
             self.slack = True
             self._noticed_ns = now_ns
-        elif now_ns - self._noticed_ns >= RESUME_NS:
-            self.slack = False
         return self.slack
+
+    def _count(self, now_ns, command_pa, pressure_pa):
+        """Add up how long the muscle was empty; commands that come and go count in part."""
+        passed_ns = 0 if self._judged_ns is None else max(now_ns - self._judged_ns, 0)
+        self._judged_ns = now_ns
+        if not pressure_pa <= SLACK_PA or passed_ns > LOST_NS:
+            self._empty_ns = 0
+        elif command_pa >= WANTED_PA:
+            self._empty_ns += passed_ns
+        else:
+            self._empty_ns = max(self._empty_ns - passed_ns, 0)
+
+    def _proven(self, pressure_pa):
+        """Return whether the muscle gets the air it is asked for."""
+        if self._measured_ns is not None and not pressure_pa > SLACK_PA:
+            return False
+        return not self._following.told or self._following.followed_pa > SLACK_PA
+
+    def command_pa(self, now_ns):
+        """Return what to ask of it [absolute Pa] while a muscle of the joint is slack."""
+        proves = self.slack and now_ns - self._noticed_ns >= RESUME_NS
+        return PROOF_PA if proves else P_ATM_PA

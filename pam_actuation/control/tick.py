@@ -56,7 +56,8 @@ REASONS = (
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
     'force stands still although the pressure changed: sensor frozen',
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
-    'a muscle is not under air although it should be, or its pressure is lost: both vented',
+    'a muscle is not under air although it should be, or its pressure or driver is lost: '
+    'both vented',
     'what is tracked is measured twice, vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 

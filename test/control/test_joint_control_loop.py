@@ -102,7 +102,7 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
 def test_no_muscle_is_left_alone_under_air(joint, loop, stops, reading):
     topic = ('flexor/pressure', 'extensor/pressure')[stops]
     bench, highest, spoiled = Bench(joint, loop), [], {}
-    for k in range(1600):
+    for k in range(1700):
         loop.on_joint_reference(AngleReference(bench.now_ns, 0.1, 0.0))
         if 200 <= k < 1000:
             spoiled = {topic: reading(bench.now_ns + bench.period_ns)}

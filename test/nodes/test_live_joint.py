@@ -32,6 +32,7 @@ from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 pytestmark = pytest.mark.ros
 
@@ -84,6 +85,10 @@ def vented(rig):
     return all(newest(rig, f'{side}/valve_signal').efforts == (0.0,) for side in SIDES)
 
 
+def empty(rig):
+    return max(newest(rig, f'{side}/pressure').pressure_pa for side in SIDES) < P_ATM_PA + 20e3
+
+
 def holds(rig, angle_rad):
     recent = rig.heard['joint_state'][-100:]
     return len(recent) == 100 and all(
@@ -122,6 +127,17 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
     wait_for(stiff, 30.0, 'the wanted co-contraction')
     wait_for(lambda: holds(knee, 0.3), 30.0, 'the angle after the change of stiffness')
 
+    # A stop of one driver is one of both muscles, for as long as it is latched.
+    assert knee.call(Trigger, 'extensor/valve_driver/emergency_stop').success
+    wait_for(lambda: vented(knee), 5.0, 'the signal that vents both muscles')
+    wait_for(lambda: empty(knee), 5.0, 'the air of both muscles to leave')
+    begin = time.monotonic()
+    while time.monotonic() < begin + 3.0:
+        assert newest(knee, 'flexor/valve_signal').efforts == (0.0,) and empty(knee)
+        time.sleep(0.02)
+    assert knee.call(Trigger, 'extensor/valve_driver/reset').success
+    wait_for(lambda: holds(knee, 0.3), 30.0, 'the angle after the reset')
+
     wait_for(lambda: knee.descriptions, 10.0, 'the robot description')
     assert '<joint name="knee" type="revolute">' in knee.descriptions[0].data
 
@@ -143,8 +159,20 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
 
     processes['/knee/joint_controller'].send_signal(signal.SIGKILL)
     wait_for(lambda: vented(knee), 30.0, 'the signal that vents both muscles')
-    wait_for(lambda: max(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES)
-             < P_ATM_PA + 20e3, 30.0, 'the air of both muscles to leave')
+    wait_for(lambda: empty(knee), 30.0, 'the air of both muscles to leave')
     problems = knee.supervisor.finish()
     assert problems == ['/knee/joint_controller: joint_controller was ended by SIGKILL']
     assert {process.exit_code for process in processes.values()} == {0, -signal.SIGKILL}
+
+
+def test_a_killed_driver_of_one_muscle_leaves_both_vented(knee):
+    wait_for(lambda: all(knee.heard.values()), 60.0, 'a message of every topic')
+    wait_for(lambda: min(newest(knee, f'{side}/pressure').pressure_pa for side in SIDES)
+             > P_ATM_PA + 100e3, 60.0, 'pressure in both muscles')
+    knee.supervisor.processes['/knee/flexor/valve_driver'].send_signal(signal.SIGKILL)
+    wait_for(lambda: vented(knee), 10.0, 'the signal that vents both muscles')
+    wait_for(lambda: empty(knee), 10.0, 'the air of both muscles to leave')
+    begin = time.monotonic()
+    while time.monotonic() < begin + 3.0:
+        assert vented(knee) and empty(knee)
+        time.sleep(0.02)

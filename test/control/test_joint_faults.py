@@ -1,0 +1,383 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every fault of one muscle of a joint vents both, and the joint comes back calmly."""
+
+import math
+
+from faulty_joint import FaultyJoint, MS_NS
+from pam_actuation.control import tick as codes
+from pam_actuation.drivers.faults import FAULT_TABLE, HOLD, VENT
+from pam_actuation.messages import (
+    AngleReference, JointAngle, NamedEfforts, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
+from pam_sim.joint.parameters import SIDES
+from pam_sim.units import P_ATM_PA
+import pytest
+
+ANGLE_RAD = 0.3
+VENTED_WITHIN_S = {'ppr': 0.5, 'hsv': 1.2}      # the pair of valves empties more slowly
+SECOND = 1_000_000_000
+
+
+def other(side):
+    return SIDES[1 - SIDES.index(side)]
+
+
+def _pressure(rig, side, arrives):
+    rig.spoil[f'{side}/pressure'] = arrives
+
+
+def _silent(topic):
+    """Return how to lose a topic of a muscle, and how to find it again."""
+    def begin(rig, side):
+        rig.spoil[f'{side}/{topic}'] = lambda message: None
+
+    def end(rig, side):
+        rig.spoil.clear()
+    return begin, end
+
+
+def _readings(arrives):
+    def begin(rig, side):
+        _pressure(rig, side, arrives)
+
+    def end(rig, side):
+        rig.spoil.clear()
+    return begin, end
+
+
+def _latched(begin):
+    def end(rig, side):
+        rig.spoil.clear()
+        rig.drivers[side].on_device('')
+        done, why = rig.drivers[side].reset()
+        assert done, why
+    return begin, end
+
+
+def _emergency_stop(rig, side):
+    rig.drivers[side].emergency_stop()
+
+
+def _over_pressure(rig, side):
+    _pressure(rig, side, lambda sound: Pressure(sound.stamp_ns, P_ATM_PA + 700e3))
+    rig.run(0.01)
+    rig.spoil.clear()
+
+
+def _device_refuses(rig, side):
+    rig.drivers[side].on_device('no such device')
+
+
+def _senders(key):
+    def begin(rig, side):
+        rig.drivers[side].set_sender_fault((key, 'two nodes send'))
+
+    def end(rig, side):
+        rig.drivers[side].set_sender_fault(None)
+    return begin, end
+
+
+def _no_command(rig, side):
+    """Reset a stop, but let no command arrive any more."""
+    rig.spoil[f'{side}/pressure_command'] = lambda message: None
+    rig.drivers[side].emergency_stop()
+    rig.run(0.02)
+    rig.drivers[side].reset()
+
+
+def _interrupted(rig, side):
+    """Command the pair of valves itself, shut, and lose the pressure meanwhile."""
+    rig.spoil[f'{side}/pressure_command'] = lambda message: None
+    rig.drivers[side].on_valve_command(ValveSignal(
+        rig.now_ns + MS_NS, VALVE_NAMES['hsv'], (0.0, 0.0)))
+    rig.run(0.3)
+
+
+def _stopped(rig, side):
+    rig.stopped.add(side)
+
+
+def _go_on(rig, side):
+    rig.stopped.clear()
+
+
+def _paused(rig, side):
+    rig.stopped.add(side)
+    rig.run(0.5)
+    rig.stopped.clear()
+
+
+def _clock_back(rig, side):
+    rig.late_ns[side] = -SECOND
+
+
+def _clock_right(rig, side):
+    rig.late_ns[side] = 0
+
+
+def _ends(rig, side):
+    rig.stopped.add(side)
+    rig.plant.set_signal(side, rig.drivers[side].safe_signal(rig.now_ns))
+
+
+def _nothing(rig, side):
+    """Do nothing: the fault ends by itself."""
+
+
+# Key in the fault table: (how it begins, how it ends) of a muscle under pressure.
+ROWS = {
+    'emergency_stop': _latched(_emergency_stop),
+    'over_pressure': _latched(_over_pressure),
+    'device_refuses': _latched(_device_refuses),
+    'no_command': (_no_command, _silent('')[1]),
+    'command_timeout': _silent('pressure_command'),
+    'two_publishers': _senders('two_publishers'),
+    'second_driver': _senders('second_driver'),
+    'two_sensors': _senders('two_sensors'),
+    'valve_command_interrupted': _latched(_interrupted),
+    'pressure_timeout': _silent('pressure'),
+    'pressure_frozen': _readings(lambda sound: Pressure(sound.stamp_ns, P_ATM_PA + 3e5)),
+    'driver_paused': (_paused, _nothing),
+    'clock_back': (_clock_back, _clock_right),
+    'driver_ends': (_ends, _go_on),
+    'driver_killed': (_stopped, _go_on)}
+OF_PAIRS_OF_VALVES = ('valve_command_interrupted', 'pressure_frozen', 'no_pressure')
+UNTOLD = ('driver_ends', 'driver_killed')      # the driver does not tell it itself
+FROM_THE_START = {
+    'no_pressure': _silent('pressure'),
+    'no_command': _silent('pressure_command'),
+    'emergency_stop': _latched(_emergency_stop),
+    'driver_killed': (_stopped, _go_on)}
+# What a muscle's readings are beside silent where they cannot be used.
+UNUSABLE = {
+    'not_a_number': lambda sound: Pressure(sound.stamp_ns, math.nan),
+    'past': lambda sound: Pressure(sound.stamp_ns - SECOND, sound.pressure_pa),
+    'future': lambda sound: Pressure(sound.stamp_ns + SECOND, sound.pressure_pa),
+    'implausible': lambda sound: Pressure(sound.stamp_ns, 0.0)}
+
+
+def test_every_row_that_vents_a_muscle_is_tested_for_a_joint():
+    assert {fault.key for fault in FAULT_TABLE if fault.reaction in (VENT, HOLD)} == {
+        *ROWS, *FROM_THE_START}
+
+
+def under_pressure(valve, **options):
+    """Return a joint that holds an angle with both muscles under pressure."""
+    rig = FaultyJoint(valve, lambda time_s: ANGLE_RAD, **options).run(2.0)
+    assert abs(rig.angle_rad[-1] - ANGLE_RAD) < 0.05 and min(rig.gauge_pa[-1]) > 150e3
+    return rig
+
+
+def both_stay_vented(rig, side):
+    """Check that both muscles are vented, and stay so for longer than the least time."""
+    rig.run(VENTED_WITHIN_S[rig.joint.flexor.valve] + 0.3)
+    rig.run(2.5)
+    assert rig.highest_gauge_pa(other(side), 2.5) < 10e3
+    # It alone is asked for a little, which shows when its driver follows again.
+    assert rig.highest_gauge_pa(side, 2.5) < 60e3
+    assert [pa for pair in rig.commands_pa[-500:] for pa in pair if pa > P_ATM_PA + 50e3] == []
+    assert rig.reasons[-1] == codes.REASONS[codes.MUSCLE_SLACK]
+
+
+def comes_back(rig):
+    """Check that the joint goes on without a jump."""
+    rig.run(6.5)
+    assert rig.reasons[-1] == codes.REASONS[codes.OK]
+    assert abs(rig.angle_rad[-1] - ANGLE_RAD) < 0.05
+    assert max(rig.angle_rad[-700:]) < ANGLE_RAD + 0.1
+    assert rig.fastest_rise_pa_per_s(6.5) < 650e3
+
+
+def cases(rows):
+    return [(valve, key, SIDES[(k + (valve == 'hsv')) % 2])
+            for k, key in enumerate(rows) for valve in ('ppr', 'hsv')
+            if valve == 'hsv' or key not in OF_PAIRS_OF_VALVES]
+
+
+@pytest.mark.parametrize('valve, key, side', cases(ROWS))
+def test_a_fault_of_one_muscle_vents_both_until_it_has_ended(valve, key, side):
+    begin, end = ROWS[key]
+    rig = under_pressure(valve)
+    begin(rig, side)
+    both_stay_vented(rig, side) if key != 'driver_paused' else rig.run(0.5)
+    assert key in UNTOLD or key in rig.faults[side]
+    assert rig.faults[other(side)] <= {'', 'no_command', 'no_pressure'}
+    end(rig, side)
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('valve, key, side', cases(FROM_THE_START))
+def test_a_joint_of_which_one_driver_does_not_follow_does_not_begin(valve, key, side):
+    begin, end = FROM_THE_START[key]
+    rig = FaultyJoint(valve, lambda time_s: ANGLE_RAD)
+    begin(rig, side)
+    rig.run(1.2)        # of a driver that never spoke, the pressure tells
+    both_stay_vented(rig, side)
+    assert key == 'driver_killed' or max(map(max, rig.gauge_pa)) < 120e3
+    end(rig, side)
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('problem', UNUSABLE)
+def test_a_pressure_that_cannot_be_used_vents_both_muscles(valve, problem):
+    rig, side = under_pressure(valve), SIDES[len(problem) % 2]
+    _pressure(rig, side, UNUSABLE[problem])
+    both_stay_vented(rig, side)
+    rig.spoil.clear()
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('side', SIDES)
+def test_a_muscle_whose_air_somebody_else_lets_out_is_not_left_to_the_other_one(valve, side):
+    """A dump valve or a lost supply: the driver knows of nothing."""
+    rig = under_pressure(valve)
+    safe = SAFE_EFFORTS[valve]
+    rig.plant.signals[side].take = lambda message, writer, now_ns: None
+    rig.plant.signals[side].efforts = safe
+    rig.run(1.0)
+    both_stay_vented(rig, side)
+    del rig.plant.signals[side].take
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('wanted', [-0.9, 0.9])
+@pytest.mark.parametrize('side', SIDES)
+def test_a_stop_is_seen_however_little_pressure_the_muscle_is_asked_for(wanted, side):
+    rig = FaultyJoint('ppr', lambda time_s: wanted).run(2.0)
+    rig.drivers[side].emergency_stop()
+    rig.run(0.8)
+    assert max(rig.gauge_pa[-1]) < 10e3
+
+
+def test_a_stop_is_seen_where_no_pressure_was_ever_measured():
+    rig = FaultyJoint('ppr', lambda time_s: ANGLE_RAD)
+    for side in SIDES:
+        rig.spoil[f'{side}/pressure'] = lambda message: None
+    rig.run(5.0)        # regulators go on without after 2 s
+    assert min(rig.gauge_pa[-1]) > 150e3
+    rig.drivers['flexor'].emergency_stop()
+    rig.run(0.8)
+    assert max(rig.gauge_pa[-1]) < 10e3
+    rig.run(2.0)
+    assert max(rig.gauge_pa[-1]) < 10e3
+    rig.drivers['flexor'].reset()
+    comes_back(rig)
+
+
+def test_a_stop_vents_both_muscles_of_a_joint_that_gives_a_torque():
+    rig = under_pressure('ppr')
+    rig.control.references.clear()
+    rig.control.on_joint_reference = lambda message: rig.control.on_named_efforts(
+        NamedEfforts(message.stamp_ns, ('muscle',), (0.05,)))
+    rig.run(0.5)
+    assert rig.control.follows_torque and min(rig.gauge_pa[-1]) > 100e3
+    rig.drivers['extensor'].emergency_stop()
+    rig.run(0.8)
+    assert max(rig.gauge_pa[-1]) < 10e3
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_without_its_controller_both_drivers_vent_and_come_back_calmly(valve):
+    rig = under_pressure(valve)
+    rig.stopped.add('controller')
+    rig.run(VENTED_WITHIN_S[valve] + 0.3)
+    assert max(rig.gauge_pa[-1]) < 30e3
+    assert all('command_timeout' in rig.faults[side] for side in SIDES)
+    rig.run(1.0)
+    rig.stopped.clear()
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('problem', [
+    lambda sound: None,
+    lambda sound: JointAngle(sound.stamp_ns, math.nan),
+    lambda sound: JointAngle(sound.stamp_ns - SECOND, sound.angle_rad)])
+def test_an_angle_that_was_lost_and_found_brings_no_jump(problem):
+    rig = under_pressure('ppr')
+    rig.spoil['joint_state'] = problem
+    rig.run(1.0)
+    assert max(rig.gauge_pa[-1]) < 5e3
+    rig.spoil.clear()
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_an_angle_and_pressures_frozen_in_motion_are_noticed(valve):
+    """The pressures that should have moved the joint are those of the drivers."""
+    rig = FaultyJoint(valve, lambda time_s: 0.6 * math.sin(math.pi * time_s)).run(3.3)
+    rig.reasons.clear()
+    sound = {}
+
+    def frozen(topic, field):
+        def arrives(message):
+            value = sound.setdefault(topic, getattr(message, field))
+            return type(message)(message.stamp_ns, value)
+        return arrives
+
+    rig.spoil['joint_state'] = frozen('joint_state', 'angle_rad')
+    for side in SIDES:
+        rig.spoil[f'{side}/pressure'] = frozen(f'{side}/pressure', 'pressure_pa')
+    rig.run(2.5)
+    told = {codes.REASONS[code] for code in (codes.ANGLE_FROZEN, codes.MUSCLE_SLACK)}
+    assert told & set(rig.reasons)
+    assert max(rig.gauge_pa[-1]) < 50e3
+
+
+def test_two_senders_of_the_angle_vent_both_muscles():
+    rig = under_pressure('ppr')
+    sentence = rig.control.two_sensors = 'two publishers send joint_state'
+    rig.run(0.5)
+    assert max(rig.gauge_pa[-1]) < 10e3
+    assert rig.reasons[-1] == f'{codes.REASONS[codes.TWO_SENSORS]}: {sentence}'
+    rig.control.two_sensors = ''
+    comes_back(rig)
+
+
+def test_a_joint_that_forgot_waits_for_new_inputs():
+    rig = under_pressure('ppr')
+    rig.control.forget()
+    commands, _ = rig.control.tick(rig.now_ns + 5 * MS_NS)
+    assert [command.pressure_pa for command in commands] == [P_ATM_PA] * 2
+    assert rig.control.reason == codes.REASONS[codes.NO_ANGLE]
+
+
+def test_a_reference_from_the_future_does_not_keep_the_muscles_filled():
+    rig = under_pressure('ppr')
+    rig.control.on_joint_reference(AngleReference(rig.now_ns + 3600 * SECOND, ANGLE_RAD, 0.0))
+    rig.wanted = lambda time_s: math.nan        # no other one is usable
+    rig.run(3.0)
+    assert rig.reasons[-1] == codes.REASONS[codes.REFERENCE_LOST]
+    assert max(rig.gauge_pa[-1]) < 5e3
+
+
+def test_a_loop_that_stood_still_starts_bumplessly():
+    rig = under_pressure('ppr')
+    rig.stopped.add('controller')
+    rig.run(0.3)
+    rig.stopped.clear()
+    rig.run(0.005)
+    numbers = dict(zip(rig.state.names, rig.state.values))
+    assert numbers['restarted'] == 1.0 and numbers['elapsed_s'] > 0.25
+    for side, command_pa in zip(SIDES, rig.commands_pa[-1]):
+        assert command_pa == pytest.approx(numbers[f'{side}_pressure_pa'], abs=5e3)
+
+
+@pytest.mark.parametrize('wanted', [-1.02, 1.02])
+def test_a_joint_pushed_against_its_stop_is_not_vented_for_the_noise_of_its_encoder(wanted):
+    rig = FaultyJoint('ppr', lambda time_s: wanted).run(4.0)
+    assert abs(rig.angle_rad[-1]) == 1.0
+    assert set(rig.reasons) == {codes.REASONS[codes.OK]}
