@@ -32,13 +32,14 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Pressure, SAFE_EFFORTS
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import from_ros, RosWriter, stamp_ns, type_of
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.senders import WriterNames
-from pam_actuation.nodes.wire import WireReader
 from pam_actuation.rigging.client import RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_actuation.topics.cdr import NS_PER_S
+from pam_actuation.topics.codec import Reader, Writer
 from pam_sim.units import P_ATM_PA
 import rclpy
 from rclpy.node import Node
@@ -218,8 +219,8 @@ class Witness:
         node = self._client.node
         self._sources = {
             topic: PolledSubscription(
-                node, type_of(topic), f'{NAMESPACE}/{topic}', qos.RECORDER, raw=True,
-                read=WireReader(topic), writers=True) for topic in heard}
+                node, class_of(topic), f'{NAMESPACE}/{topic}', qos.RECORDER, raw=True,
+                read=Reader(topic), writers=True) for topic in heard}
         self._health = PolledSubscription(node, DiagnosticArray, '/diagnostics', qos.RECORDER)
         self._name_of = WriterNames(node)
         self.last = {}
@@ -253,7 +254,8 @@ class Witness:
     def _note(self, message):
         for status in message.status:
             name = status.name.rsplit('/', 1)[-1]
-            now = Status(stamp_ns(message), status.level[0], status.message,
+            now = Status(NS_PER_S * message.header.stamp.sec + message.header.stamp.nanosec,
+                         status.level[0], status.message,
                          {item.key: item.value for item in status.values})
             before = self.last.get(name)
             self.last[name] = now
@@ -299,7 +301,7 @@ class Witness:
     def new_publisher(self, topic):
         """Return a publisher of a topic of the rig."""
         return self._client.node.create_publisher(
-            type_of(topic), f'{NAMESPACE}/{topic}', qos.PUBLISHER)
+            class_of(topic), f'{NAMESPACE}/{topic}', qos.PUBLISHER)
 
     def call(self, service_type, name, timeout_s=5.0):
         """Call a service of the rig; TimeoutError if it does not answer."""
@@ -319,7 +321,7 @@ class Witness:
         node = Node(name, namespace=NAMESPACE, context=self._client.node.context,
                     enable_rosout=False, start_parameter_services=False)
         for topic in topics:
-            kind = DiagnosticArray if topic == '/diagnostics' else type_of(topic)
+            kind = DiagnosticArray if topic == '/diagnostics' else class_of(topic)
             node.create_subscription(kind, topic, lambda message: None, qos.CONSUMER)
         return node
 
@@ -382,10 +384,11 @@ def relay():
     """Pass sensors on until stopped; spoil them as asked."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node('sensor_relay', namespace=NAMESPACE)
-    sources = {topic: PolledSubscription(node, type_of(topic), f'true/{topic}')
+    sources = {topic: PolledSubscription(
+        node, class_of(topic), f'true/{topic}', raw=True, read=Reader(topic))
                for topic in RELAYED}
-    sinks = {topic: (node.create_publisher(type_of(topic), topic, qos.PUBLISHER),
-                     RosWriter(topic)) for topic in RELAYED}
+    sinks = {topic: (node.create_publisher(class_of(topic), topic, qos.PUBLISHER),
+                     Writer(topic)) for topic in RELAYED}
     modes = {topic: ('none', {}) for topic in (*RELAYED, 'pressure_command')}
     threading.Thread(target=_read_modes, args=(modes,), daemon=True).start()
     flood = None
@@ -395,12 +398,12 @@ def relay():
             publisher, writer = sinks[topic]
             how, memory = modes[topic]
             for message, _ in source.take():
-                for plain in spoiled(topic, how, from_ros(topic, message), memory):
+                for plain in spoiled(topic, how, message, memory):
                     publisher.publish(writer.fill(plain))
         if modes['pressure_command'][0] == 'flood':
             flood = flood or (node.create_publisher(
-                type_of('pressure_command'), 'pressure_command', qos.PUBLISHER),
-                RosWriter('pressure_command'))
+                class_of('pressure_command'), 'pressure_command', qos.PUBLISHER),
+                Writer('pressure_command'))
             for k in range(FLOOD_PER_ROUND):
                 flood[0].publish(flood[1].fill(Pressure(time.time_ns(), P_ATM_PA + 1e5 * k)))
         elif flood is not None:

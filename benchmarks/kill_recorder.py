@@ -38,12 +38,13 @@ import tempfile
 import time
 
 from mcap.reader import make_reader
-from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.recover import recover_bag
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import ControllerState, Pressure
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import RECORDED
 from rosbags.rosbag2 import Reader
 
 FEED_PERIOD_S = 0.01
@@ -91,7 +92,7 @@ def record(directory, split_bytes, begun):
         directory, {'experiment_name': 'kill'}, max_file_bytes=split_bytes))
     sent = dict.fromkeys(RATES_HZ, 0)
     for topic in RATES_HZ:
-        core.add_topic(f'/muscle/{topic}', TOPIC_TYPES[topic])
+        core.add_topic(f'/muscle/{topic}', RECORDED[topic].type_name)
     diary = Diary(f'{directory}.diary')
     begin = time.monotonic()
     begun.send(time.time_ns())
@@ -212,13 +213,13 @@ def _wait_for_diary(diary, publisher):
 
 def publish(path):
     """Publish numbered messages to the recorder until stopped (a process of its own)."""
-    from pam_actuation.nodes.conversions import MESSAGE_TYPES
     from pam_actuation.nodes.endpoints import CountedPublisher, wait_until_matched
+    from pam_actuation.nodes.ros_messages import class_of
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)      # SIGTERM ends it at once
     node = rclpy.create_node('numbers', namespace='/muscle')
-    publishers = {topic: CountedPublisher(node, MESSAGE_TYPES[topic], topic)
+    publishers = {topic: CountedPublisher(node, class_of(topic), topic)
                   for topic in NODE_RATES_HZ}
     wait_until_matched(
         list(publishers.values()), '/muscle/experiment_recorder', 60.0, lambda: not rclpy.ok())

@@ -32,9 +32,9 @@ import time
 
 from long_bag import TOPICS, write_long_bag
 import numpy as np
-from pam_actuation.bags import layout
 from pam_actuation.bags.load import load_run, read_series
 from pam_actuation.bags.source import read_bag
+from pam_actuation.topics import definitions
 from rosbags.highlevel import AnyReader
 
 STREAMS = {
@@ -78,7 +78,7 @@ def load_here(path):
 def load_with_rosbags(path):
     """Return short name to messages, read and deserialised by rosbags."""
     found = {}
-    with AnyReader([path], default_typestore=layout.typestore()) as reader:
+    with AnyReader([path], default_typestore=definitions.typestore()) as reader:
         for connection, _, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             found.setdefault(connection.topic.rsplit('/', 1)[-1], []).append(message)

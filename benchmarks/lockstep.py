@@ -33,11 +33,12 @@ import tempfile
 import time
 
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import MESSAGE_TYPES
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.rigging.client import NAME, RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_actuation.topics.table import OF_A_RUN
 
 CONTROLLER = 'sofc_controller'
 NODES = ('plant_simulator', 'valve_driver', CONTROLLER, 'reference_generator')
@@ -65,8 +66,8 @@ class Listener:
     def __init__(self, node, silent):
         self.sources = {} if silent else {
             topic: PolledSubscription(
-                node, message_type, f'{NAMESPACE}/{topic}', qos.reliable(20_000), raw=True)
-            for topic, message_type in MESSAGE_TYPES.items()}
+                node, class_of(topic), f'{NAMESPACE}/{topic}', qos.reliable(20_000), raw=True)
+            for topic in OF_A_RUN}
         self.messages = {topic: [] for topic in self.sources}
 
     def take(self):

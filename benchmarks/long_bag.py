@@ -27,9 +27,11 @@ from mcap.records import (
     Channel, Chunk, ChunkIndex, DataEnd, Footer, Header, Schema, Statistics)
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import codecs, layout
+from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED, short_name
 import zstandard
 
 CHUNK_BYTES = 128 * 1024
@@ -60,7 +62,7 @@ class _LongFile:
 
     def __init__(self, stream, topics):
         self.stream, self.topics = stream, topics
-        self.templates = [codecs.encode(name, template) for name, template, _, _ in topics]
+        self.templates = [codec.encode(name, template) for name, template, _, _ in topics]
         sizes = [MESSAGE_BYTES + len(template) for template in self.templates]
         self.offsets = np.concatenate([[0], np.cumsum(sizes)]).tolist()
         self.rounds = max(CHUNK_BYTES // self.offsets[-1], 1)
@@ -88,12 +90,12 @@ class _LongFile:
     def _described(self):
         schemas, channels = [], []
         for i, (name, *_) in enumerate(self.topics, 1):
-            type_name = codecs.TOPIC_TYPES[codecs.short_name(name)]
+            type_name = RECORDED[short_name(name)].type_name
             schemas.append(_bytes_of(Schema(
-                i, layout.schema_text(type_name).encode(), 'ros2msg', type_name)))
+                i, definitions.schema_text(type_name).encode(), 'ros2msg', type_name)))
             channels.append(_bytes_of(Channel(i, name, 'cdr', {
                 'offered_qos_profiles': layout.to_yaml([layout.qos_profile()]),
-                'topic_type_hash': layout.type_hash(type_name)}, i)))
+                'topic_type_hash': definitions.type_hash(type_name)}, i)))
         return schemas + channels
 
     def _records(self, ticks, stamp_ns, rng):

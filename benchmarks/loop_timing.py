@@ -59,7 +59,7 @@ BARE = 'bare loop'
 
 def echo(role):
     """Be one node of the bare echo until SIGTERM; the listener prints what it found."""
-    from pam_actuation.nodes.conversions import set_stamp, stamp_ns
+    from pam_actuation.nodes.ros_messages import set_stamp
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from sensor_msgs.msg import JointState
@@ -80,7 +80,8 @@ def echo(role):
         node.create_timer(1.0 / ECHO_HZ, talk)
     else:
         def hear(message):
-            latency.add(time.time_ns() - stamp_ns(message))
+            stamp = message.header.stamp
+            latency.add(time.time_ns() - 1_000_000_000 * stamp.sec - stamp.nanosec)
 
         node.create_subscription(JointState, '/echo', hear, 10)
     refused = ask_for_realtime(ECHO_PRIORITY)

@@ -72,7 +72,7 @@ def publish_extra(count):
 
     Begins with a line on stdin: what is sent before the recorder is active is not recorded.
     """
-    from pam_actuation.bags.codecs import encode
+    from pam_actuation.topics.codec import encode
     from pam_actuation.messages import Pressure
     from pam_actuation.nodes.endpoints import CountedPublisher
     from pam_actuation.nodes.endpoints import wait_until_matched

@@ -43,7 +43,7 @@ from fault_table import (
     DRIVER, read_outcomes, RECORDER, REFERENCE, RESTART_S, run_series, START_S)
 import numpy as np
 from pam_actuation.messages import Pressure
-from pam_actuation.nodes.conversions import RosWriter
+from pam_actuation.topics.codec import Writer
 from pam_sim.units import P_ATM_PA
 from std_srvs.srv import Trigger
 from tqdm import tqdm
@@ -78,7 +78,7 @@ class Rig(FaultRig):
         self.controller = controller
         if not controller:
             self._publisher = self.witness.new_publisher('pressure_command')
-            self._writer = RosWriter('pressure_command')
+            self._writer = Writer('pressure_command')
 
     def command(self, command_pa, duration_s):
         """Command a pressure (None: nothing) at 200 Hz and listen."""

@@ -37,10 +37,10 @@ from fault_table import (
     ALLOWED_PA, ALLOWED_S, CONTROLLER, DRIVER, RESTART_S, run_series, Series, SETTLE_S, WATCHDOG)
 from pam_actuation.messages import Contraction, Pressure, VALVE_NAMES, ValveSignal
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import RosWriter, type_of
 from pam_actuation.nodes.endpoints import PolledSubscription
-from pam_actuation.nodes.wire import WireReader
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.rigging.processes import end_all, NodeProcess
+from pam_actuation.topics.codec import Reader, Writer
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
@@ -232,7 +232,7 @@ def stranger(valve):
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(STRANGER, namespace=NAMESPACE)
     sources = {topic: PolledSubscription(
-        node, type_of(true), true, raw=True, read=WireReader(true))
+        node, class_of(true), true, raw=True, read=Reader(true))
         for topic, true in MEASURED_FROM.items()}
     wanted = ['none']
 
@@ -250,8 +250,8 @@ def stranger(valve):
                 publisher = None
             topic = wanted[0]
             if topic != 'none':
-                publisher = node.create_publisher(type_of(topic), topic, qos.PUBLISHER)
-                writer = RosWriter(topic)
+                publisher = node.create_publisher(class_of(topic), topic, qos.PUBLISHER)
+                writer = Writer(topic)
         if publisher is None:
             time.sleep(0.002)
             continue

@@ -15,10 +15,10 @@
 """
 The messages of the rig as plain values, one class per topic, no ROS needed.
 
-The laws, drivers and loops of this package exchange these; nodes translate
-them to ROS messages (``nodes/conversions.py``) and bags to CDR bytes
-(``bags/codecs.py``). SI units, pressures absolute. ``stamp_ns`` is the
-``header.stamp``: the time of the measurement, integer nanoseconds.
+The laws, drivers and loops of this package exchange these; ``topics/table.py`` says which
+topic carries which, and how it becomes the bytes that nodes send and bags hold. SI units,
+pressures absolute. ``stamp_ns`` is the ``header.stamp``: the time of the measurement, integer
+nanoseconds.
 """
 
 from collections.abc import Iterable
@@ -189,6 +189,7 @@ class Status:
     One diagnostic status: topic /diagnostics.
 
     ``level`` 0 ok, 1 warning, 2 error, 3 stale; ``values`` is a tuple of (key, text) pairs.
+    ``hardware_id`` is the program or device that speaks.
     """
 
     stamp_ns: int
@@ -196,3 +197,4 @@ class Status:
     name: str
     message: str
     values: tuple[tuple[str, str], ...] = ()
+    hardware_id: str = ''

@@ -69,6 +69,9 @@ class Series:
         Field name to samples, SI.
     unit : dict of str to str
         Field name to SI unit.
+    held : bool, optional
+        Whether a value counts until the next one, as that of a command does; others are
+        interpolated. By default the name of the topic tells, by ``HELD_TOPICS``.
     start_ns : int, optional
         Stamp of ``time_s`` = 0. A run sets it to its own start, the same for all its topics;
         without a run it is the first stamp.
@@ -79,6 +82,7 @@ class Series:
     values: dict[str, FloatArray]
     unit: dict[str, str] = field(default_factory=dict)
     start_ns: int | None = field(default=None, compare=False)
+    held: bool | None = field(default=None, compare=False)
 
     def __len__(self) -> int:
         """Return the number of messages."""
@@ -253,7 +257,7 @@ class Run:
             stamp_ns = np.asarray(one.stamp_ns, dtype=np.int64)
             order = np.argsort(stamp_ns, kind='stable')
             seconds = (stamp_ns[order] - int(start_ns)) * 1e-9
-            held = name in HELD_TOPICS
+            held = name in HELD_TOPICS if one.held is None else one.held
             values[name] = {
                 key: _held(time_s, seconds, np.asarray(samples, float)[order]) if held
                 else _interpolated(time_s, seconds, np.asarray(samples, float)[order], max_gap_s)

@@ -27,8 +27,9 @@ RHO_REFERENCE = 1.185         # kg/m^3, reference density of ISO 6358
 T_REFERENCE_K = 293.15        # K, reference temperature of ISO 6358
 LEAST_ABSOLUTE_PA, MOST_ABSOLUTE_PA = 101e3, 1e7    # between them a range is one of pressures
 _UNIT_OF_ENDING = (
-    ('_m_per_s', 'm/s'), ('_pa_per_s', 'Pa/s'), ('_pa', 'Pa'), ('_hz', 'Hz'), ('_kg', 'kg'),
-    ('_ns', 'ns'), ('_s', 's'), ('_m', 'm'), ('_n', 'N'), ('_voltage', 'V'), ('_sec', 's'),
+    ('_m_per_s', 'm/s'), ('_pa_per_s', 'Pa/s'), ('_rad_per_s', 'rad/s'), ('_pa', 'Pa'),
+    ('_hz', 'Hz'), ('_kg', 'kg'), ('_rad', 'rad'), ('_n_m', 'N m'), ('_k', 'K'), ('_ns', 'ns'),
+    ('_s', 's'), ('_m', 'm'), ('_n', 'N'), ('_voltage', 'V'), ('_sec', 's'),
     ('_nanosec', 'ns'), ('_v', 'V'))
 
 

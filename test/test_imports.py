@@ -22,7 +22,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 # From the bottom: a room imports from its own row and from those above it in this table.
 LAYERS = (
-    ('messages', 'namespaces', 'resources', 'interrupts', 'parallel', 'random_levels',
+    ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'parallel', 'random_levels',
      'ros_missing', 'slow_rise', 'control', 'drivers', 'loops', 'bags', 'hardware', 'plant_loop',
      'joint_plant_loop'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules'),

@@ -26,8 +26,8 @@ from catkin_pkg.changelog import get_changelog_from_path  # noqa: I100
 from catkin_pkg.package import parse_package
 import pam_actuation
 from pam_actuation import resources
-from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.drivers.faults import fault_table_markdown
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -232,11 +232,11 @@ def test_pyproject_leaves_everything_to_setup_py():
     assert set(said) == {'build-system', 'tool'} and set(said['tool']) == {'mypy'}
 
 
-@pytest.mark.parametrize('topic', TOPIC_TYPES)
+@pytest.mark.parametrize('topic', RECORDED)
 def test_a_page_per_topic_states_its_type(topic):
     text = (ROOT / 'msg_docs' / f'{topic}.md').read_text(encoding='utf-8')
-    assert re.search(r'^\| message type \| `(.+)` \|$', text, re.M)[1] == TOPIC_TYPES[topic]
-    assert 'ros2 topic pub' in text and f' {TOPIC_TYPES[topic]} ' in text
+    assert re.search(r'^\| message type \| `(.+)` \|$', text, re.M)[1] == RECORDED[topic].type_name
+    assert 'ros2 topic pub' in text and f' {RECORDED[topic].type_name} ' in text
     for heading in ('## Fields', '## Rules', '## Quality of service', '## Example'):
         assert heading in text
 
@@ -244,10 +244,10 @@ def test_a_page_per_topic_states_its_type(topic):
 def test_the_index_of_pages_lists_every_topic_with_its_type():
     text = (ROOT / 'msg_docs' / 'README.md').read_text(encoding='utf-8')
     listed = dict(re.findall(r'^\| \[`(\w+)`\]\(\1\.md\) \| `([\w/]+)` \|', text, re.M))
-    assert listed == TOPIC_TYPES
+    assert listed == {name: topic.type_name for name, topic in RECORDED.items()}
 
 
-@pytest.mark.parametrize('topic', TOPIC_TYPES)
+@pytest.mark.parametrize('topic', RECORDED)
 def test_the_example_of_a_page_is_a_valid_message(topic):
     text = (ROOT / 'msg_docs' / f'{topic}.md').read_text(encoding='utf-8')
     example = yaml.safe_load(re.search(r'^  "(\{.*\})"$', text, re.M)[1])
@@ -263,7 +263,7 @@ def test_the_example_of_a_page_is_a_valid_message(topic):
                 for entry in item:
                     check(entry, fields[key][1][0][1])
 
-    check(example, TOPIC_TYPES[topic])
+    check(example, RECORDED[topic].type_name)
 
 
 def test_links_between_the_pages_lead_somewhere():

@@ -21,6 +21,7 @@ import tempfile
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.mcap_write import McapWriter
+from pam_actuation.topics.definitions import schema_text
 
 LIBRARY = 'pam_actuation'
 
@@ -77,7 +78,7 @@ class DataFile:
         """Announce a topic with its definition."""
         if type_name not in self._schemas:
             self._schemas[type_name] = self.mcap.add_schema(
-                type_name, 'ros2msg', layout.schema_text(type_name).encode())
+                type_name, 'ros2msg', schema_text(type_name).encode())
         self._channels[name] = self.mcap.add_channel(
             name, self._schemas[type_name], {
                 'offered_qos_profiles': layout.to_yaml(list(qos)),

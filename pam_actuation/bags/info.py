@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pam_actuation.bags import cdr, codecs, layout, plausibility, series
+from pam_actuation.bags import plausibility, series
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
@@ -35,6 +35,9 @@ from pam_actuation.bags.losses import count_of, missing_messages, PublishedCount
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import read_bag
+from pam_actuation.topics.cdr import CdrError
+from pam_actuation.topics.definitions import typestore
+from pam_actuation.topics.table import OF_A_RUN, short_name
 from pam_sim.errors import InputError
 
 __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
@@ -127,8 +130,7 @@ class BagInfo:
             return False
         # Diagnostics come from every node there is, also from those not of the rig.
         rig = [
-            topic for topic in self.topics if topic.name != '/diagnostics'
-            and topic.name.rsplit('/', 1)[-1] in codecs.TOPIC_TYPES]
+            topic for topic in self.topics if short_name(topic.name) in OF_A_RUN]
         return True if rig and all(topic.lost is not None for topic in rig) else None
 
     @property
@@ -236,15 +238,15 @@ def _topic_info(topic, remarks):
         info.stamp_jitter_s = float(np.sqrt(np.mean((steps_s - usual_s)**2)))
     for name, column in values.items():
         finite = column[np.isfinite(column)]
-        if len(finite) and topic.name.rsplit('/', 1)[-1] != 'controller_state':
+        if len(finite) and not OF_A_RUN[short_name(topic.name)].internals:
             info.ranges[name] = (float(finite.min()), float(finite.max()))
     return info, stamp_ns, values
 
 
 def _stamps_and_values(topic, remarks):
     """Return header stamps in file order (receive times if there are none) and values."""
-    short = topic.name.rsplit('/', 1)[-1]
-    if is_rig_topic(topic) and short in series.VALUES:
+    short = short_name(topic.name)
+    if is_rig_topic(topic) and short in OF_A_RUN and OF_A_RUN[short].numeric is not None:
         stamp_ns, values, bad = series.table(short, topic.payloads)
         if bad.any():
             remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
@@ -252,13 +254,13 @@ def _stamps_and_values(topic, remarks):
     if _has_header(topic):
         try:
             return series.stamps(topic.payloads), {}
-        except cdr.CdrError:
+        except CdrError:
             remarks.append(f'{topic.name}: some messages cannot be decoded.')
     return topic.log_time_ns, {}
 
 
 def _has_header(topic):
-    fields = layout.typestore().fielddefs.get(topic.type_name)
+    fields = typestore().fielddefs.get(topic.type_name)
     return bool(
         topic.encoding == 'cdr' and fields and fields[1]
         and fields[1][0][1][1] == 'std_msgs/msg/Header')

@@ -15,18 +15,14 @@
 """
 The rosbag2 layout of ROS 2 Jazzy: types, hashes, QoS texts, metadata.yaml version 9.
 
-Message definitions and RIHS01 hashes come from the Jazzy type store of the
-``rosbags`` package, so nothing here needs a ROS installation.
+Message definitions and hashes: ``topics/definitions.py``. Nothing here needs ROS.
 """
 
 from dataclasses import dataclass
-import functools
 import os
 from pathlib import Path
 
 from pam_actuation.bags import disk
-from pam_sim.errors import InputError
-from rosbags.typesys import get_typestore, Stores
 import yaml
 
 METADATA_VERSION = 9
@@ -49,33 +45,6 @@ class TopicFacts:
     qos: tuple
     type_hash: str
     count: int
-
-
-@functools.lru_cache(maxsize=1)
-def typestore():
-    """Return the type store of ROS 2 Jazzy (standard messages)."""
-    return get_typestore(Stores.ROS2_JAZZY)
-
-
-def _known(type_name):
-    if type_name not in typestore().fielddefs:
-        raise InputError(
-            f'{type_name!r} is not a message type of ROS 2 Jazzy; give a standard type such as '
-            'sensor_msgs/msg/JointState', 'message type')
-
-
-@functools.lru_cache(maxsize=None)
-def schema_text(type_name):
-    """Return the ROS 2 message definition with its dependencies (encoding ``ros2msg``)."""
-    _known(type_name)
-    return typestore().generate_msgdef(type_name, ros_version=2)[0]
-
-
-@functools.lru_cache(maxsize=None)
-def type_hash(type_name):
-    """Return the RIHS01 hash of a message type, as DDS discovery carries it."""
-    _known(type_name)
-    return typestore().hash_rihs01(type_name)
 
 
 def qos_profile(depth=10, reliability='reliable', durability='volatile', history='keep_last'):

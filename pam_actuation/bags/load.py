@@ -24,10 +24,12 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from pam_actuation.bags import codecs, renamed, series
+from pam_actuation.bags import renamed, series
 from pam_actuation.bags.plausibility import recorded_length_m, topic_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.messages import VALVE_NAMES, valve_of
+from pam_actuation.topics.codec import decode
+from pam_actuation.topics.table import KEPT, OF_A_RUN, RECORDED, short_name, TOLD
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
 from pam_sim.units import unit_of
@@ -122,7 +124,7 @@ def load_run(path, namespace=None, recover=False, topics=None):
     remarks = list(bag.remarks)
     topics, trajectories = {}, ()
     for short, topic in found.items():
-        if short == 'reference_trajectory':
+        if OF_A_RUN[short].numeric is None:
             trajectories = _trajectories(topic, remarks)
         else:
             one = read_series(short, topic, remarks)
@@ -142,14 +144,14 @@ def topics_of(bag, namespace):
     found = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
-        if parent != namespace or short not in codecs.TOPIC_TYPES or short == 'diagnostics':
+        if parent != namespace or short not in OF_A_RUN:
             continue
         if is_rig_topic(topic):
             found[short] = topic
             continue
         remark = (
             f'{name} is {topic.type_name} in {topic.encoding}, not '
-            f'{codecs.TOPIC_TYPES[short]} in cdr: left out.')
+            f'{OF_A_RUN[short].type_name} in cdr: left out.')
         if remark not in bag.remarks:
             bag.remarks.append(remark)
     return found
@@ -162,11 +164,12 @@ def is_rig_topic(topic):
 
 def is_read(name, type_name, encoding):
     """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
-    return not name.endswith('/diagnostics') and _is_of_rig(name, type_name, encoding)
+    return short_name(name) in OF_A_RUN and _is_of_rig(name, type_name, encoding)
 
 
 def _is_of_rig(name, type_name, encoding):
-    return encoding == 'cdr' and codecs.TOPIC_TYPES.get(name.rsplit('/', 1)[-1]) == type_name
+    row = RECORDED.get(short_name(name))
+    return encoding == 'cdr' and row is not None and row.type_name == type_name
 
 
 def namespaces(bag):
@@ -174,7 +177,7 @@ def namespaces(bag):
     found = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
-        if short != 'diagnostics' and is_rig_topic(topic) and len(topic.payloads):
+        if short in OF_A_RUN and is_rig_topic(topic) and len(topic.payloads):
             found.setdefault(parent, set()).add(short)
     return found
 
@@ -208,13 +211,14 @@ def _listed(names):
 
 def read_series(short, topic, remarks):
     """Return the Series of a TopicData; what is odd is appended to ``remarks`` as sentences."""
+    row = OF_A_RUN[short]
     stamp_ns, values, bad = series.table(short, topic.payloads)
     keep = ~bad
     if bad.any():
         remarks.append(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
     stamp_ns, keep = _checked_stamps(stamp_ns, keep, topic, remarks)
-    if short == 'valve_signal':
+    if row.missing == KEPT:
         values = {name: values[name] for name in _SIGNAL_NAMES if name in values}
         if not values and len(stamp_ns):
             remarks.append(
@@ -232,11 +236,11 @@ def read_series(short, topic, remarks):
     same = int((np.diff(stamp_ns) == 0).sum())
     if same:
         remarks.append(f'{topic.name}: {same} messages repeat the stamp before, kept.')
-    if short == 'valve_signal':
+    if row.missing == KEPT:
         stamp_ns, values = _held(stamp_ns, values, topic.name, remarks)
-    elif short not in ('controller_state', 'valve_command') and len(stamp_ns):
+    elif row.missing == TOLD and not row.internals and len(stamp_ns):
         _remark_not_finite(values, topic.name, remarks)
-    return Series(stamp_ns, values, {name: unit_of(name) for name in values})
+    return Series(stamp_ns, values, {name: unit_of(name) for name in values}, held=row.held)
 
 
 def _checked_stamps(stamp_ns, keep, topic, remarks):
@@ -280,7 +284,7 @@ def _trajectories(topic, remarks):
     messages, bad = [], 0
     for raw in topic.payloads:
         try:
-            messages.append(codecs.decode('reference_trajectory', raw))
+            messages.append(decode('reference_trajectory', raw))
         except InputError:
             bad += 1
     if bad:

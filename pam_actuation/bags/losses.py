@@ -22,7 +22,7 @@ bag from before that report; so a node that died early is checked too.
 
 from array import array
 
-from pam_actuation.bags import codecs
+from pam_actuation.topics.codec import decode
 from pam_sim.errors import InputError
 
 DIAGNOSTICS = '/diagnostics'
@@ -76,7 +76,7 @@ class PublishedCounts:
         """
         topics = set()
         try:
-            statuses = codecs.decode('diagnostics', payload)
+            statuses = decode('diagnostics', payload)
         except InputError:
             return topics
         for status in statuses:

@@ -18,15 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pam_actuation.bags import codecs
-from pam_sim.units import gauge_kpa, P_ATM_PA
+from pam_actuation.topics.table import NEEDED, OF_A_RUN, RECORDED, short_name, USED
+from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
 MIN_RATE_HZ = 100.0
 RATE_TOLERANCE = 0.98
 GAP_LIMIT_S = 0.05                     # half of what makes a measurement invalid
-RATE_TOPICS = ('pressure', 'contraction', 'force', 'valve_signal', 'pressure_command')
-NEEDED_TOPICS = ('pressure', 'contraction', 'valve_signal')
-OPTIONAL_TOPICS = ('force', 'supply_pressure', 'reference', 'pressure_command')
 FUTURE_LIMIT_NS = 20_000_000           # a measurement stamped further ahead is invalid
 LATE_LIMIT_NS = 100_000_000            # and one older than this
 ATMOSPHERE_MARGIN_PA = 5e3             # sensor offset and weather
@@ -46,6 +43,8 @@ _PRESSURE_UNITS = (
 LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
 MOST_M = 0.5                           # and none of the usual ones by this
 MOST_N = 1e5
+# Of which only the times are looked at.
+_WITHOUT_VALUES = {row.type_name for row in OF_A_RUN.values() if row.numeric is None}
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def topic_remarks(topic, info, stamp_ns, values, length_m=None):
         As of ``value_findings``.
 
     """
-    if not values and info.type_name != codecs.TOPIC_TYPES['reference_trajectory']:
+    if not values and info.type_name not in _WITHOUT_VALUES:
         return []
     remarks = _time_remarks(topic, info, stamp_ns)
     return remarks + [one.sentence for one in topic_findings(topic.name, values, length_m)]
@@ -92,8 +91,9 @@ def topic_remarks(topic, info, stamp_ns, values, length_m=None):
 
 def topic_findings(topic, values, length_m=None):
     """Return what cannot be right in the values of a topic, a list of Implausible."""
+    row = OF_A_RUN.get(short_name(topic))
     # Internals may be undefined, such as the time since the tick before the first.
-    if topic.endswith('/controller_state'):
+    if row is not None and row.internals:
         return []
     # A reference that asks for a force says nothing of a contraction.
     asks_force = topic.endswith('/reference') and 'force_n' in values
@@ -113,8 +113,9 @@ def missing_topics(namespaces):
         return ['The bag has no messages on any topic of a muscle.'], []
     remarks, notes = [], []
     for namespace, present in sorted(namespaces.items()):
-        needed = [name for name in NEEDED_TOPICS if name not in present]
-        optional = [name for name in OPTIONAL_TOPICS if name not in present]
+        needed, optional = ([name for name, row in OF_A_RUN.items()
+                             if row.need == need and name not in present]
+                            for need in (NEEDED, USED))
         if needed:
             remarks.append(
                 f'{namespace or "/"} has no messages on {", ".join(needed)}: most analyses '
@@ -126,16 +127,17 @@ def missing_topics(namespaces):
 
 def _time_remarks(topic, info, stamp_ns):
     remarks = []
-    name, short = topic.name, topic.name.rsplit('/', 1)[-1]
+    name, row = topic.name, RECORDED.get(short_name(topic.name))
+    steady = row is not None and row.steady
     if info.stamps_backward:
         remarks.append(f'{name}: the header stamp goes back {info.stamps_backward} times.')
     if info.stamps_repeated:
         remarks.append(f'{name}: {info.stamps_repeated} messages repeat a header stamp.')
-    if short in RATE_TOPICS and info.rate_hz is not None and info.rate_hz < (
+    if steady and info.rate_hz is not None and info.rate_hz < (
             RATE_TOLERANCE * MIN_RATE_HZ):
         remarks.append(
             f'{name}: {info.rate_hz:.1f} Hz is below {MIN_RATE_HZ:.0f} Hz.')
-    if info.gaps and short in RATE_TOPICS and info.max_gap_s > GAP_LIMIT_S:
+    if info.gaps and steady and info.max_gap_s > GAP_LIMIT_S:
         remarks.append(
             f'{name}: {info.gaps} gaps, the longest {1e3 * info.max_gap_s:.0f} ms at '
             f'{info.rate_hz:.0f} Hz.')
@@ -182,10 +184,16 @@ def value_findings(topic, name, column, length_m=None):
         found.append(Implausible(
             f'{topic}: {bad} values of {name} are not finite (nan or inf), {what} can be used; '
             'look for a sensor or converter that drops out.', not len(finite)))
-    check = _supply if topic.endswith('/supply_pressure') else _CHECKS.get(name)
+    short = short_name(topic)
+    check = _CHECKS.get((short, name)) or _CHECKS.get(name)
+    limits = RECORDED[short].limits.get(name) if short in RECORDED else None
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    if len(finite) and limits is not None and not limits[0] <= low <= high <= limits[1]:
+        found.append(Implausible(
+            f'{topic}: {name} from {low:.4g} to {high:.4g} leaves '
+            f'{allowed_range(*limits, name=name)}.'))
     if len(finite) and check is not None:
-        sentence, unusable = check(
-            finite, float(finite.min()), float(finite.max()), length_m or _usual_length)
+        sentence, unusable = check(finite, low, high, length_m or _usual_length)
         if sentence:
             found.append(Implausible(f'{topic}: {sentence}', unusable))
     return found
@@ -277,5 +285,6 @@ def _voltage(finite, low, high, length_m):
     return f'{low:.3g} to {high:.3g} V leaves 0 to 10 V.', False
 
 
-_CHECKS = {'pressure_pa': _pressure, 'contraction_m': _contraction, 'force_n': _force,
-           'fill_duty': _duty, 'vent_duty': _duty, 'ppr_voltage': _voltage}
+_CHECKS = {('supply_pressure', 'pressure_pa'): _supply, 'pressure_pa': _pressure,
+           'contraction_m': _contraction, 'force_n': _force, 'fill_duty': _duty,
+           'vent_duty': _duty, 'ppr_voltage': _voltage}

@@ -14,11 +14,11 @@
 
 """Topics of a bag that have other names than those of this project."""
 
-from pam_actuation.bags import codecs
+from pam_actuation.topics.table import OF_A_RUN
 from pam_sim.errors import did_you_mean, InputError
 
 # What a run can hold, by the names of this project.
-NAMES = tuple(name for name in codecs.TOPIC_TYPES if name != 'diagnostics')
+NAMES = tuple(OF_A_RUN)
 
 
 def checked(topics):
@@ -61,7 +61,7 @@ def topics_by_name(bag, wanted):
         if name not in bag.topics:
             raise InputError(f'has no topic {name}{did_you_mean(name, bag.topics)}; its topics: '
                              f'{", ".join(sorted(bag.topics)) or "none"}', bag.path)
-        topic, needed = bag.topics[name], codecs.TOPIC_TYPES[short]
+        topic, needed = bag.topics[name], OF_A_RUN[short].type_name
         if (topic.type_name, topic.encoding) != (needed, 'cdr'):
             raise InputError(f'{name} is {topic.type_name} in {topic.encoding}; `{short}` is read '
                              f'from {needed} in cdr', bag.path)

@@ -20,30 +20,13 @@ The layout is worked out once and all messages that have the same bytes in the
 deciding places are read together as columns of one array.
 """
 
-import struct
-
 import numpy as np
-from pam_actuation.bags import cdr, codecs
 from pam_actuation.bags.payloads import Payloads
-from rosbags.serde import SerdeError
+from pam_actuation.topics import cdr
+from pam_actuation.topics.codec import UNREADABLE
+from pam_actuation.topics.definitions import little_endian
+from pam_actuation.topics.table import topic_of
 
-# Value columns that a series always has, NaN where no message carries them.
-VALUES = {
-    'pressure': ('pressure_pa',),
-    'pressure_command': ('pressure_pa',),
-    'followed_pressure': ('pressure_pa',),
-    'supply_pressure': ('pressure_pa',),
-    'force': ('force_n',),
-    'external_force': ('force_n',),
-    'contraction': ('contraction_m', 'velocity_m_per_s'),
-    'reference': ('contraction_m', 'velocity_m_per_s'),
-    'valve_command': (),
-    'valve_signal': (),
-    'controller_state': (),
-}
-
-# What unreadable bytes raise; rosbags 0.11 hands on what struct and str raise.
-UNREADABLE = (cdr.CdrError, SerdeError, struct.error, ValueError)
 # Layouts of equal length that are looked for together; what is left is read one by one.
 _MAX_LAYOUTS = 8
 
@@ -55,7 +38,7 @@ def table(short, payloads, only=None):
     Parameters
     ----------
     short : str
-        Short topic name, a key of VALUES.
+        Short name of a topic that carries numbers.
     payloads : Payloads or list of bytes
         CDR bytes, N messages.
     only : collection of str, optional
@@ -72,17 +55,18 @@ def table(short, payloads, only=None):
 
     """
     payloads = _payloads(payloads)
+    content = topic_of(short).numeric
     count = len(payloads)
     stamp_ns = np.zeros(count, dtype=np.int64)
     bad = np.zeros(count, dtype=bool)
-    values = {name: np.full(count, np.nan) for name in VALUES[short]}
+    values = {name: np.full(count, np.nan) for name in content.always}
     for indices, rows in payloads.tables():
         for _ in range(_MAX_LAYOUTS):
             if len(indices):
-                indices, rows = _read_alike(short, indices, rows, stamp_ns, values, bad, only)
+                indices, rows = _read_alike(content, indices, rows, stamp_ns, values, bad, only)
         for i in range(len(indices)):
             _read_alike(
-                short, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad, only)
+                content, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad, only)
     return stamp_ns, values, bad
 
 
@@ -106,12 +90,12 @@ def _payloads(messages):
     return messages if isinstance(messages, Payloads) else Payloads(messages)
 
 
-def _read_alike(short, indices, rows, stamp_ns, values, bad, only):
+def _read_alike(content, indices, rows, stamp_ns, values, bad, only):
     """Read the messages that have the layout of the first one; return the others."""
     first = rows[0].tobytes()
     try:
-        raw = codecs.little_endian(short, first)
-        layout = codecs.value_layout(short, raw)
+        raw = little_endian(first, content.type_name)
+        layout = content.layout(raw)
     except UNREADABLE:
         bad[indices[0]] = True
         return indices[1:], rows[1:]

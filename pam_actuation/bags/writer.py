@@ -26,6 +26,7 @@ import contextlib
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
 from pam_actuation.bags.place import BagPlace
+from pam_actuation.topics.definitions import type_hash
 from pam_sim.errors import InputError
 
 # Every file holds the metadata of the experiment; a smaller limit would be full of it.
@@ -142,7 +143,7 @@ class BagWriter:
             raise InputError('give the full topic name, such as /muscle/pressure', full_name)
         profiles = [layout.qos_profile()] if qos is None else list(qos)
         self._topics[full_name] = {
-            'type': type_name, 'qos': tuple(profiles), 'hash': layout.type_hash(type_name),
+            'type': type_name, 'qos': tuple(profiles), 'hash': type_hash(type_name),
             'count': 0}
         facts = self._topics[full_name]
         self._current.register(full_name, type_name, facts['qos'], facts['hash'])

@@ -25,7 +25,6 @@ from functools import partial
 import os
 
 from pam_actuation import interrupts
-from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
@@ -39,6 +38,8 @@ from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.plant_loop import PlantLoop
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
@@ -56,9 +57,10 @@ class _Recorder:
 
     def write(self, topic, message, now_ns):
         """Write one message under its full topic name."""
-        name = '/diagnostics' if topic == 'diagnostics' else f'{self._namespace}/{topic}'
+        row = topic_of(topic)
+        name = row.full_name(self._namespace)
         if name not in self._known:
-            self._writer.add_topic(name, TOPIC_TYPES[topic])
+            self._writer.add_topic(name, row.type_name)
             self._known.add(name)
         self._writer.write(name, encode(topic, message), now_ns, now_ns)
         self.counts[name] += 1

@@ -24,12 +24,13 @@ values hold how many messages each publisher of the node has sent
 
 import re
 
-from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Status
 from pam_actuation.nodes.console import Console
-from pam_actuation.nodes.conversions import diagnostic_array
 from pam_actuation.nodes.endpoints import CountedPublisher
+from pam_actuation.nodes.ros_messages import class_of
+from pam_actuation.topics.codec import encode
 
+TOPIC, HARDWARE_ID = '/diagnostics', 'pam_actuation'
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 WORDS = {OK: 'INFO', WARN: 'WARN', ERROR: 'ERROR', STALE: 'WARN'}     # of the logger of ROS
 DIGITS = re.compile('[0-9]+')
@@ -49,7 +50,7 @@ class DiagnosticsReporter:
 
     def __init__(self, node):
         self._node = node
-        self.publisher = CountedPublisher(node, DiagnosticArray, '/diagnostics')
+        self.publisher = CountedPublisher(node, class_of(TOPIC), TOPIC)
         self.level = OK
         self.message = 'starting'
         self.values = ()
@@ -78,9 +79,9 @@ class DiagnosticsReporter:
         level, message = self.level, self.message
         if self.remark:
             level, message = max(level, WARN), f'{message}; {self.remark}'
-        self.publisher.publish(diagnostic_array(Status(
+        self.publisher.publish(encode(TOPIC, Status(
             now_ns, level, self._node.get_fully_qualified_name(), message,
-            (*self.values, *self._node.diagnostic_values(), *self._counts()))))
+            (*self.values, *self._node.diagnostic_values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)
 
     def _say(self, now_ns, level, message):

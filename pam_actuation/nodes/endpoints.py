@@ -43,12 +43,13 @@ class CountedPublisher:
     message_type : type
     topic : str
         Relative or absolute name; ``topic`` holds the resolved full name.
+    profile : rclpy.qos.QoSProfile, optional
 
     """
 
-    def __init__(self, node, message_type, topic):
+    def __init__(self, node, message_type, topic, profile=None):
         self._publisher = node.create_publisher(
-            message_type, topic, qos.PUBLISHER,
+            message_type, topic, profile or qos.PUBLISHER,
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
         self._node = node
         self.topic = self._publisher.topic_name
@@ -113,7 +114,7 @@ class PolledSubscription:
     raw : bool
         Take serialized bytes instead of message objects.
     read : callable, optional
-        Turns what was taken into what ``take`` returns, such as a ``WireReader``; what it
+        Turns what was taken into what ``take`` returns, such as a ``Reader``; what it
         turns into None is dropped.
     writers : bool
         Tell of each message who wrote it; only with ``raw``.

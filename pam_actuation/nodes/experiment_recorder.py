@@ -15,15 +15,11 @@
 """The recorder on ROS: every message of the rig, as it came, into a bag."""
 
 import contextlib
-import importlib
 import json
 import os
 import sys
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from pam_actuation.bags import layout
-from pam_actuation.bags.codecs import decode, TOPIC_TYPES
 from pam_actuation.bags.ending import ENDED_FILE
 from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ending_of
@@ -32,14 +28,17 @@ from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter, check_limits
-from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
-from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.plant_simulator import MAX_SEED
+from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.runner import run
+from pam_actuation.topics.codec import decode
+from pam_actuation.topics.definitions import schema_text, type_hash
+from pam_actuation.topics.quality import USUAL
+from pam_actuation.topics.table import RECORDED, ROOT
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
@@ -70,7 +69,7 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter(
             'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
         NodeParameter(
-            'topics', list(TOPIC_TYPES), 'Topics to record, relative to the namespace '
+            'topics', list(RECORDED), 'Topics to record, relative to the namespace '
             '(diagnostics is /diagnostics).'),
         NodeParameter(
             'extra_topics', [''], 'Further topics, each as NAME=TYPE, for instance '
@@ -108,10 +107,10 @@ class ExperimentRecorder(ManagedNode):
         """Refuse topics that are not known."""
         for name in ('topics', 'await_topics'):
             for topic in self.value(name):
-                if topic and topic not in TOPIC_TYPES:
+                if topic and topic not in RECORDED:
                     raise InputError(
                         f'{topic!r} is not a topic of the rig; known are '
-                        f'{", ".join(TOPIC_TYPES)}', f'parameter {name}')
+                        f'{", ".join(RECORDED)}', f'parameter {name}')
         check_limits(
             self.value('max_bagfile_size_bytes'), self.value('max_bagfile_duration_s'))
         self.extra = dict(parse_extra_topic(text) for text in self.value('extra_topics') if text)
@@ -119,24 +118,20 @@ class ExperimentRecorder(ManagedNode):
     def setup(self):
         """Read the metadata, subscribe."""
         self.metadata = self._metadata()
-        self.sources = {}
-        for topic in self.value('topics'):
-            if topic == 'diagnostics':
-                source = PolledSubscription(
-                    self, DiagnosticArray, '/diagnostics', qos.RECORDER, raw=True)
-                self.subscriptions_polled.append(source)
-            else:
-                source = self.add_subscription(topic, qos.RECORDER, plain=False)
-            self.sources[topic] = source
-        self.types = dict(TOPIC_TYPES)
-        for name, (type_name, message_type) in self.extra.items():
-            self.types[name] = type_name
-            source = PolledSubscription(self, message_type, name, qos.RECORDER, raw=True)
-            self.subscriptions_polled.append(source)
-            self.sources[name] = source
-        for type_name in set(self.types.values()):
-            layout.schema_text(type_name)       # looked up now, not at the first message
-            layout.type_hash(type_name)
+        self.sources, self.types = {}, {}
+        for topic in filter(None, self.value('topics')):
+            row = RECORDED[topic]
+            name = row.full_name('') if row.place == ROOT else topic
+            self._record(topic, name, row.type_name, row.service.recorder)
+        for name, type_name in self.extra.items():
+            self._record(name, name, type_name, USUAL.recorder)
+
+    def _record(self, topic, name, type_name, quality):
+        """Subscribe to a topic; definitions are looked up now, not at the first message."""
+        schema_text(type_name)
+        type_hash(type_name)
+        self.types[topic] = type_name
+        self.sources[topic] = self.subscribe(message_class(type_name), name, quality)
 
     def _metadata(self):
         path = self.value('metadata_file')
@@ -322,19 +317,19 @@ def _before(summary):
 
 
 def parse_extra_topic(text):
-    """Return name and (type name, message class) of ``NAME=TYPE``; InputError with a reason."""
+    """Return name and type of ``NAME=TYPE``; InputError with a reason."""
     where = 'parameter extra_topics'
     name, _, type_name = text.partition('=')
     parts = type_name.split('/')
     if not name or len(parts) != 3 or parts[1] != 'msg':
         raise InputError(
             f'{text!r} is not NAME=TYPE, such as /bench/imu=sensor_msgs/msg/Imu', where)
-    layout.type_hash(type_name)
+    type_hash(type_name)
     try:
-        message_type = getattr(importlib.import_module(f'{parts[0]}.msg'), parts[2])
-    except (ImportError, AttributeError):
-        raise InputError(f'the message type {type_name} is not installed', where) from None
-    return name, (type_name, message_type)
+        message_class(type_name)
+    except InputError as error:
+        raise InputError(str(error), where) from None
+    return name, type_name
 
 
 def main(args=None):

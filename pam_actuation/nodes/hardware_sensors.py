@@ -20,19 +20,14 @@ from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
 from pam_actuation.hardware.sysfs import DeviceError
-from pam_actuation.messages import Contraction
-from pam_actuation.messages import Force
-from pam_actuation.messages import Pressure
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
+from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
-
-PLAIN = {'pressure': Pressure, 'supply_pressure': Pressure, 'contraction': Contraction,
-         'force': Force}
 
 
 class HardwareSensors(ManagedNode):
@@ -91,7 +86,7 @@ class HardwareSensors(ManagedNode):
                 self.failures += 1
                 problem = problem or f'{topic} is not measured: {error}'
             else:
-                self.send(topic, PLAIN[topic](now_ns, value))
+                self.send(topic, topic_of(topic).content.message(now_ns, value))
         if problem:
             self.diagnostics.update(ERROR, problem)
         else:

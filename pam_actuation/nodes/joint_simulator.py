@@ -17,7 +17,6 @@
 from functools import partial
 import sys
 
-from pam_actuation.nodes import qos
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
@@ -59,7 +58,7 @@ class JointSimulator(PhysicsNode):
             for topic in topics:
                 self.add_publisher(f'{side}/{topic}')
             self.signals[side] = self.add_subscription(
-                f'{side}/valve_signal', qos.PHYSICS, writers=True)
+                f'{side}/valve_signal', writers=True)
 
     def tick(self):
         """Apply what arrived, run physics to the present, measure."""

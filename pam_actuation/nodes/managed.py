@@ -30,7 +30,7 @@ import traceback
 
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.conversions import type_of
+from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter
 from pam_actuation.nodes.diagnostics import ERROR
 from pam_actuation.nodes.diagnostics import OK
@@ -43,11 +43,13 @@ from pam_actuation.nodes.loops import SteadyTime
 from pam_actuation.nodes.parameters import declare
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.realtime import ask_for_realtime
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.simulated_time import FollowedTime
 from pam_actuation.nodes.simulated_time import leave_clock_to_node
 from pam_actuation.nodes.timing import LoopTiming
-from pam_actuation.nodes.wire import WireReader
-from pam_actuation.nodes.wire import WireWriter
+from pam_actuation.topics.codec import Reader
+from pam_actuation.topics.codec import Writer
+from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -196,25 +198,36 @@ class ManagedNode(LifecycleNode):
 
     def add_publisher(self, topic):
         """Create the publisher of a topic of the rig; ``send`` publishes on it."""
-        publisher = CountedPublisher(self, type_of(topic), topic)
+        publisher = CountedPublisher(
+            self, class_of(topic), topic, qos.profile(topic_of(topic).service.publisher))
         self.publishers_counted.append(publisher)
-        self._writers[topic] = (publisher, WireWriter(topic, self.value('muscle')))
+        self._writers[topic] = (publisher, Writer(topic, self.value('muscle')))
 
     def send(self, topic, plain):
         """Publish a plain message."""
         publisher, writer = self._writers[topic]
         publisher.publish(writer.fill(plain))
 
-    def add_subscription(self, topic, profile=None, plain=True, writers=False):
+    def add_subscription(self, topic, plain=True, writers=False):
         """
         Create and return a polled subscription of a topic of the rig.
 
         It gives plain messages; without ``plain`` the bytes, as they came. With ``writers`` the
         info of each tells who wrote it.
         """
+        return self.subscribe(
+            class_of(topic), topic, topic_of(topic).service.consumer,
+            Reader(topic) if plain else None, writers)
+
+    def subscribe(self, message_type, name, quality, read=None, writers=False):
+        """
+        Create and return a polled subscription of any topic, which takes bytes.
+
+        ``quality`` is that of ``topics/quality.py``; ``read``, ``writers``: as of
+        ``PolledSubscription``.
+        """
         subscription = PolledSubscription(
-            self, type_of(topic), topic, profile, raw=True,
-            read=WireReader(topic) if plain else None, writers=writers)
+            self, message_type, name, qos.profile(quality), raw=True, read=read, writers=writers)
         self.subscriptions_polled.append(subscription)
         return subscription
 

@@ -18,7 +18,6 @@ from functools import partial
 import sys
 
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
@@ -70,8 +69,8 @@ class PlantSimulator(PhysicsNode):
             self.add_publisher(topic)
         if rig.valve == 'hsv':
             self.add_publisher('supply_pressure')
-        self.signals = self.add_subscription('valve_signal', qos.PHYSICS, writers=True)
-        self.disturbances = self.add_subscription('external_force', qos.PHYSICS)
+        self.signals = self.add_subscription('valve_signal', writers=True)
+        self.disturbances = self.add_subscription('external_force')
         if self.uses_simulated_time:
             self._clock_services = [
                 self.create_service(SetBool, '~/pause', self._on_pause),

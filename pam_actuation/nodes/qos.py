@@ -13,47 +13,42 @@
 # limitations under the License.
 
 """
-Quality of service of every topic of the rig, in this one place.
+What ``topics/quality.py`` declares, as rclpy takes it.
 
-Reliable and volatile with a short history, and nothing requested that a default
-publisher would not offer (no deadline, lifespan or liveliness), so that any
-publisher or subscriber with default settings matches. Time-outs are done in the
-nodes. Each setting can be overridden at launch by the usual parameters
+Each setting can be overridden at launch by the usual parameters
 ``qos_overrides.<topic>.<publisher|subscription>.<history|depth|reliability>``.
 """
 
+import functools
+
+from pam_actuation.topics import quality
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-PUBLISHER_DEPTH = 1000    # a second of a 1 kHz topic is sent again to a receiver that was busy
-# Consumers use the newest message, but must hold all that a publisher may send again: Fast DDS
-# delivers in order, and in a shorter history the messages after a lost one left it no place. A
-# node that had been stopped then stayed behind by the whole history of the publisher for good.
-CONSUMER_DEPTH = PUBLISHER_DEPTH
-PHYSICS_DEPTH = 1000      # physics that stood still goes through all signals since, not the last
-RECORDER_DEPTH = 5000     # five seconds of a 1 kHz topic may wait for the recorder
 
-
-def reliable(depth):
-    """Return the profile of all topics of the rig with a history of ``depth`` messages."""
+@functools.lru_cache(maxsize=None)
+def profile(wanted: quality.Quality) -> QoSProfile:
+    """Return the profile of one end of a topic."""
     return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.VOLATILE)
+        history=HistoryPolicy.KEEP_LAST, depth=wanted.depth,
+        reliability=ReliabilityPolicy[wanted.reliability.upper()],
+        durability=DurabilityPolicy[wanted.durability.upper()])
 
 
-PUBLISHER = reliable(PUBLISHER_DEPTH)
-CONSUMER = reliable(CONSUMER_DEPTH)
-PHYSICS = reliable(PHYSICS_DEPTH)
-RECORDER = reliable(RECORDER_DEPTH)
-# What is said once, such as a robot description: who comes later hears it too.
-LATCHED = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL)
+def reliable(depth: int) -> QoSProfile:
+    """Return the profile of all topics of the rig with a history of ``depth`` messages."""
+    return profile(quality.Quality(depth))
 
 
-def overridable():
+PUBLISHER = profile(quality.USUAL.publisher)
+CONSUMER = profile(quality.USUAL.consumer)
+RECORDER = profile(quality.USUAL.recorder)
+LATCHED = profile(quality.LATCHED)
+
+
+def overridable() -> QoSOverridingOptions:
     """Return the option that lets history, depth and reliability be set by parameters."""
     return QoSOverridingOptions.with_default_policies()

@@ -18,8 +18,8 @@ import time
 
 from pam_actuation.drivers.senders import DriverSenders, is_safe, Senders, told, two_send
 from pam_actuation.nodes.endpoints import full_name
-from pam_actuation.nodes.wire import WireReader
 from pam_actuation.nodes.writers import gid_of
+from pam_actuation.topics.codec import Reader
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'         # as the graph has it before it hears of the node
 ASK_EVERY_NS = 20_000_000
@@ -82,7 +82,7 @@ class DriverEar:
         self.vented = False         # whether another node sent the safe signal at the last look
         self._on_graph = names.on_graph
         self._signals = node.add_subscription('valve_signal', plain=False, writers=True)
-        self._read = WireReader('valve_signal')
+        self._read = Reader('valve_signal')
         self._name_of = names
         own = gid_of(dict(node.topics_sent())['valve_signal'].rclpy_publisher)
         self._senders = DriverSenders(

@@ -24,10 +24,10 @@ import time
 
 from pam_actuation.messages import START_NS
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import set_stamp
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.ros_messages import set_stamp
 from rclpy.clock import ClockType
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import ReliabilityPolicy

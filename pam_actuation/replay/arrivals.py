@@ -26,20 +26,19 @@ import os
 from typing import Any
 
 import numpy as np
-from pam_actuation.bags import codecs, series
+from pam_actuation.bags import series
 from pam_actuation.bags.load import is_read, topics_of
 from pam_actuation.bags.source import read_bag, TopicData
 from pam_actuation.loops.bus import Bus
 from pam_actuation.messages import Message
+from pam_actuation.topics.codec import decode
+from pam_actuation.topics.table import OF_A_RUN
 from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
 from pam_sim.run import Run
 
 # At equal times: measure, want, decide, act. The simulation runs its loops in this order too.
-ORDER = (
-    'pressure', 'contraction', 'force', 'supply_pressure', 'external_force', 'reference',
-    'reference_trajectory', 'controller_state', 'pressure_command', 'valve_command',
-    'valve_signal', 'followed_pressure')
+ORDER = tuple(OF_A_RUN)
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000
@@ -60,12 +59,14 @@ class RecordedTopic:
                  path: str | os.PathLike[str]) -> None:
         self.short = short
         self._messages: list[Message] | None = None
-        if short == 'reference_trajectory':
-            self._messages = [codecs.decode(short, raw) for raw in topic.payloads]
+        numeric = OF_A_RUN[short].numeric
+        if numeric is None:
+            self._messages = [decode(short, raw) for raw in topic.payloads]
             self._columns = {}
             stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
         else:
             stamp_ns, self._columns, bad = series.table(short, topic.payloads, ONLY.get(short))
+            self._make = numeric.maker(tuple(self._columns))
             if bad.any():
                 raise InputError(
                     f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}',
@@ -93,10 +94,9 @@ class RecordedTopic:
             if self._messages is not None:
                 yield from (self._messages[i] for i in places.tolist())
                 continue
-            names = tuple(self._columns)
-            columns = [self._columns[name][places].tolist() for name in names]
+            columns = [column[places].tolist() for column in self._columns.values()]
             for stamp_ns, *values in zip(self._stamp_ns[places].tolist(), *columns):
-                yield codecs.from_values(self.short, stamp_ns, dict(zip(names, values)))
+                yield self._make(stamp_ns, values)
 
     def play(self, bus: Bus, tick: Callable[[Any, int], object]) -> None:
         """Have a bus call ``tick(message, now_ns)`` when a message arrived."""

@@ -27,17 +27,17 @@ import tempfile
 
 import numpy as np
 
-from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import next_experiment
-from pam_actuation.messages import Contraction, Force, Pressure
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import topic_of
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, whole_files, write_text
@@ -48,7 +48,6 @@ from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
-MESSAGE = {'pressure': Pressure, 'contraction': Contraction, 'force': Force}
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
@@ -150,9 +149,10 @@ def write_compare(result, namespace, path):
     with tempfile.TemporaryDirectory(dir=path.parent, prefix='.compare') as folder:
         with BagWriter(Path(folder) / 'compare', {'verdict': result.verdict}) as bag:
             for topic, signal in sorted({(row[1], row[2]) for row in rows}):
-                bag.add_topic(topic, TOPIC_TYPES[signal])
+                bag.add_topic(topic, topic_of(signal).type_name)
             for stamp, topic, signal, value in rows:
-                bag.write(topic, encode(signal, MESSAGE[signal](stamp, value)), stamp, stamp)
+                message = topic_of(signal).content.message(stamp, value)
+                bag.write(topic, encode(signal, message), stamp, stamp)
         os.replace(bag.file, path)
 
 

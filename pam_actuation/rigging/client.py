@@ -22,6 +22,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.transport import prepare_middleware, RANGE
+from pam_actuation.topics.codec import Reader
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -79,17 +80,17 @@ class RigClient:
         self._clients = {}
         self.statuses = {}
         self.changes = []
+        self._read = Reader('diagnostics')
         self.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.reliable(1000))
+            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.CONSUMER, raw=True)
 
-    def _on_diagnostics(self, message):
-        for status in message.status:
-            level = status.level[0]
-            values = {item.key: item.value for item in status.values}
+    def _on_diagnostics(self, raw):
+        for status in self._read(raw) or ():
             known = self.statuses.get(status.name)
-            if known is None or known[:2] != (level, status.message):
-                self.changes.append((time.monotonic(), status.name, level, status.message))
-            self.statuses[status.name] = (level, status.message, values)
+            if known is None or known[:2] != (status.level, status.message):
+                self.changes.append(
+                    (time.monotonic(), status.name, status.level, status.message))
+            self.statuses[status.name] = (status.level, status.message, dict(status.values))
 
     def spin(self, duration_s):
         """Handle messages for a while."""

@@ -17,8 +17,9 @@
 import math
 
 from pam_actuation import messages
-from pam_actuation.bags.codecs import encode, TOPIC_TYPES
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import RECORDED
 
 START_NS = 1_790_000_000_123_456_789
 STEP_NS = 5_000_000
@@ -58,7 +59,7 @@ def example_messages(i=0, valve='ppr'):
 
 def full_name(short, namespace='/muscle'):
     """Return the full topic name."""
-    return '/diagnostics' if short == 'diagnostics' else f'{namespace}/{short}'
+    return RECORDED[short].full_name(namespace)
 
 
 def write_bag(directory, count=50, namespaces=('/muscle',), leave_out=(), valve='ppr',
@@ -70,9 +71,9 @@ def write_bag(directory, count=50, namespaces=('/muscle',), leave_out=(), valve=
     """
     with BagWriter(directory, metadata) as writer:
         for namespace in namespaces:
-            for short, type_name in TOPIC_TYPES.items():
+            for short, topic in RECORDED.items():
                 if short not in leave_out:
-                    writer.add_topic(full_name(short, namespace), type_name)
+                    writer.add_topic(topic.full_name(namespace), topic.type_name)
         for i in range(count):
             for namespace in namespaces:
                 for short, message in example_messages(i, valve).items():

@@ -15,7 +15,8 @@
 """Bags in the forms that other writers choose, for tests of reading."""
 
 from mcap.writer import CompressionType, Writer
-from pam_actuation.bags import codecs, layout
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED
 from rosbags.rosbag2 import CompressionFormat
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from sample_bag import example_messages, full_name, START_NS, STEP_NS
@@ -37,13 +38,13 @@ def write_mcap(directory, count, compression='', namespace='/muscle', **options)
         for i in range(count):
             for short, message in example_messages(i).items():
                 if short not in channels:
-                    type_name = codecs.TOPIC_TYPES[short]
+                    type_name = RECORDED[short].type_name
                     schema = writer.register_schema(
-                        type_name, 'ros2msg', layout.schema_text(type_name).encode())
+                        type_name, 'ros2msg', definitions.schema_text(type_name).encode())
                     channels[short] = writer.register_channel(
                         full_name(short, namespace), 'cdr', schema)
                 writer.add_message(
-                    channels[short], START_NS + i * STEP_NS, codecs.encode(short, message), 0)
+                    channels[short], START_NS + i * STEP_NS, codec.encode(short, message), 0)
         writer.finish()
     return directory
 
@@ -61,7 +62,7 @@ def write_with_rosbags(directory, count, plugin, compression=None, namespaces=('
                     name = full_name(short, namespace)
                     if name not in connections:
                         connections[name] = writer.add_connection(
-                            name, codecs.TOPIC_TYPES[short], typestore=layout.typestore())
+                            name, RECORDED[short].type_name, typestore=definitions.typestore())
                     writer.write(
-                        connections[name], START_NS + i * STEP_NS, codecs.encode(short, message))
+                        connections[name], START_NS + i * STEP_NS, codec.encode(short, message))
     return directory

@@ -21,10 +21,11 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import cdr, codecs, mcap_scan, series
-from pam_actuation.bags.layout import typestore
+from pam_actuation.bags import mcap_scan, series
 from pam_actuation.bags.payloads import Payloads
 from pam_actuation.bags.record_walk import walk_messages
+from pam_actuation.topics import cdr, codec
+from pam_actuation.topics.definitions import typestore
 import pytest
 
 
@@ -86,7 +87,7 @@ def different_layouts():
 
 def test_layouts_that_differ_are_read_one_by_one():
     sample = different_layouts()
-    raws = [codecs.encode('controller_state', one) for one in sample]
+    raws = [codec.encode('controller_state', one) for one in sample]
     assert len(set(map(len, raws))) == 1
     raws[7] = raws[7][:4] + bytes(len(raws[7]) - 4)
     raws[11:150:7] = [
@@ -103,8 +104,8 @@ def test_layouts_that_differ_are_read_one_by_one():
 
 
 def test_stamps_of_any_stamped_message():
-    raws = [codecs.encode('pressure', messages.Pressure(i * 10**9 + 5, 1.0)) for i in range(5)]
-    raws.append(codecs.encode('contraction', messages.Contraction(7, 1.0, 2.0)))
+    raws = [codec.encode('pressure', messages.Pressure(i * 10**9 + 5, 1.0)) for i in range(5)]
+    raws.append(codec.encode('contraction', messages.Contraction(7, 1.0, 2.0)))
     assert list(series.stamps(raws)) == [*(i * 10**9 + 5 for i in range(5)), 7]
     for bad in (b'', raws[0][:11], b'\x00\x00' + raws[0][2:]):
         with pytest.raises(cdr.CdrError):

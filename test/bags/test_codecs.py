@@ -18,31 +18,33 @@ import math
 
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import codecs, series
-from pam_actuation.bags.layout import typestore
+from pam_actuation.bags import series
+from pam_actuation.topics import codec
+from pam_actuation.topics.definitions import typestore
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import example_messages
 
 NAN = math.nan
-ALL = list(codecs.TOPIC_TYPES)
+ALL = list(RECORDED)
 
 
 def rosbags_decode(short, raw):
-    return typestore().deserialize_cdr(raw, codecs.TOPIC_TYPES[short])
+    return typestore().deserialize_cdr(raw, RECORDED[short].type_name)
 
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 @pytest.mark.parametrize('short', ALL)
 def test_every_topic_comes_back_equal(short, valve):
     message = example_messages(3, valve)[short]
-    assert codecs.decode(f'/left_knee/flexor/{short}', codecs.encode(short, message)) == message
+    assert codec.decode(f'/left_knee/flexor/{short}', codec.encode(short, message)) == message
 
 
 @pytest.mark.parametrize('short', ALL)
 def test_bytes_are_those_of_the_reference_encoder(short):
-    raw = codecs.encode(short, example_messages(5, 'hsv')[short])
-    type_name = codecs.TOPIC_TYPES[short]
+    raw = codec.encode(short, example_messages(5, 'hsv')[short])
+    type_name = RECORDED[short].type_name
     again = typestore().serialize_cdr(rosbags_decode(short, raw), type_name)
     assert raw == bytes(again)
 
@@ -54,41 +56,41 @@ def test_joint_states_of_any_names_are_aligned_as_the_reference_encoder_does(nam
     for short, message in (
             ('controller_state', messages.ControllerState(-1, names, values)),
             ('valve_signal', messages.ValveSignal(10**18 + 1, names, values))):
-        raw = codecs.encode(short, message)
+        raw = codec.encode(short, message)
         wire = rosbags_decode(short, raw)
         assert tuple(wire.name) == names
-        assert raw == bytes(typestore().serialize_cdr(wire, codecs.TOPIC_TYPES[short]))
-        assert codecs.decode(short, raw) == message
+        assert raw == bytes(typestore().serialize_cdr(wire, RECORDED[short].type_name))
+        assert codec.decode(short, raw) == message
 
 
 def test_wire_fields_are_the_documented_ones():
     sample = example_messages(1, 'hsv')
     contraction = rosbags_decode(
-        'contraction', codecs.encode('contraction', sample['contraction']))
+        'contraction', codec.encode('contraction', sample['contraction']))
     assert contraction.name == ['muscle'] and contraction.header.frame_id == ''
     assert contraction.position[0] == sample['contraction'].contraction_m
     assert contraction.velocity[0] == 0.002 and len(contraction.effort) == 0
-    signal = rosbags_decode('valve_signal', codecs.encode('valve_signal', sample['valve_signal']))
+    signal = rosbags_decode('valve_signal', codec.encode('valve_signal', sample['valve_signal']))
     assert signal.name == ['fill_duty', 'vent_duty'] and len(signal.position) == 0
     assert tuple(signal.effort) == sample['valve_signal'].efforts
     state = rosbags_decode(
-        'controller_state', codecs.encode('controller_state', sample['controller_state']))
+        'controller_state', codec.encode('controller_state', sample['controller_state']))
     assert tuple(state.position) == (1.0, 1e-4, 1.0)
-    force = rosbags_decode('force', codecs.encode('force', sample['force']))
+    force = rosbags_decode('force', codec.encode('force', sample['force']))
     assert force.wrench.force.x == sample['force'].force_n and force.wrench.torque.z == 0.0
-    pressure = rosbags_decode('pressure', codecs.encode('pressure', sample['pressure']))
+    pressure = rosbags_decode('pressure', codec.encode('pressure', sample['pressure']))
     assert pressure.fluid_pressure == sample['pressure'].pressure_pa and pressure.variance == 0.0
     path = rosbags_decode(
         'reference_trajectory',
-        codecs.encode('reference_trajectory', sample['reference_trajectory']))
+        codec.encode('reference_trajectory', sample['reference_trajectory']))
     assert path.joint_names == ['muscle']
     assert (path.points[2].time_from_start.sec, path.points[2].time_from_start.nanosec) == (1, 1)
 
 
 def test_unmeasured_velocity_is_an_empty_field():
-    raw = codecs.encode('contraction', messages.Contraction(5, 0.01))
+    raw = codec.encode('contraction', messages.Contraction(5, 0.01))
     assert len(rosbags_decode('contraction', raw).velocity) == 0
-    back = codecs.decode('contraction', raw)
+    back = codec.decode('contraction', raw)
     assert back.contraction_m == 0.01 and math.isnan(back.velocity_m_per_s)
 
 
@@ -107,52 +109,52 @@ def test_messages_of_others_are_read(frame_id, little_endian):
     wire = joint_state(['knee'], [0.02, 9.0], [0.5, 9.0], [1.0], frame_id)
     raw = bytes(typestore().serialize_cdr(
         wire, 'sensor_msgs/msg/JointState', little_endian=little_endian))
-    assert codecs.decode('contraction', raw) == messages.Contraction(12_000_000_034, 0.02, 0.5)
+    assert codec.decode('contraction', raw) == messages.Contraction(12_000_000_034, 0.02, 0.5)
 
 
 @pytest.mark.parametrize('short', ALL)
 def test_bytes_behind_a_message_do_not_matter(short):
     message = example_messages(3)[short]
-    raw = codecs.encode(short, message)
+    raw = codec.encode(short, message)
     for behind in (b'\x00', b'\xff\xfe\xfd\xfc', b'0123456789'):
-        assert codecs.decode(short, raw + behind) == message
+        assert codec.decode(short, raw + behind) == message
 
 
 def test_entries_that_a_message_leaves_out_are_not_numbers():
     raw = bytes(typestore().serialize_cdr(
         joint_state(['vent_duty', 'fill_duty'], effort=[0.5]), 'sensor_msgs/msg/JointState'))
-    signal = codecs.decode('valve_signal', raw)
+    signal = codec.decode('valve_signal', raw)
     assert signal.names == ('vent_duty', 'fill_duty')
     assert signal.efforts[0] == 0.5 and math.isnan(signal.efforts[1])
     raw = bytes(typestore().serialize_cdr(joint_state([]), 'sensor_msgs/msg/JointState'))
-    assert math.isnan(codecs.decode('contraction', raw).contraction_m)
+    assert math.isnan(codec.decode('contraction', raw).contraction_m)
 
 
 @pytest.mark.parametrize('short', ALL)
 def test_bytes_cut_short_are_refused_with_the_topic(short):
-    raw = codecs.encode(short, example_messages()[short])
+    raw = codec.encode(short, example_messages()[short])
     for size in (0, 3, 4, 11, len(raw) - 5):
         with pytest.raises(InputError, match=f'/muscle/{short}: .* bytes are not a '):
-            codecs.decode(f'/muscle/{short}', raw[:size])
+            codec.decode(f'/muscle/{short}', raw[:size])
 
 
 def test_unknown_topic_is_refused():
     with pytest.raises(InputError, match='/muscle/temperature'):
-        codecs.encode('/muscle/temperature', None)
+        codec.encode('/muscle/temperature', None)
 
 
-@pytest.mark.parametrize('short', [name for name in ALL if name in series.VALUES])
+@pytest.mark.parametrize('short', [name for name in ALL if RECORDED[name].numeric])
 def test_tables_hold_what_single_messages_hold(short):
     sample = [example_messages(i, 'hsv')[short] for i in range(20)]
-    payloads = [codecs.encode(short, message) for message in sample]
+    payloads = [codec.encode(short, message) for message in sample]
     payloads[4] = payloads[4][:-9]
     payloads[7] = bytes(typestore().serialize_cdr(
-        rosbags_decode(short, payloads[7]), codecs.TOPIC_TYPES[short], little_endian=False))
+        rosbags_decode(short, payloads[7]), RECORDED[short].type_name, little_endian=False))
     stamp_ns, values, bad = series.table(short, payloads)
     assert list(np.flatnonzero(bad)) == [4]
     for i in np.flatnonzero(~bad):
         assert stamp_ns[i] == sample[i].stamp_ns
-        single = codecs.decode(short, payloads[i])
+        single = codec.decode(short, payloads[i])
         numbers = dict(zip(single.names, getattr(single, 'efforts', None) or single.values)) \
             if hasattr(single, 'names') else {name: getattr(single, name) for name in values}
         assert {name: column[i] for name, column in values.items()} == numbers
@@ -164,7 +166,7 @@ def test_tables_accept_layouts_that_change_from_message_to_message():
         messages.ControllerState(2, ('b', 'a'), (3.0, 4.0)),
         messages.ControllerState(3, ('a', 'c', 'd'), (5.0, 6.0, 7.0))]
     stamp_ns, values, bad = series.table(
-        'controller_state', [codecs.encode('controller_state', state) for state in states])
+        'controller_state', [codec.encode('controller_state', state) for state in states])
     assert list(stamp_ns) == [1, 2, 3] and not bad.any()
     np.testing.assert_array_equal(values['a'], [1.0, 4.0, 5.0])
     np.testing.assert_array_equal(values['b'], [2.0, 3.0, NAN])
@@ -172,7 +174,7 @@ def test_tables_accept_layouts_that_change_from_message_to_message():
 
 
 def test_alignment_bytes_of_any_content_do_not_matter():
-    raws = [bytearray(codecs.encode('pressure', messages.Pressure(i, 1e5 + i))) for i in range(3)]
+    raws = [bytearray(codec.encode('pressure', messages.Pressure(i, 1e5 + i))) for i in range(3)]
     # Bytes 17 to 19 only align the first number; some middlewares leave them unset.
     raws[1][17:20] = b'\xaa\xbb\xcc'
     _, values, _ = series.table('pressure', [bytes(raw) for raw in raws])

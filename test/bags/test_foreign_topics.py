@@ -17,9 +17,10 @@
 import tracemalloc
 
 import numpy as np
-from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.load import is_read, load_run
 from pam_actuation.bags.source import read_bag
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
@@ -32,7 +33,7 @@ IMAGE_BYTES, COUNT = 200_000, 150        # 30 MB that no run needs
 def bag(request, tmp_path_factory):
     """Return a bag with the topics of the rig, images, and a text where a pressure could be."""
     directory = tmp_path_factory.mktemp('foreign') / request.param.name
-    store = layout.typestore()
+    store = definitions.typestore()
     random = np.random.default_rng(2)
     image = store.types['std_msgs/msg/String'](
         data=random.integers(65, 90, IMAGE_BYTES).astype(np.uint8).tobytes().decode())
@@ -43,8 +44,8 @@ def bag(request, tmp_path_factory):
             for short, message in example_messages(i).items():
                 if short not in connections:
                     connections[short] = writer.add_connection(
-                        full_name(short), codecs.TOPIC_TYPES[short], typestore=store)
-                writer.write(connections[short], time_ns, codecs.encode(short, message))
+                        full_name(short), RECORDED[short].type_name, typestore=store)
+                writer.write(connections[short], time_ns, codec.encode(short, message))
             for name in ('/camera/text', '/other/pressure'):
                 if name not in connections:
                     connections[name] = writer.add_connection(

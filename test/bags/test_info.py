@@ -18,11 +18,12 @@ import json
 
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import codecs
 from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.metadata import experiment_metadata, UNITS
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics import codec
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
@@ -37,7 +38,7 @@ def said(info, *words):
 def test_good_bag(tmp_path):
     info = bag_info(write_bag(tmp_path / 'run', COUNT))
     assert info.remarks == [] and info.notes == [] and not info.has_findings
-    assert info.message_count == COUNT * len(codecs.TOPIC_TYPES)
+    assert info.message_count == COUNT * len(RECORDED)
     assert info.namespaces == ['/muscle'] and info.metadata == METADATA
     assert info.duration_s == pytest.approx((COUNT - 1) * 0.005)
     pressure = info.topic('/muscle/pressure')
@@ -91,8 +92,8 @@ def test_loss_of_a_node_that_died_before_its_last_report(tmp_path):
 
 def test_recorder_counts_reach_the_info(tmp_path):
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
-    for short, type_name in codecs.TOPIC_TYPES.items():
-        core.add_topic(full_name(short), type_name)
+    for short, topic in RECORDED.items():
+        core.add_topic(full_name(short), topic.type_name)
     for i in range(20):
         for short, message in example_messages(i).items():
             if short == 'diagnostics':
@@ -103,7 +104,7 @@ def test_recorder_counts_reach_the_info(tmp_path):
             skip = 3 if short == 'force' and i > 10 else 0
             received_ns = START_NS + i * STEP_NS
             core.receive(
-                full_name(short), codecs.encode(short, message), received_ns - 1000,
+                full_name(short), codec.encode(short, message), received_ns - 1000,
                 received_ns, i + 1 + skip)
     core.close()
     info = bag_info(tmp_path / 'run')
@@ -123,7 +124,7 @@ def test_recorder_and_info_count_the_same_losses(tmp_path, unknown_send_times):
         core = RecorderCore(BagWriter(tmp_path / f'run_{k}', METADATA))
         topics = ('pressure', 'contraction', 'force')
         for short in (*topics, 'diagnostics'):
-            core.add_topic(full_name(short), codecs.TOPIC_TYPES[short])
+            core.add_topic(full_name(short), RECORDED[short].type_name)
         dies_at, numbered = int(random.integers(20, 60)), bool(k % 2)
         for i in range(60):
             now_ns = START_NS + i * STEP_NS
@@ -132,14 +133,14 @@ def test_recorder_and_info_count_the_same_losses(tmp_path, unknown_send_times):
                 if random.random() < 0.1 or (short == 'force' and i > dies_at + 5):
                     continue
                 core.receive(
-                    full_name(short), codecs.encode(short, messages_now[short]),
+                    full_name(short), codec.encode(short, messages_now[short]),
                     0 if unknown_send_times else now_ns - 1000, now_ns,
                     i + 1 if numbered and short != 'contraction' else 0)
             for node, sent in (('plant', topics[:2]), ('cell', topics[2:])):
                 if i % 10 == 9 and (node == 'plant' or i <= dies_at):
                     counts = tuple((f'published.{full_name(s)}', str(i + 1)) for s in sent)
                     status = messages.Status(now_ns, 0, f'/muscle/{node}', 'ok', counts)
-                    core.receive(full_name('diagnostics'), codecs.encode(
+                    core.receive(full_name('diagnostics'), codec.encode(
                         'diagnostics', [status]), now_ns, now_ns + 5)
         summary, info = core.close(), bag_info(tmp_path / f'run_{k}')
         assert summary.lost == info.lost > 0
@@ -152,12 +153,12 @@ def test_recorder_and_info_count_the_same_losses(tmp_path, unknown_send_times):
 def test_messages_before_the_recorder_are_told_from_losses(tmp_path):
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
     for short in ('valve_signal', 'diagnostics'):
-        core.add_topic(full_name(short), codecs.TOPIC_TYPES[short])
+        core.add_topic(full_name(short), RECORDED[short].type_name)
     for i in range(6, 20):
         for short in ('valve_signal', 'diagnostics'):
             received_ns = START_NS + i * STEP_NS
             core.receive(
-                full_name(short), codecs.encode(short, example_messages(i)[short]),
+                full_name(short), codec.encode(short, example_messages(i)[short]),
                 received_ns - 1000, received_ns, i + 1)
     core.close()
     info = bag_info(tmp_path / 'run')
@@ -170,13 +171,13 @@ def test_messages_before_the_recorder_are_told_from_losses(tmp_path):
 def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
     name = '/diagnostics'
-    core.add_topic(name, codecs.TOPIC_TYPES['diagnostics'])
+    core.add_topic(name, RECORDED['diagnostics'].type_name)
     for i in range(10):
         for node, missing in (('driver', (0, 1, 2)), ('plant', (5,))):
             if i not in missing:
                 status = messages.Status(
                     START_NS + i, 0, f'/muscle/{node}', 'ok', ((f'published.{name}', str(i + 1)),))
-                core.receive(name, codecs.encode('diagnostics', [status]),
+                core.receive(name, codec.encode('diagnostics', [status]),
                              START_NS + i, START_NS + i + 5)
     summary, info = core.close(), bag_info(tmp_path / 'run').topic(name)
     for counts in (summary.counts[name], info):

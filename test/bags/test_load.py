@@ -20,9 +20,10 @@ import shutil
 import mcap_ros2.writer
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 from pam_sim.run import Run
 import pytest
@@ -138,7 +139,7 @@ def test_bags_of_the_mcap_library(tmp_path, type_name):
     with open(path, 'wb') as stream:
         writer = mcap_ros2.writer.Writer(stream)
         schema = writer.register_msgdef(
-            type_name, layout.schema_text('sensor_msgs/msg/JointState'))
+            type_name, definitions.schema_text('sensor_msgs/msg/JointState'))
         for i in range(COUNT):
             writer.write_message('/contraction', schema, {
                 'header': {'stamp': {'sec': i, 'nanosec': 5}, 'frame_id': 'rig'},
@@ -184,8 +185,8 @@ def test_namespaces_that_are_no_muscle_do_not_disturb(tmp_path):
                 ('/image', 'sensor_msgs/msg/Image')):
             writer.add_topic(name, type_name)
             short = name.rsplit('/', 1)[-1]
-            if short in codecs.TOPIC_TYPES:
-                raw = codecs.encode(short, example_messages()[short])
+            if short in RECORDED:
+                raw = codec.encode(short, example_messages()[short])
                 writer.write(name, raw, START_NS, START_NS)
     run = load_run(tmp_path / 'run')
     assert run.namespace == '/muscle' and set(run.topics) == {'pressure', 'contraction'}
@@ -203,7 +204,7 @@ def test_stamps_out_of_order_are_sorted_stably_and_said(tmp_path):
     with BagWriter(tmp_path / 'run', {}) as writer:
         writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
         for i, stamp in enumerate(stamps):
-            raw = codecs.encode('pressure', messages.Pressure(stamp, 2e5 + i))
+            raw = codec.encode('pressure', messages.Pressure(stamp, 2e5 + i))
             writer.write('/muscle/pressure', raw, START_NS + i, START_NS + i)
     run = load_run(tmp_path / 'run')
     one = run.topics['pressure']
@@ -249,7 +250,7 @@ def test_undecodable_messages_are_left_out(tmp_path, monkeypatch):
     with BagWriter(tmp_path / 'run', {}) as writer:
         writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
         for i in range(5):
-            raw = codecs.encode('pressure', messages.Pressure(START_NS + i, 2e5))
+            raw = codec.encode('pressure', messages.Pressure(START_NS + i, 2e5))
             raw = raw[:12] if i == 2 else raw
             writer.write('/muscle/pressure', raw, START_NS + i, START_NS + i)
     run = load_run(tmp_path / 'run')
@@ -295,7 +296,7 @@ def test_recording_that_ended_early(tmp_path):
         complete.topics['pressure'].values['pressure_pa'][:count])
     assert any('ended early' in remark for remark in run.remarks)
     path.write_bytes(data[:-1])
-    with pytest.raises(InputError, match=f'{2000 * len(codecs.TOPIC_TYPES)} messages'):
+    with pytest.raises(InputError, match=f'{2000 * len(RECORDED)} messages'):
         load_run(path)
 
 

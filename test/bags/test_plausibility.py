@@ -17,7 +17,6 @@
 import json
 
 import numpy as np
-from pam_actuation.bags import codecs
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.plausibility import value_findings
@@ -27,6 +26,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.topics import codec
 from pam_sim import load_rig
 from pam_sim.gap.data.health import check_health
 from pam_sim.units import P_ATM_PA
@@ -106,8 +106,8 @@ def converted(source, target, change):
             for payload, log_ns, sent_ns in zip(
                     topic.payloads, topic.log_time_ns.tolist(), topic.publish_time_ns.tolist()):
                 if short in ('pressure', 'contraction'):
-                    message = codecs.decode(short, payload)
-                    payload = codecs.encode(short, change(short, message))
+                    message = codec.decode(short, payload)
+                    payload = codec.encode(short, change(short, message))
                 writer.write(name, payload, log_ns, sent_ns)
     return str(target)
 

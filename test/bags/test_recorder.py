@@ -19,7 +19,6 @@ import io
 import threading
 import time
 
-from pam_actuation.bags import codecs
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
@@ -27,6 +26,8 @@ from pam_actuation.bags.mcap_scan import scan
 from pam_actuation.bags.recorder import RecorderCore, SequenceCheck
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics import codec
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import example_messages, METADATA, START_NS
@@ -35,7 +36,7 @@ TOPIC = '/muscle/pressure'
 
 
 def payload(i):
-    return codecs.encode('pressure', example_messages(i)['pressure'])
+    return codec.encode('pressure', example_messages(i)['pressure'])
 
 
 class HeldWriter(BagWriter):
@@ -65,7 +66,7 @@ class FullDiskWriter(BagWriter):
 
 def recorder_on(writer, **options):
     core = RecorderCore(writer, **options)
-    core.add_topic(TOPIC, codecs.TOPIC_TYPES['pressure'])
+    core.add_topic(TOPIC, RECORDED['pressure'].type_name)
     return core
 
 
@@ -90,7 +91,7 @@ def test_several_threads_may_hand_over(tmp_path):
     core = recorder_on(BagWriter(tmp_path / 'run', METADATA))
 
     def send(name):
-        core.add_topic(name, codecs.TOPIC_TYPES['pressure'])
+        core.add_topic(name, RECORDED['pressure'].type_name)
         for i in range(500):
             core.receive(name, payload(i), START_NS + i, START_NS + i, sequence=i + 1)
 
@@ -173,8 +174,8 @@ def test_gaps_are_lost_messages(tmp_path):
 
 def test_diagnostics_have_no_sequence_check(tmp_path):
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
-    core.add_topic('/diagnostics', codecs.TOPIC_TYPES['diagnostics'])
-    raw = codecs.encode('diagnostics', example_messages()['diagnostics'])
+    core.add_topic('/diagnostics', RECORDED['diagnostics'].type_name)
+    raw = codec.encode('diagnostics', example_messages()['diagnostics'])
     for sequence in (1, 1, 9, 2, 5):
         core.receive('/diagnostics', raw, START_NS, START_NS, sequence)
     summary = core.close()

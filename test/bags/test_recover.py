@@ -20,19 +20,19 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from pam_actuation.bags import disk, recover
 from pam_actuation.bags.check import independent_readers
-from pam_actuation.bags.codecs import TOPIC_TYPES
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.recover import recover_bag
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import example_messages, METADATA, START_NS, write_bag
 import yaml
 
 COUNT = 300
-TOPICS = len(TOPIC_TYPES)
+TOPICS = len(RECORDED)
 
 
 @pytest.fixture(scope='module')
@@ -195,7 +195,7 @@ def test_a_split_recording_is_repaired_from_all_its_files(tmp_path):
 
 
 def example_payload():
-    from pam_actuation.bags.codecs import encode
+    from pam_actuation.topics.codec import encode
     return encode('pressure', example_messages()['pressure'])
 
 

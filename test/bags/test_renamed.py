@@ -15,8 +15,9 @@
 """Topics of a bag under names of its own: taken where they are named, refused in a sentence."""
 
 import numpy as np
-from pam_actuation.bags import codecs, layout
 from pam_actuation.bags.load import load_run
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.rosbag2 import StoragePlugin
@@ -31,21 +32,21 @@ COUNT = 20
 def bag(request, tmp_path_factory):
     """Return a bag with three topics under other names, a text, and a driver's signal."""
     directory = tmp_path_factory.mktemp('renamed') / request.param.name
-    store = layout.typestore()
+    store = definitions.typestore()
     text = bytes(store.serialize_cdr(
         store.types['std_msgs/msg/String'](data='hello'), 'std_msgs/msg/String'))
     names = {**OTHER, 'valve_signal': '/muscle/valve_signal'}
     with RosbagsWriter(directory, version=9, storage_plugin=request.param) as writer:
-        connections = {short: writer.add_connection(name, codecs.TOPIC_TYPES[short],
+        connections = {short: writer.add_connection(name, RECORDED[short].type_name,
                                                     typestore=store)
                        for short, name in names.items()}
         note = writer.add_connection('/robot/note', 'std_msgs/msg/String', typestore=store)
-        writer.add_connection('/robot/empty', codecs.TOPIC_TYPES['force'], typestore=store)
+        writer.add_connection('/robot/empty', RECORDED['force'].type_name, typestore=store)
         for i in range(COUNT):
             messages = example_messages(i)
             for short, connection in connections.items():
                 writer.write(connection, START_NS + i * STEP_NS,
-                             codecs.encode(short, messages[short]))
+                             codec.encode(short, messages[short]))
             writer.write(note, START_NS + i * STEP_NS, text)
     return directory
 

@@ -19,10 +19,12 @@ import tracemalloc
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from pam_actuation.bags import codecs, layout
+from pam_actuation.bags import layout
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.highlevel import AnyReader
@@ -43,7 +45,7 @@ def test_rosbags_reads_every_message(bag):
     for opened in (bag, bag / 'run_0.mcap'):
         with AnyReader([Path(opened)]) as reader:
             topics = {connection.topic for connection in reader.connections}
-            assert topics == {full_name(short) for short in codecs.TOPIC_TYPES}
+            assert topics == {full_name(short) for short in RECORDED}
             decoded = 0
             for connection, log_time_ns, raw in reader.messages():
                 message = reader.deserialize(raw, connection.msgtype)
@@ -51,7 +53,7 @@ def test_rosbags_reads_every_message(bag):
                 stamp_ns = stamp.sec * 10**9 + stamp.nanosec
                 assert log_time_ns == stamp_ns + 400_000
                 decoded += 1
-            assert decoded == reader.message_count == COUNT * len(codecs.TOPIC_TYPES)
+            assert decoded == reader.message_count == COUNT * len(RECORDED)
 
 
 def test_rosbags_sees_the_metadata_file(bag):
@@ -62,7 +64,7 @@ def test_rosbags_sees_the_metadata_file(bag):
         for connection in reader.connections:
             profile, = connection.ext.offered_qos_profiles
             assert (profile.history.name, profile.reliability.name) == ('KEEP_LAST', 'RELIABLE')
-            assert connection.digest == layout.type_hash(connection.msgtype)
+            assert connection.digest == definitions.type_hash(connection.msgtype)
 
 
 def test_mcap_ros2_decodes_with_the_embedded_definitions(bag):
@@ -73,7 +75,7 @@ def test_mcap_ros2_decodes_with_the_embedded_definitions(bag):
         for _, channel, message, decoded in reader.iter_decoded_messages():
             seen.setdefault(channel.topic, []).append((message, decoded))
     assert {topic: len(found) for topic, found in seen.items()} == {
-        full_name(short): COUNT for short in codecs.TOPIC_TYPES}
+        full_name(short): COUNT for short in RECORDED}
     message, pressure = seen['/muscle/pressure'][0]
     assert pressure.fluid_pressure == sample['pressure'].pressure_pa
     assert message.log_time - message.publish_time == 300_000 and message.sequence == 0
@@ -92,10 +94,10 @@ def test_file_is_laid_out_as_jazzy_does(bag):
         for channel in summary.channels.values():
             schema = summary.schemas[channel.schema_id]
             assert channel.message_encoding == 'cdr'
-            assert channel.metadata['topic_type_hash'] == layout.type_hash(schema.name)
+            assert channel.metadata['topic_type_hash'] == definitions.type_hash(schema.name)
             profile, = yaml.safe_load(channel.metadata['offered_qos_profiles'])
             assert profile['durability'] == 'volatile'
-        assert sum(1 for _ in reader.iter_messages()) == COUNT * len(codecs.TOPIC_TYPES)
+        assert sum(1 for _ in reader.iter_messages()) == COUNT * len(RECORDED)
         records = [(record.name, record.metadata) for record in reader.iter_metadata()]
     assert [name for name, _ in records] == ['rosbag2', 'pam_experiment', 'rosbag2']
     assert records[1][1] == METADATA
@@ -131,13 +133,13 @@ def test_metadata_file_is_version_9(bag):
 
 def test_known_type_hashes():
     # As `ros2 topic info --verbose` prints them on Jazzy.
-    assert layout.type_hash('sensor_msgs/msg/JointState') == (
+    assert definitions.type_hash('sensor_msgs/msg/JointState') == (
         'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e')
 
 
 def test_bag_without_messages_opens(tmp_path):
     with BagWriter(tmp_path / 'empty', {}) as writer:
-        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+        writer.add_topic('/muscle/pressure', RECORDED['pressure'].type_name)
     with Reader(tmp_path / 'empty') as reader:
         assert reader.message_count == 0
     with Reader(tmp_path / 'empty' / 'empty_0.mcap') as reader:
@@ -196,11 +198,11 @@ def test_same_messages_give_the_same_bytes(tmp_path):
 
 def test_hours_of_recording_need_no_memory(tmp_path):
     names = [f'/m{k}/pressure' for k in range(12)]
-    raw = codecs.encode('pressure', example_messages()['pressure'])
+    raw = codec.encode('pressure', example_messages()['pressure'])
     sizes = []
     with BagWriter(tmp_path / 'run', METADATA) as writer:
         for name in names:
-            writer.add_topic(name, codecs.TOPIC_TYPES['pressure'])
+            writer.add_topic(name, RECORDED['pressure'].type_name)
         tracemalloc.start()
         try:
             for i in range(CHUNKS + 1):
@@ -224,10 +226,10 @@ def test_hours_of_recording_need_no_memory(tmp_path):
 @pytest.mark.parametrize('limits', ({'max_file_s': 0.05 * 4}, {'max_file_bytes': 100_000}))
 def test_split_bags_are_one_bag_everywhere(tmp_path, limits):
     count = 3000
-    raw = codecs.encode('controller_state', example_messages()['controller_state'])
+    raw = codec.encode('controller_state', example_messages()['controller_state'])
     with BagWriter(tmp_path / 'run', METADATA, **limits) as writer:
-        writer.add_topic('/muscle/controller_state', codecs.TOPIC_TYPES['controller_state'])
-        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+        writer.add_topic('/muscle/controller_state', RECORDED['controller_state'].type_name)
+        writer.add_topic('/muscle/pressure', RECORDED['pressure'].type_name)
         for i in range(count):
             writer.write('/muscle/controller_state', raw, START_NS + i * 500_000, START_NS)
     files = writer.files

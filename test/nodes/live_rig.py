@@ -21,11 +21,13 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import from_ros, MESSAGE_TYPES, RosWriter
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
+from pam_actuation.topics.codec import Reader, Writer
+from pam_actuation.topics.table import OF_A_RUN
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -47,7 +49,7 @@ class LiveRig:
         self.domain_id = self._lock.domain_id
         self.environment = node_environment(self.domain_id, log_dir)
         self.processes = {}
-        self.heard = {topic: [] for topic in MESSAGE_TYPES}
+        self.heard = {topic: [] for topic in OF_A_RUN}
         self.health = collections.defaultdict(list)
         self._context = None
         self._polled = []
@@ -65,16 +67,16 @@ class LiveRig:
             name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
             log_dir)
 
-    def listen(self, topics=None):
+    def listen(self, topics=tuple(OF_A_RUN)):
         """
         Join the graph; processes are started before (forking with threads is unsafe).
 
-        ``topics`` are types by topic, ``None`` for all of a muscle.
+        By default to all topics of a muscle.
         """
         self._context = local_context(self.domain_id)
         self.node = Node('listener', namespace=self._namespace, context=self._context)
-        for topic, message_type in (topics or MESSAGE_TYPES).items():
-            self.hear(message_type, topic, self._hearer(topic))
+        for topic in topics:
+            self.hear(class_of(topic), topic, self._hearer(topic), read=Reader(topic))
         self.hear(DiagnosticArray, '/diagnostics', self._on_diagnostics)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -84,16 +86,19 @@ class LiveRig:
         for thread in self._threads:
             thread.start()
 
-    def hear(self, message_type, topic, handler, profile=None):
+    def hear(self, message_type, topic, handler, profile=None, read=None):
         """
         Subscribe; the handler gets each message and what rclpy says about it.
+
+        Messages are those of ROS, with ``read`` what it makes of their bytes.
 
         Polled: an executor waits anew on every entity for each message, and falls seconds
         behind a whole rig on a busy machine.
         """
         name = topic if topic.startswith('/') else f'{self._namespace}/{topic}'
         self._polled.append((
-            PolledSubscription(self.node, message_type, name, profile or qos.reliable(1000)),
+            PolledSubscription(self.node, message_type, name, profile or qos.reliable(1000),
+                               raw=read is not None, read=read),
             handler))
 
     def _spin(self):
@@ -111,7 +116,7 @@ class LiveRig:
     def _hearer(self, topic):
         def hear(message, info):
             self.heard[topic].append(Heard(
-                time.monotonic(), from_ros(topic, message), info['publication_sequence_number']))
+                time.monotonic(), message, info['publication_sequence_number']))
         return hear
 
     def _on_diagnostics(self, message, _):
@@ -131,7 +136,7 @@ class LiveRig:
 
     def publisher(self, topic):
         """Return a publisher of the listener's own."""
-        return self.node.create_publisher(MESSAGE_TYPES[topic], topic, qos.PUBLISHER)
+        return self.node.create_publisher(class_of(topic), topic, qos.PUBLISHER)
 
     def close(self):
         """End everything."""
@@ -151,7 +156,7 @@ class Commander:
 
     def __init__(self, rig, command_pa):
         self._publisher = rig.publisher('pressure_command')
-        self._writer = RosWriter('pressure_command')
+        self._writer = Writer('pressure_command')
         self._command_pa = command_pa
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -24,10 +24,11 @@ import time
 from live_rig import LiveRig, wait_for
 from pam_actuation.messages import NamedEfforts, Pressure
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.conversions import RosWriter, type_of
 from pam_actuation.nodes.joint_controller import GIVING
+from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
 from pam_actuation.rigging.supervisor import Supervisor
+from pam_actuation.topics.codec import Writer
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -61,7 +62,7 @@ def knee(tmp_path):
         rig.supervisor = Supervisor(nodes, rig.domain_id, realtime_priority=1)
         rig.supervisor.start()
         rig.heard = {topic: [] for topic in TOPICS}
-        rig.listen({topic: type_of(topic) for topic in TOPICS})
+        rig.listen(TOPICS)
         rig.descriptions = []
         rig.hear(String, 'robot_description',
                  lambda message, _: rig.descriptions.append(message), qos.LATCHED)
@@ -73,7 +74,7 @@ def knee(tmp_path):
 
 def send(rig, topic, plain_at):
     """Return a function that publishes what ``plain_at`` makes of the present time."""
-    publisher, writer = rig.node.create_publisher(type_of(topic), topic, 10), RosWriter(topic)
+    publisher, writer = rig.node.create_publisher(class_of(topic), topic, 10), Writer(topic)
     return lambda: publisher.publish(writer.fill(plain_at(time.time_ns())))
 
 

@@ -28,7 +28,7 @@ from lifecycle_msgs.msg import Transition                                   # no
 from lifecycle_msgs.srv import ChangeState, GetState                        # noqa: E402
 from live_rig import LiveRig, wait_for                                      # noqa: E402
 from pam_actuation.messages import Contraction, ReferenceTrajectory         # noqa: E402
-from pam_actuation.nodes.conversions import RosWriter                       # noqa: E402
+from pam_actuation.topics.codec import Writer                               # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 from rcl_interfaces.srv import SetParameters                                # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
@@ -62,7 +62,7 @@ class Resting:
 
     def __init__(self, rig):
         self._publishers = {
-            topic: (rig.publisher(topic), RosWriter(topic))
+            topic: (rig.publisher(topic), Writer(topic))
             for topic in ('contraction', 'reference_trajectory')}
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)

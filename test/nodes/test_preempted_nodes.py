@@ -24,10 +24,11 @@ pytest.importorskip('rclpy')
 from pam_actuation.messages import Contraction, JointAngle                  # noqa: E402, I100
 from pam_actuation.messages import Pressure, ValveSignal                    # noqa: E402
 from pam_actuation.nodes import qos                                         # noqa: E402
-from pam_actuation.nodes.conversions import RosWriter, type_of              # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
+from pam_actuation.nodes.ros_messages import class_of                       # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.topics.codec import Writer                               # noqa: E402
 import rclpy                                                                # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
@@ -52,8 +53,8 @@ class Sender:
     def __init__(self, context, topics):
         self._node = Node('sender', namespace='/muscle', context=context)
         self._topics = {
-            topic: (self._node.create_publisher(type_of(topic), topic, qos.PUBLISHER),
-                    RosWriter(topic)) for topic in topics}
+            topic: (self._node.create_publisher(class_of(topic), topic, qos.PUBLISHER),
+                    Writer(topic)) for topic in topics}
         self.last_ns = 0
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -23,13 +23,13 @@ pytest.importorskip('rclpy')
 
 from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
 from pam_actuation.bags.check import independent_readers                    # noqa: E402
-from pam_actuation.bags.codecs import encode                                # noqa: E402
 from pam_actuation.bags.info import bag_info                                # noqa: E402
 from pam_actuation.bags.recover import recover_bag                          # noqa: E402
 from pam_actuation.messages import Pressure                                 # noqa: E402
 from pam_actuation.nodes import qos                                         # noqa: E402
 from pam_actuation.rigging import session                                   # noqa: E402
 from pam_actuation.rigging.plan import make_plan, RECORDER                  # noqa: E402
+from pam_actuation.topics.codec import encode                                # noqa: E402
 from sensor_msgs.msg import FluidPressure                                   # noqa: E402
 
 pytestmark = pytest.mark.ros

@@ -27,7 +27,7 @@ pytest.importorskip('rclpy')
 from live_rig import Commander, LiveRig, wait_for                           # noqa: E402, I100
 from pam_actuation.drivers.senders import is_safe                           # noqa: E402
 from pam_actuation.messages import Contraction, Pressure, ValveSignal       # noqa: E402
-from pam_actuation.nodes.conversions import RosWriter                       # noqa: E402
+from pam_actuation.topics.codec import Writer                               # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
 
@@ -40,12 +40,13 @@ FILLING = ('fill_duty', 'vent_duty'), (1.0, 0.0)
 KILLED_CONTROLLER = """
 import time
 from pam_actuation.messages import Pressure
-from pam_actuation.nodes.conversions import RosWriter, type_of
+from pam_actuation.nodes.ros_messages import class_of
+from pam_actuation.topics.codec import Writer
 import rclpy
 rclpy.init()
 node = rclpy.create_node('former', namespace='/muscle')
-publisher = node.create_publisher(type_of('pressure_command'), 'pressure_command', 10)
-writer = RosWriter('pressure_command')
+publisher = node.create_publisher(class_of('pressure_command'), 'pressure_command', 10)
+writer = Writer('pressure_command')
 while True:
     publisher.publish(writer.fill(Pressure(time.time_ns(), 401325.0)))
     time.sleep(0.01)
@@ -56,7 +57,7 @@ class Stranger:
     """Once discovered, send what ``make`` returns for a time [ns], 500 times a second."""
 
     def __init__(self, rig, topic, make):
-        self._publisher, self._writer = rig.publisher(topic), RosWriter(topic)
+        self._publisher, self._writer = rig.publisher(topic), Writer(topic)
         self._rig, self._make = rig, make
         listening = rig.node.count_subscribers(self._publisher.topic_name)
         wait_for(lambda: self._publisher.get_subscription_count() >= listening, 10.0, 'discovery')

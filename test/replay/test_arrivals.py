@@ -19,12 +19,14 @@ import math
 
 import numpy as np
 from pam_actuation import messages
-from pam_actuation.bags import codecs, series
+from pam_actuation.bags import series
 from pam_actuation.bags.load import load_run, topics_of
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.loops.bus import Bus
 from pam_actuation.replay.arrivals import ORDER, recorded_topics, TICKED
+from pam_actuation.topics import codec
+from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 from process_replay import bag_of
 import pytest
@@ -51,7 +53,7 @@ def one_by_one(run, topics):
     for short, topic in topics_of(read_bag(run.path), run.namespace).items():
         for raw, received_ns in zip(topic.payloads, topic.log_time_ns.tolist()):
             if short in topics:
-                message = codecs.decode(short, raw)
+                message = codec.decode(short, raw)
                 time_ns = message.stamp_ns if short in TICKED else received_ns
                 found.append((time_ns, short, message))
     return sorted(found, key=lambda one: (one[0], ORDER.index(one[1])))
@@ -70,9 +72,9 @@ def write(path, sample):
     """Write (short name, receive time, message) in this order; return the run."""
     with BagWriter(path, {'valve': 'ppr'}) as writer:
         for short in {short for short, _, _ in sample}:
-            writer.add_topic(f'/muscle/{short}', codecs.TOPIC_TYPES[short])
+            writer.add_topic(f'/muscle/{short}', RECORDED[short].type_name)
         for short, time_ns, message in sample:
-            writer.write(f'/muscle/{short}', codecs.encode(short, message), time_ns, time_ns)
+            writer.write(f'/muscle/{short}', codec.encode(short, message), time_ns, time_ns)
     return load_run(path)
 
 
@@ -122,16 +124,16 @@ def test_arrivals_of_a_recording_are_those_of_decoding_one_by_one():
 
 def test_a_message_that_is_none_is_refused(tmp_path):
     with BagWriter(tmp_path / 'run', {}) as writer:
-        writer.add_topic('/muscle/pressure', codecs.TOPIC_TYPES['pressure'])
+        writer.add_topic('/muscle/pressure', RECORDED['pressure'].type_name)
         for i in range(3):
-            raw = codecs.encode('pressure', messages.Pressure(START_NS + i, 1e5))
+            raw = codec.encode('pressure', messages.Pressure(START_NS + i, 1e5))
             writer.write('/muscle/pressure', raw[:9] if i == 1 else raw, START_NS, START_NS)
     with pytest.raises(InputError, match='1 messages are not sensor_msgs/msg/FluidPressure'):
         recorded_topics(load_run(tmp_path / 'run'), ORDER)
 
 
 def test_only_the_named_values_are_read():
-    raws = [codecs.encode('controller_state', messages.ControllerState(
+    raws = [codec.encode('controller_state', messages.ControllerState(
         i, ('tick', 'learning'), (float(i), 1.0))) for i in range(20)]
     stamp_ns, values, bad = series.table('controller_state', raws, only=('learning', 'other'))
     assert list(stamp_ns) == list(range(20)) and not bad.any()

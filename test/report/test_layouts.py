@@ -20,11 +20,12 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 from pam_actuation import resources
-from pam_actuation.bags.codecs import encode, TOPIC_TYPES
-from pam_actuation.bags.layout import typestore
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.source import read_bag
 from pam_actuation.messages import Force
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.definitions import typestore
+from pam_actuation.topics.table import RECORDED
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +44,7 @@ def messages():
                 typestore().deserialize_cdr(topic.payloads[-1], topic.type_name))
     raw = encode('external_force', Force(1, 2.0))
     found['external_force'] = [
-        typestore().deserialize_cdr(raw, TOPIC_TYPES['external_force'])]
+        typestore().deserialize_cdr(raw, RECORDED['external_force'].type_name)]
     assert load_run(path).namespace + '/' == NAMESPACE
     return found
 
@@ -86,7 +87,7 @@ def test_foxglove_lines_lead_to_numbers(messages, topic, path):
 @pytest.mark.parametrize('topic, path', plotjuggler_curves())
 def test_plotjuggler_curves_lead_to_numbers(messages, topic, path):
     assert (ROOT / 'msg_docs' / f'{topic}.md').is_file()
-    if TOPIC_TYPES[topic] == 'sensor_msgs/msg/JointState':
+    if RECORDED[topic].type_name == 'sensor_msgs/msg/JointState':
         # PlotJuggler sorts the entries of this message by their names.
         name, field = path.split('/')
         assert any(name in message.name and has_number(
@@ -101,7 +102,7 @@ def test_both_show_the_same_topics():
         for panel in foxglove()['configById'].values() if 'topicPath' in panel}
     assert shown == {topic for topic, _ in plotjuggler_curves()}
     # What a raw valve command asks for is seen in the valve signal.
-    assert shown == set(TOPIC_TYPES) - {
+    assert shown == set(RECORDED) - {
         'reference_trajectory', 'diagnostics', 'valve_command'}
 
 

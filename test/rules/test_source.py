@@ -168,7 +168,8 @@ def _pid_text():
 
 def _with_controller(bag, text):
     """Return a bag with a pressure and another controller in its metadata."""
-    from pam_actuation.bags.codecs import encode, TOPIC_TYPES
+    from pam_actuation.topics.codec import encode
+    from pam_actuation.topics.table import RECORDED
     from pam_actuation.bags.metadata import experiment_metadata
     from pam_actuation.bags.writer import BagWriter
     from pam_actuation.messages import Pressure
@@ -177,7 +178,7 @@ def _with_controller(bag, text):
         experiment_name='none', seed=0)
     path = bag.parent / f'with_{len(text)}'
     writer = BagWriter(path, {'pam_experiment': metadata})
-    writer.add_topic('/muscle/pressure', TOPIC_TYPES['pressure'])
+    writer.add_topic('/muscle/pressure', RECORDED['pressure'].type_name)
     writer.write('/muscle/pressure', encode('pressure', Pressure(5, 1e5)), 5, 5)
     writer.close()
     return path

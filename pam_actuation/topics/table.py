@@ -1,0 +1,185 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The table of topics: one row each, from which nodes, recorder, loader, bag checks and docs follow.
+
+A row says what the topic carries, and with it ROS type, plain message, bytes and columns of
+arrays; who speaks and who listens; its quality of service; what a bag of it is checked for.
+A topic may be given by its short name (``pressure``) or in full
+(``/left_knee/flexor/pressure``); the last part decides.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from pam_actuation.messages import (
+    AngleReference, AngleTrajectory, Contraction, ControllerState, Force, JointAngle,
+    NamedEfforts, Pressure, Reference, ReferenceTrajectory, ValveSignal)
+from pam_actuation.topics.contents import (
+    AnyJoints, Content, JOINT_STATE, NamedNumbers, Numbers, Numeric, Statuses, Trajectory, Value)
+from pam_actuation.topics.quality import Service, USUAL
+from pam_sim.errors import InputError
+
+# Where a topic lies: in the namespace of a muscle, in that of a joint, or at the root.
+MUSCLE, JOINT, ROOT = 'muscle', 'joint', 'root'
+# How much a recording of a muscle is worth without it.
+NEEDED, USED, EXTRA = 'needed', 'used', 'extra'
+# What a number means that is missing or not finite: a fault to be told; that the one before it
+# still counts, as a valve takes it; or nothing, since what is not wished for may be missing.
+TOLD, KEPT, ALLOWED = 'told', 'kept', 'allowed'
+
+RECORDER = 'experiment_recorder'
+EVERY_NODE = 'every node'
+
+
+@dataclass(frozen=True)
+class Topic:
+    """
+    One topic.
+
+    Parameters
+    ----------
+    name : str
+        The last part of its full name.
+    content : Content
+        What it carries.
+    meaning : str
+        In a few words, for the list of topics.
+    published_by, consumed_by : tuple of str
+        Nodes; the recorder, which listens to all of a muscle, is left out.
+    place : {'muscle', 'joint', 'root'}
+        Where it lies.
+    held : bool
+        Whether a value counts until the next one; others are measured points of a curve.
+    need : {'needed', 'used', 'extra'}
+        How much a recording is worth without it.
+    steady : bool
+        Whether it comes at 100 Hz or more, so that a lower rate and gaps are told.
+    missing : {'told', 'kept', 'allowed'}
+        What a number that is not there means.
+    internals : bool
+        Whether its numbers are internals of a node, which may be anything.
+    limits : dict of str to tuple of float
+        Lowest and highest plausible number of a value, SI, where ``bags/plausibility.py`` does
+        not know the value.
+    service : Service
+        Quality of service.
+
+    """
+
+    name: str
+    content: Content
+    meaning: str
+    published_by: tuple[str, ...]
+    consumed_by: tuple[str, ...]
+    place: str = MUSCLE
+    held: bool = False
+    need: str = EXTRA
+    steady: bool = False
+    missing: str = TOLD
+    internals: bool = False
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    service: Service = USUAL
+
+    @property
+    def type_name(self) -> str:
+        """Return the ROS message type, such as ``sensor_msgs/msg/JointState``."""
+        return self.content.type_name
+
+    @property
+    def numeric(self) -> Numeric | None:
+        """Return the content if many messages of it are arrays, else None."""
+        return self.content if isinstance(self.content, Numeric) else None
+
+    def full_name(self, namespace: str) -> str:
+        """Return the full name in a namespace such as ``/muscle``."""
+        return f'/{self.name}' if self.place == ROOT else f'{namespace}/{self.name}'
+
+
+SENSORS = ('plant_simulator', 'joint_simulator', 'hardware_sensors')
+PLANTS = ('plant_simulator', 'joint_simulator')
+LAWS = ('sofc_controller', 'pid_controller')
+CONTROLLERS = (*LAWS, 'joint_controller')
+REFERENCE = ('reference_generator',)
+DRIVER = ('valve_driver',)
+
+_PRESSURE = Numbers(
+    'sensor_msgs/msg/FluidPressure', Pressure, (Value('pressure_pa', 'fluid_pressure'),))
+_FORCE = Numbers(
+    'geometry_msgs/msg/WrenchStamped', Force, (Value('force_n', 'wrench.force.x'),))
+_MOTION = (Value('contraction_m', 'position'), Value('velocity_m_per_s', 'velocity'))
+_SIGNAL = NamedNumbers(ValveSignal, 'efforts', 'effort')
+
+# Of messages at equal times those of an earlier row act first: measured, wanted, decided, acted.
+TOPICS = (
+    Topic('pressure', _PRESSURE, 'measured muscle pressure', SENSORS, (*CONTROLLERS, *DRIVER),
+          need=NEEDED, steady=True),
+    Topic('contraction', Numbers(JOINT_STATE, Contraction, _MOTION), 'measured contraction',
+          SENSORS, LAWS, need=NEEDED, steady=True),
+    Topic('force', _FORCE, 'measured force', SENSORS, CONTROLLERS, need=USED, steady=True),
+    Topic('supply_pressure', _PRESSURE, 'measured supply pressure', SENSORS, DRIVER, need=USED),
+    Topic('external_force', _FORCE, 'disturbance on the simulated load', REFERENCE,
+          ('plant_simulator',)),
+    Topic('reference', Numbers(JOINT_STATE, Reference, _MOTION, (Value('force_n', 'effort'),)),
+          'wanted contraction, now', REFERENCE, LAWS, held=True, need=USED),
+    Topic('reference_trajectory', Trajectory(
+        ReferenceTrajectory, 'contraction_m', 'velocity_m_per_s', 'force_n'),
+          'wanted contraction, known ahead', REFERENCE, LAWS),
+    Topic('controller_state', NamedNumbers(ControllerState, 'values', 'position'),
+          'every internal of a controller tick', CONTROLLERS, (), held=True, internals=True),
+    Topic('pressure_command', _PRESSURE, 'wanted muscle pressure', (*CONTROLLERS, *REFERENCE),
+          DRIVER, held=True, need=USED, steady=True),
+    Topic('valve_command', _SIGNAL, 'wanted raw valve signal', REFERENCE, DRIVER, held=True,
+          missing=ALLOWED),
+    Topic('valve_signal', _SIGNAL, 'what goes to the valve', (*DRIVER, 'valve_watchdog'),
+          (*PLANTS, *DRIVER, 'valve_watchdog'), held=True, need=NEEDED, steady=True,
+          missing=KEPT),
+    Topic('followed_pressure', _PRESSURE, 'what the driver makes of the command', DRIVER,
+          CONTROLLERS, held=True),
+    Topic('diagnostics', Statuses(), 'health of every node', (EVERY_NODE,), (), place=ROOT),
+    Topic('joint_state', Numbers(JOINT_STATE, JointAngle, (
+        Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
+          'measured angle, and torque of both tendons', ('joint_simulator',),
+          ('joint_controller',), place=JOINT),
+    Topic('joint_reference', Numbers(JOINT_STATE, AngleReference, (
+        Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
+          'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True),
+    Topic('joint_trajectory', AnyJoints(AngleTrajectory, 'angle_rad', 'rate_rad_per_s'),
+          'wanted angle, known ahead', REFERENCE, ('joint_controller',), place=JOINT),
+    Topic('joint_effort', NamedNumbers(NamedEfforts, 'efforts', 'effort'),
+          'wanted torque of both tendons', (), ('joint_controller',), place=JOINT, held=True),
+    Topic('co_contraction', _PRESSURE, 'wanted mean pressure of both muscles', (),
+          ('joint_controller',), place=JOINT, held=True),
+)
+
+BY_NAME = {topic.name: topic for topic in TOPICS}
+# What a recording of a muscle holds.
+RECORDED = {topic.name: topic for topic in TOPICS if topic.place != JOINT}
+# What a loaded run can hold.
+OF_A_RUN = {name: topic for name, topic in RECORDED.items() if topic.place == MUSCLE}
+
+
+def short_name(full_name: str) -> str:
+    """Return the last part of the name of a topic, whatever topic it is."""
+    return full_name.rsplit('/', 1)[-1]
+
+
+def topic_of(name: str) -> Topic:
+    """Return the row of a topic by short or full name; InputError if it is none of a rig."""
+    topic = BY_NAME.get(short_name(name))
+    if topic is None:
+        raise InputError(
+            f'no topic of a rig; known are {", ".join(BY_NAME)}', name)
+    return topic
