@@ -17,6 +17,8 @@ STAMP := $(VENV)/installed
 # Nothing of a run leaves this machine, and one thread per process is fastest here.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export OPENBLAS_NUM_THREADS := 1
+# Byte code is kept: without it every process compiles some 300 files again.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test docs env clean
 

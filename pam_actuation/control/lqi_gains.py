@@ -36,7 +36,6 @@ from pam_actuation.control.lqi_model import LinearModel
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, record, values_of, zeros
-from scipy.linalg import solve_discrete_are
 
 MAX_ORDER = 10
 MAX_DELAY_TICKS = 200
@@ -107,6 +106,7 @@ def observer_gains(model: LinearModel, disturbance_pa: float, noise_m: float) ->
 
 def _riccati(a: FloatArray, b: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
     """Return the solution of the discrete algebraic Riccati equation."""
+    from scipy.linalg import solve_discrete_are       # slow to import, see lqi_model
     try:
         return solve_discrete_are(a, b, q, r)
     except np.linalg.LinAlgError:

@@ -44,8 +44,9 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.rig import Rig
 from pam_sim.units import gauge_kpa, P_ATM_PA
-from scipy.linalg import lstsq
-from scipy.signal import butter, lfilter
+
+# scipy.linalg and scipy.signal are imported where a model is identified or simulated: they take
+# half of the time that a verb needs to start, and a controller of another law needs neither.
 
 MAX_DELAY_S = 0.12
 DRIFT_HZ = 1.0                 # corner of the high-pass
@@ -93,6 +94,7 @@ class LinearModel:
 
     def simulate(self, command_pa):
         """Return the contraction [m] for commands [absolute Pa], from rest at the first one."""
+        from scipy.signal import lfilter
         u = np.asarray(command_pa, dtype=float) - self.pressure_pa
         delayed = np.r_[np.full(1 + self.delay_ticks, u[0]), u][:u.size]
         rest = self.gain_m_per_pa * u[0]
@@ -122,6 +124,7 @@ def identify(command_pa, contraction_m, rate_hz, order=3, max_delay_s=MAX_DELAY_
         Too short, nothing moves, or no stable model is found.
 
     """
+    from scipy.signal import butter, lfilter
     u, y = np.asarray(command_pa, dtype=float), np.asarray(contraction_m, dtype=float)
     if u.size < _SHORTEST or u.shape != y.shape:
         raise InputError(
@@ -148,6 +151,8 @@ def identify(command_pa, contraction_m, rate_hz, order=3, max_delay_s=MAX_DELAY_
 
 def _steiglitz_mcbride(u, y, order, delay):
     """Return (a, b) as tuples for one delay, None where the rounds run away."""
+    from scipy.linalg import lstsq
+    from scipy.signal import lfilter
     u = np.r_[np.zeros(delay), u][:u.size]
     filtered = np.ones(1)
     for _ in range(_ROUNDS):

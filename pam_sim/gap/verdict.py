@@ -30,7 +30,6 @@ from pam_sim.gap.verify.model import held_without, model_of, numbers_of
 from pam_sim.gap.verify.spread import spread_of_numbers
 from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
 from pam_sim.gap.verify.validation import Validation
-from scipy.stats import norm
 
 
 def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
@@ -152,6 +151,7 @@ def _tested(rival: Rival, subsystem: str) -> float | None:
 
 def _confidence(named: NamedEffect, outcome: Outcome, criteria: Criteria) -> float:
     """Return how sure a name is, 0 to 1: against its nearest rival, and by what is left."""
+    from scipy.stats import norm       # slow to import
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
     rivals = [_tested(r, s) for r in named.rivals if r.name not in named.names

@@ -144,6 +144,18 @@ def test_completion_loads_no_simulator():
     assert done.stdout.strip() == '[]', done.stdout + done.stderr
 
 
+def test_a_verb_or_node_starts_without_the_slow_half_of_scipy():
+    # They take half a second, and only a gap or an LQI model that is identified needs them.
+    verbs = ('simulate', 'run', 'replay', 'report', 'tune')
+    code = 'import sys, importlib\n' \
+        f'for name in {verbs}: importlib.import_module("pam_actuation.cli." + name)\n' \
+        'import pam_actuation.experiments.offline, pam_actuation.report, ' \
+        'pam_actuation.replay.chain, pam_actuation.tuning.tune\n' \
+        'print([n for n in ("scipy.signal", "scipy.stats") if n in sys.modules])'
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
+    assert done.stdout.strip() == '[]', done.stdout + done.stderr
+
+
 def test_every_node_says_what_to_install_where_ros_is_missing(tmp_path):
     names = nodes()
     assert len(names) == 10

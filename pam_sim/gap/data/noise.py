@@ -24,7 +24,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from scipy.signal import lfilter
 
 THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)      # 1, 3, 3, 1 squared and summed
 MAD_TO_SD = 1.4826                          # of a normal distribution
@@ -77,6 +76,7 @@ class Noise:
 
     def draw(self, time_s: FloatArray, random: np.random.Generator) -> FloatArray:
         """Return noise like it at rising instants, shape of ``time_s``."""
+        from scipy.signal import lfilter       # slow to import
         found = self.white_sd * random.standard_normal(time_s.size)
         if self.slow_sd > 0.0:
             period = float(np.median(np.diff(time_s)))

@@ -45,7 +45,6 @@ from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
 from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
-from scipy.signal import savgol_filter
 
 BINS = 10                    # of a condition alone; half as many of each in a pair
 LEAST_SAMPLES = 20           # in a bin; emptier ones predict nothing
@@ -70,6 +69,7 @@ def conditions_of(recording: Recording, subsystem: str, time_s: FloatArray
     that of the contraction [m/s], of the pressure [Pa/s] where the subsystem is the valve or
     nothing moves; pressure in Pa gauge.
     """
+    from scipy.signal import savgol_filter       # slow to import
     grid = recording.grid_s
     level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
              for s in ('pressure', 'contraction')}

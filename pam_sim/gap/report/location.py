@@ -31,7 +31,6 @@ from pam_sim.gap.result import Share
 from pam_sim.gap.subsystems.simulation import pressure_driven, run_from_pressure, simulate_driven
 from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
-from scipy.signal import savgol_filter
 
 SMOOTH_S = 0.1               # window of the derivatives of measured contraction
 MOVING_M_PER_S = 1e-3
@@ -136,6 +135,7 @@ def muscle_part(rig: Rig, recording: Recording, floor: Mapping[str, float]) -> f
 
 def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return contraction [m], its rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
+    from scipy.signal import savgol_filter       # slow to import
     x = np.interp(recording.grid_s, recording.time_s['contraction'],
                   recording.measured['contraction'])
     window = 2 * int(0.5 * SMOOTH_S / GRID_S) + 1

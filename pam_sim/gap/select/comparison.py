@@ -29,7 +29,6 @@ from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from scipy.stats import norm, t as student, wilcoxon
 
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
 NO_TEST_T = math.nan
@@ -110,6 +109,7 @@ def preference(problem: SubsystemProblem, base: FloatArray, better: FloatArray, 
 
 def _deviations(ratio: FloatArray, criteria: Criteria) -> float:
     """Return by how many deviations the log ratios of some blocks differ from none."""
+    from scipy.stats import norm, t as student, wilcoxon       # slow to import
     if ratio.size < criteria.min_blocks:
         return NO_TEST_T
     if not ratio.any():

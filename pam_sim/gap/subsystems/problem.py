@@ -28,7 +28,6 @@ from pam_sim.gap.data.split import part_of
 from pam_sim.gap.subsystems.known import Known, of_run
 from pam_sim.response import Response
 from pam_sim.rig import Rig
-from scipy.signal import savgol_filter
 
 RATE_HZ = 200.0              # of the samples that are compared
 TEST_BLOCK_S = 0.5           # of the paired tests between rivals
@@ -200,5 +199,6 @@ class SubsystemProblem:
 
 def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:
     """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
+    from scipy.signal import savgol_filter       # slow to import
     y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
     return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))
