@@ -14,6 +14,7 @@
 
 """Settings of the documentation: ``make docs`` builds it with Sphinx into build/docs."""
 
+from functools import lru_cache
 import importlib.util
 from pathlib import Path
 import sys
@@ -29,6 +30,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'docs')]
 from generate import pages                      # noqa: E402
 from generate.mathml import add_mathml          # noqa: E402
 from pam_actuation import __version__           # noqa: E402
+from sphinx.domains.python import PythonDomain  # noqa: E402
 
 project = 'pam_actuation'
 author = 'pam_actuation developers'
@@ -60,9 +62,17 @@ python_use_unqualified_type_names = True
 maximum_signature_line_length = 80
 
 
+class RememberingDomain(PythonDomain):
+    """Python's domain that looks a name up once: a type stands in hundreds of signatures."""
+
+    # One domain per build, whose names are complete before the first is looked up.
+    find_obj = lru_cache(maxsize=None)(PythonDomain.find_obj)
+
+
 def setup(app):
     """Put the pages together beside the output: docs/ holds only what is written by hand."""
     target = Path(app.doctreedir).resolve() / 'source'
     pages.write_all(ROOT, Path(app.srcdir), target)
     app.srcdir = target
     add_mathml(app)
+    app.add_domain(RememberingDomain, override=True)

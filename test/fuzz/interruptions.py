@@ -58,6 +58,11 @@ NODES = ('valve_driver', 'valve_watchdog', 'plant_simulator', 'sofc_controller',
          'experiment_recorder')
 # As the script that pip or colcon writes; the line tells that the interpreter itself is up.
 SCRIPT = 'print(flush=True); import sys; from {} import {} as main; sys.exit(main())'
+# How long they work on a quiet machine [s]; a node does the same for ever after its first seconds.
+# A signal that comes later tells nothing.
+WORKS_S = {'simulate': 4.0, 'replay': 3.0, 'tune': 4.0, 'gap': 1.2, 'report': 2.0, 'info': 1.0,
+           'models': 1.2, 'valves': 4.0, 'rules': 1.0, 'nodes': 1.0, 'up': 6.0}
+NODE_WORKS_S = 4.0
 ENDED_AFTER_S = 20.0        # a node that compiles, a session that ends all its nodes in order
 MARK = 'PAM_INTERRUPTED_BY_TEST'
 
@@ -90,7 +95,8 @@ def case(number, longest_s, live):
         words = (name, '-p', 'backend:=dummy') if name == 'hardware_sensors' else (name,)
     else:
         words = dice.choice(LIVE_VERBS if live else VERBS)
-    first_s = dice.uniform(0.05, longest_s)
+    works_s = NODE_WORKS_S if is_node else WORKS_S.get(words[0], longest_s)
+    first_s = dice.uniform(0.05, min(longest_s, works_s))
     more = tuple(dice.uniform(0.005, 0.3) for _ in range(dice.choice((0, 0, 1, 3, 8))))
     return Case(number, words, is_node, (first_s, *more), dice.random() < 0.5)
 

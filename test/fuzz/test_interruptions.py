@@ -32,8 +32,9 @@ def test_nodes_and_those_who_start_them_end_in_order_whenever_they_are_interrupt
 
 @pytest.mark.slow
 def test_many_verbs_at_work():
-    outcomes, bad = run(100, longest_s=5.0, start=1000)
+    outcomes, bad = run(72, longest_s=5.0, start=1000)
     assert bad == []
+    assert outcomes['interrupted'] > 50
 
 
 @pytest.mark.slow
@@ -41,6 +42,7 @@ def test_many_verbs_at_work():
 def test_many_nodes_at_work():
     outcomes, bad = run(40, longest_s=10.0, live=True, jobs=3, start=1000)
     assert bad == []
+    assert outcomes['interrupted'] > 25
 
 
 def test_the_same_number_is_the_same_interruption():
