@@ -65,7 +65,7 @@ TEST_REQUIRES = [
     *DOCS_REQUIRES,
     'pytest>=7.4',
     'pytest-timeout>=2.1',
-    'pytest-xdist>=3.0',
+    'pytest-xdist>=3.7',
     'hypothesis>=6.98',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',

@@ -88,5 +88,5 @@ class StallPlugin:
 
 def pytest_configure(config):
     """Watch the machine where live tests run one after the other."""
-    if HAS_ROS and config.getoption('markexpr') == 'ros':
+    if HAS_ROS and config.getoption('markexpr') in ('ros', 'ros and not shared'):
         config.pluginmanager.register(StallPlugin())

@@ -126,6 +126,7 @@ def test_other_layouts_of_colcon_find_their_files(tmp_path, option):
 
 @pytest.mark.slow
 @pytest.mark.ros
+@pytest.mark.shared
 def test_every_executable_starts_and_ends_from_the_colcon_install(isolated_install, tmp_path):
     folder = isolated_install / 'pam_actuation' / 'lib' / 'pam_actuation'
     environment = environment_of(isolated_install / 'setup.bash', ROS_LOG_DIR=str(tmp_path))

@@ -22,7 +22,7 @@ import pytest
 from sample_bag import example_messages
 
 serialization = pytest.importorskip('rclpy.serialization', reason='rclpy is not installed')
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 
 def message_class(type_name):

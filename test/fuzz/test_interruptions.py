@@ -24,6 +24,7 @@ def test_verbs_end_with_one_line_whenever_they_are_interrupted():
 
 
 @pytest.mark.ros
+@pytest.mark.shared
 def test_nodes_and_those_who_start_them_end_in_order_whenever_they_are_interrupted():
     outcomes, bad = run(14, longest_s=1.3, live=True)
     assert bad == []
@@ -39,6 +40,7 @@ def test_many_verbs_at_work():
 
 @pytest.mark.slow
 @pytest.mark.ros
+@pytest.mark.shared
 def test_many_nodes_at_work():
     outcomes, bad = run(40, longest_s=10.0, live=True, jobs=3, start=1000)
     assert bad == []

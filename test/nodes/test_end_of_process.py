@@ -25,7 +25,7 @@ pytest.importorskip('rclpy')
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
 from pam_actuation.rigging.processes import node_environment                # noqa: E402
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 # The threads of the participant are named dds.*; the watchdog belongs to the library.
 PROGRAM = """

@@ -27,7 +27,7 @@ from pam_actuation.nodes.pages import pages                                 # no
 from pam_actuation.nodes.policy import policy                               # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 ROOT = Path(__file__).resolve().parents[2]
 POLICIES = {

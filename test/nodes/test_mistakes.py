@@ -24,7 +24,7 @@ pytest.importorskip('rclpy')
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
 from pam_actuation.rigging.processes import node_environment                # noqa: E402
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 MISTAKES = {
     'valve_driver valve': (
