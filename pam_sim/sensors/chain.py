@@ -80,9 +80,9 @@ class SensorChain:
         reading = [pressure_pa, contraction_m, force_n]
         jitter_ns = 0
         if self._adds_noise:
-            noise = self._random.standard_normal(4) * self._sigma
-            reading = [signal + float(part) for signal, part in zip(reading, noise)]
-            jitter_ns = int(round(float(noise[3]) * 1e9))
+            *noise, jitter_s = (self._random.standard_normal(4) * self._sigma).tolist()
+            reading = [signal + part for signal, part in zip(reading, noise)]
+            jitter_ns = int(round(jitter_s * 1e9))
         for index, step in enumerate(self._step):
             if step > 0.0:
                 reading[index] = round(reading[index] / step) * step
