@@ -30,8 +30,10 @@ import time
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
-from pam_sim.rollout import kernel, layout
+from pam_sim.records import size_of
+from pam_sim.rollout import kernel
 from pam_sim.rollout.batch import default_workers, Record, residual_sums, simulate_batch
+from pam_sim.rollout.layout import OUTPUT
 from pam_sim.rollout.sampling import Measured
 from pam_sim.rollout.simulate import input_array
 
@@ -73,7 +75,7 @@ def best_s(call, repeats):
 def seconds_per_step(rig):
     """Return the time of one step [s] in the compiled rollout."""
     inputs, _ = input_array(rig, signal_for(rig))
-    outputs = np.empty((STEPS + 1, layout.OUT_SIZE))
+    outputs = np.empty((STEPS + 1, size_of(OUTPUT)))
     start, par = rig.pack()
     return best_s(lambda: kernel.rollout(start.copy(), par, inputs, outputs), REPEATS) / STEPS
 

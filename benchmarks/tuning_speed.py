@@ -37,6 +37,7 @@ from pam_actuation.tuning.space import default_axes, from_unit
 from pam_actuation.tuning.workers import Workers
 from pam_sim import load_rig
 from pam_sim.muscle.laws.sarosi import tension_n
+from pam_sim.records import fields, values_of
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from scipy.integrate import solve_ivp
 
@@ -71,13 +72,14 @@ def per_minute(problem, jobs):
 def with_solve_ivp(rig, controller, experiment, rtol=1e-6):
     """Track with ``solve_ivp`` between changes of the signal; return (contraction [m], s)."""
     number = rig.parameters
-    law = rig.muscle.law.law.pack()
+    law = rig.muscle.law.law
+    law = fields(values_of(law.PACKED, law.pack()), law.PACKED)
     gain, lag, mass = number['K_m'], number['T_m'], number['mass_kg']
     damping, length_m = number['damping_n_s_per_m'], rig.muscle.length_m
 
     def slopes(_, state, volts):
         gauge, x, v = state
-        net = tension_n(gauge, x / length_m, law, 0) - damping * v - mass * GRAVITY_M_PER_S2
+        net = tension_n(gauge, x / length_m, law) - damping * v - mass * GRAVITY_M_PER_S2
         held = x <= 0.0 and v <= 0.0 and net < 0.0
         return (gain * volts - gauge) / lag, v, 0.0 if held else net / mass
 

@@ -70,6 +70,11 @@ def interpreted(function: Callable[P, R]) -> Callable[P, R]:
     return python
 
 
+def named_arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the names of the arguments of a compiled function."""
+    return tuple(inspect.signature(interpreted(function)).parameters)
+
+
 def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], list[str]]:
     """
     Return what compiled code is built from.
@@ -100,8 +105,9 @@ def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], 
             files.add(_file_of(part))
             waiting += filter(_is_compiled, vars(part).values())
             continue
-        found = inspect.getclosurevars(part.py_func)
-        files.add(_file_of(part.py_func))
+        function: Any = getattr(part, 'py_func', part)       # itself where nothing is compiled
+        found = inspect.getclosurevars(function)
+        files.add(_file_of(function))
         for name, value in {**found.globals, **found.nonlocals}.items():
             if _is_compiled(value):
                 waiting.append(value)
@@ -109,7 +115,7 @@ def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], 
                 constants.add(f'{name} = {value!r}')
             elif isinstance(value, types.ModuleType) and value.__name__.startswith('pam_'):
                 files.add(_file_of(value))
-                used = (getattr(value, name, None) for name in part.py_func.__code__.co_names)
+                used = (getattr(value, name, None) for name in function.__code__.co_names)
                 waiting += filter(_is_compiled, used)
     return sorted(files), sorted(constants)
 

@@ -22,6 +22,7 @@ same with ``fields``. An inserted field moves its neighbours in memory and nowhe
 """
 
 from collections.abc import Mapping
+import functools
 import types
 from typing import Any
 
@@ -50,9 +51,17 @@ def record(*declared: Declared) -> np.dtype[Any]:
     -------
     numpy.dtype
 
+    Raises
+    ------
+    ValueError
+        A name that records of numpy have for something else.
+
     """
     parts: list[tuple[Any, ...]] = []
     for one in declared:
+        name = one if isinstance(one, str) else one[0]
+        if hasattr(np.record, name):        # read as an attribute, it would be numpy's own
+            raise ValueError(f'`{name}` cannot be a field of a record: numpy has taken the name')
         if isinstance(one, str):
             parts.append((one, np.float64))
         elif isinstance(one[1], int):
@@ -149,16 +158,39 @@ def put(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
         A field is missing, or there is none of a name.
 
     """
-    names = dtype.names or ()
-    if values.keys() != set(names):
+    spans, numbers = _spans(dtype)
+    if values.keys() != spans.keys():
         raise ValueError(
-            f'fields {sorted(set(values) ^ set(names))} are missing or unknown')
-    if size_of(dtype) == len(names):        # numbers alone
-        array[place:place + len(names)] = [values[name] for name in names]
-        return
-    for name in names:
+            f'fields {sorted(values.keys() ^ spans.keys())} are missing or unknown')
+    # At once what begins the record as numbers alone: rigs are packed often.
+    array[place:place + len(numbers)] = [values[name] for name in numbers]
+    if len(numbers) < len(spans):
+        put_some(array, dtype, {name: values[name] for name in list(spans)[len(numbers):]}, place)
+
+
+def put_some(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
+             place: int = 0) -> None:
+    """Write the fields a mapping names into an array, from ``place`` on; others stay."""
+    spans, _ = _spans(dtype)
+    for name, value in values.items():
+        begin, end = spans[name]
+        if end == begin + 1:
+            array[place + begin] = value
+        else:
+            flat = value.ravel() if isinstance(value, np.ndarray) else value
+            array[place + begin:place + end] = flat
+
+
+@functools.cache
+def _spans(dtype: np.dtype[Any]) -> tuple[dict[str, tuple[int, int]], list[str]]:
+    """Return the numbers before and with each field, and the first fields that are numbers."""
+    found = {}
+    for name in dtype.names or ():
         inner, begin = _field(dtype, name)
-        array[place + begin:place + begin + size_of(inner)] = np.ravel(values[name])
+        found[name] = begin, begin + size_of(inner)
+    sizes = [end - begin for begin, end in found.values()]
+    leading = next((k for k, size in enumerate(sizes) if size != 1), len(sizes))
+    return found, list(found)[:leading]
 
 
 def _field(dtype: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:

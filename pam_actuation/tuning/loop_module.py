@@ -14,12 +14,12 @@
 
 """Closed loops compiled as modules of their own, made anew whenever a part of them changes."""
 
-import hashlib
 from pathlib import Path
 
 from pam_actuation.tuning import loop_parts
 from pam_sim.compiled import source_key
-from pam_sim.rollout.generate import kernel_hash, load_cached_module
+from pam_sim.generated import generated_module
+from pam_sim.rollout import kernel
 
 
 def load_loops(name, template, controllers, also=''):
@@ -39,7 +39,5 @@ def load_loops(name, template, controllers, also=''):
 
     """
     source = (Path(__file__).parent / template).read_text(encoding='utf-8')
-    key = hashlib.sha256(source.encode())
-    key.update((kernel_hash() + also).encode())
-    key.update(str(source_key(loop_parts, *controllers)).encode())
-    return load_cached_module(name, source, key.hexdigest()[:12])
+    key = source_key(loop_parts, kernel, *controllers)
+    return generated_module(name, f'# Of sources {key:x} {also}.\n{source}')

@@ -16,6 +16,12 @@
 Named effects, one file each; being in this folder is being registered.
 
 A file defines ``EFFECT = Effect(...)`` and, under the names of
-:mod:`pam_sim.rollout.hooks`, the small compiled functions by which it acts.
+:mod:`pam_sim.rollout.hooks`, the small compiled functions by which it acts. They take the
+arguments they name and read their numbers by name::
+
+    @compiled
+    def muscle_force(force_n, contraction_m, par):
+        return force_n - par.stiffness_n_per_m * contraction_m
+
 Further folders can be named in the environment variable ``PAM_EFFECTS_PATH``.
 """

@@ -41,6 +41,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_output(tension_n, pressure_pa, contraction_m, state, i, par, k):
+def map_output(tension_n, contraction_m, par):
     """Return the tension less that of the tube."""
-    return tension_n - par[k] * contraction_m
+    return tension_n - par.stiffness_n_per_m * contraction_m

@@ -19,7 +19,7 @@ from pam_sim.effects.bladder_stiffness import EFFECT as _SIBLING
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.progressive import (
-    HARDENING, HARDENING_FREE, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
+    HARDENING, HARDENING_FREE, pack_progressive, PROGRESSIVE, SECANT_REPORTED, SOURCE, spring_n)
 
 EFFECT = Effect(
     name='bladder_stiffness_progressive',
@@ -32,12 +32,13 @@ EFFECT = Effect(
     parameters=(*_SIBLING.parameters, HARDENING),
     amplitude=_SIBLING.amplitude,
     reported=SECANT_REPORTED,
+    packed=PROGRESSIVE,
     pack=pack_progressive,
     fitting=Fitting(free=(FreeParameter('stiffness_n_per_m', 200.0, 0.0, 1e4), HARDENING_FREE)),
 )
 
 
 @compiled
-def map_output(tension_n, pressure_pa, contraction_m, state, i, par, k):
+def map_output(tension_n, contraction_m, par):
     """Return the tension less that of the tube."""
-    return tension_n - spring_n(contraction_m, par, k)
+    return tension_n - spring_n(contraction_m, par)

@@ -42,8 +42,8 @@ from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import braid
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
-_FACTOR, _PATCH, _RADIUS, _LENGTH, _ATMOSPHERE = range(5)
 _REFERENCE_PA, _REFERENCE_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
@@ -57,8 +57,9 @@ def _constants(values, muscle):
 
 
 def _pack(values, numbers):
-    return (*_constants(values, numbers.muscle), numbers.muscle.length_m,
-            numbers.parameters['p_atm'])
+    factor, patch, radius_m = _constants(values, numbers.muscle)
+    return {'friction_per_pa_m': factor, 'patch_m3_per_pa': patch, 'radius_m': radius_m,
+            'length_m': numbers.muscle.length_m, 'atmosphere_pa': numbers.parameters['p_atm']}
 
 
 @compiled
@@ -95,15 +96,16 @@ EFFECT = Effect(
         'force_at_400kpa_n', 'N', lambda values, rig: float(
             friction_n(_REFERENCE_PA, rig.muscle.length_m - _REFERENCE_M,
                        *_constants(values, rig.muscle)))),),
-    slots=5,
+    packed=record(
+        'friction_per_pa_m', 'patch_m3_per_pa', 'radius_m', 'length_m', 'atmosphere_pa'),
     pack=_pack,
     fitting=Fitting(free=(FreeParameter('friction_coefficient', 0.3, 0.0, 2.0),)),
 )
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
+def muscle_friction(level_n, pressure_pa, contraction_m, par):
     """Return the friction level with this part added."""
     return level_n + friction_n(
-        pressure_pa - par[k + _ATMOSPHERE], par[k + _LENGTH] - contraction_m, par[k + _FACTOR],
-        par[k + _PATCH], par[k + _RADIUS])
+        pressure_pa - par.atmosphere_pa, par.length_m - contraction_m, par.friction_per_pa_m,
+        par.patch_m3_per_pa, par.radius_m)

@@ -36,6 +36,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
+def muscle_friction(level_n, par):
     """Return the friction level with this part added."""
-    return level_n + par[k]
+    return level_n + par.force_n

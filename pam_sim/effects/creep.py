@@ -24,12 +24,12 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
-
-_K1, _TAU1, _K2, _TAU2 = range(4)
+from pam_sim.records import record
 
 
 def _initial(values, numbers):
-    return numbers.contraction_m, numbers.contraction_m      # relaxed at the start
+    # Relaxed at the start.
+    return {'anchor_1_m': numbers.contraction_m, 'anchor_2_m': numbers.contraction_m}
 
 
 def _relaxing_stiffness(values, rig):
@@ -66,7 +66,7 @@ EFFECT = Effect(
         Reported('relaxing_stiffness_n_per_m', 'N/m', _relaxing_stiffness),
         Reported('creep_fraction_at_400kpa', '-', _creep_fraction),
     ),
-    states=2,
+    states=record('anchor_1_m', 'anchor_2_m'),
     initial=_initial,
     fitting=Fitting(
         free=(
@@ -86,17 +86,18 @@ def relaxed(anchor_m, contraction_m, dx_m, elapsed_s, time_constant_s):
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, contraction_m, dx_m, elapsed_s, state, par):
     """Return the force less that of the relaxing springs."""
-    q1 = relaxed(state[i], contraction_m, dx_m, elapsed_s, par[k + _TAU1])
-    q2 = relaxed(state[i + 1], contraction_m, dx_m, elapsed_s, par[k + _TAU2])
-    return (force_n - par[k + _K1] * (contraction_m - q1)
-            - par[k + _K2] * (contraction_m - q2))
+    q1 = relaxed(state.anchor_1_m, contraction_m, dx_m, elapsed_s, par.time_constant_1_s)
+    q2 = relaxed(state.anchor_2_m, contraction_m, dx_m, elapsed_s, par.time_constant_2_s)
+    return (force_n - par.stiffness_1_n_per_m * (contraction_m - q1)
+            - par.stiffness_2_n_per_m * (contraction_m - q2))
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(contraction_m, dx_m, elapsed_s, state, par):
     """Advance the anchors of the springs."""
-    state[i] = relaxed(state[i], contraction_m, dx_m, elapsed_s, par[k + _TAU1])
-    state[i + 1] = relaxed(state[i + 1], contraction_m, dx_m, elapsed_s, par[k + _TAU2])
+    state.anchor_1_m = relaxed(
+        state.anchor_1_m, contraction_m, dx_m, elapsed_s, par.time_constant_1_s)
+    state.anchor_2_m = relaxed(
+        state.anchor_2_m, contraction_m, dx_m, elapsed_s, par.time_constant_2_s)

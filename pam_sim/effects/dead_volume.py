@@ -38,6 +38,6 @@ EFFECT = Effect(
 
 
 @compiled
-def volume(volume_m3, pressure_pa, contraction_m, state, i, par, k):
+def volume(volume_m3, par):
     """Return the air volume with the extra one."""
-    return volume_m3 + par[k]
+    return volume_m3 + par.extra_volume_m3

@@ -15,9 +15,12 @@
 """What an effect file declares."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import check_parameters
+from pam_sim.records import put, put_some, record
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
@@ -55,7 +58,7 @@ class Numbers:
     pressure_pa: float = 0.0
     contraction_m: float = 0.0
     force_n: float = 0.0
-    muscle: object = None
+    muscle: Any = None
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,12 @@ class Reported:
     valves: tuple = ('ppr', 'hsv')
 
 
-def _pack_in_order(values, numbers):
-    return tuple(values.values())
+def _as_they_are(values, numbers):
+    return values
 
 
-def _no_states(values, numbers):
-    return ()
+def _at_zero(values, numbers):
+    return {}
 
 
 @dataclass(frozen=True)
@@ -104,14 +107,14 @@ class Effect:
     amplitude : tuple of str
         Parameters that switch it: all zero means the effect is not there.
     reported : tuple of Reported
-    states : int
-        Number of float64 states.
-    slots : int, optional
-        Number of packed values; by default one per parameter, in order.
+    states : numpy.dtype, optional
+        Record of its states, ``record('anchor_m')``; none by default.
+    packed : numpy.dtype, optional
+        Record that its hooks read as ``par``; by default of the parameters, by their names.
     pack : callable
-        ``pack(values, numbers) -> floats``: what the hooks find at ``par[k…]``.
+        ``pack(values, numbers) -> dict``: what ``packed`` holds, by name.
     initial : callable
-        ``initial(values, numbers) -> floats``: states at the start.
+        ``initial(values, numbers) -> dict``: states at the start, by name; others are zero.
     valves : tuple of str
         Valve types it can act with.
     order : int
@@ -134,10 +137,10 @@ class Effect:
     equation: str = ''
     variant_of: str = ''
     relative_of: tuple = ()
-    states: int = 0
-    slots: int = None
-    pack: object = _pack_in_order
-    initial: object = _no_states
+    states: np.dtype = None
+    packed: np.dtype = None
+    pack: object = _as_they_are
+    initial: object = _at_zero
     valves: tuple = ('ppr', 'hsv')
     order: int = 50
     active: object = None
@@ -145,9 +148,9 @@ class Effect:
     hooks: dict = field(default_factory=dict, compare=False)
 
     def __post_init__(self):
-        """Fill in the number of packed values and check the declaration."""
-        if self.slots is None:
-            object.__setattr__(self, 'slots', len(self.parameters))
+        """Fill in the record of the packed values and check the declaration."""
+        if self.packed is None:
+            object.__setattr__(self, 'packed', record(*(p.name for p in self.parameters)))
         known = {parameter.name for parameter in self.parameters}
         if self.subsystem not in SUBSYSTEMS or not self.amplitude or set(self.amplitude) - known:
             raise ValueError(f'effect {self.name}: wrong subsystem or amplitude')
@@ -177,9 +180,9 @@ class Effect:
             return bool(self.active(values, numbers))
         return any(values[name] != 0.0 for name in self.amplitude)
 
-    def pack_into(self, values, numbers, par, k, state, i):
+    def pack_into(self, values, numbers, par, place, state, state_place):
         """
-        Write flag, packed parameters and initial states.
+        Write packed parameters and initial states, if the effect acts.
 
         Parameters
         ----------
@@ -187,24 +190,23 @@ class Effect:
             All parameters of the effect.
         numbers : Numbers
             Of the rig.
-        par : ndarray of float64
-            ``par[k - 1]`` is the flag, ``par[k:k + slots]`` the packed values.
-        k : int
-            Place of the first packed value.
-        state : ndarray of float64
-            ``state[i:i + states]`` are the effect's states.
-        i : int
-            Place of the first state.
+        par, state : ndarray of float64
+            Arrays that hold its records, ``packed`` and ``states``.
+        place, state_place : int
+            Numbers before its records in them.
+
+        Returns
+        -------
+        bool
+            Whether it acts.
 
         """
         if not self.is_active(values, numbers):
-            par[k - 1:k + self.slots] = 0.0
-            return
-        par[k - 1] = 1.0
-        par[k:k + self.slots] = self.pack(values, numbers)
-        first = self.initial(values, numbers)
-        state[i:i + len(first)] = first
-        state[i + len(first):i + self.states] = 0.0
+            return False
+        put(par, self.packed, self.pack(values, numbers), place)
+        if self.states is not None:
+            put_some(state, self.states, self.initial(values, numbers), state_place)
+        return True
 
     def report(self, values, rig):
         """Return reported name -> (value, unit) for a rig; all of them without one."""

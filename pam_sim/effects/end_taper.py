@@ -47,6 +47,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, state, i, par, k):
+def map_input(gauge_pa, strain, par):
     """Return the strain scaled."""
-    return gauge_pa, strain * (1.0 + par[k])
+    return gauge_pa, strain * (1.0 + par.k_minus_1)

@@ -20,7 +20,6 @@ from pam_sim.effects.end_taper import EFFECT as _SIBLING, force_change_n
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
-_AT_START, _PER_STRAIN = range(2)
 _AT_M = 10e-3                # contraction for which the factor is stated
 
 
@@ -58,6 +57,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, state, i, par, k):
+def map_input(gauge_pa, strain, par):
     """Return the strain scaled."""
-    return gauge_pa, strain * (1.0 + par[k + _AT_START] + par[k + _PER_STRAIN] * strain)
+    return gauge_pa, strain * (1.0 + par.k_minus_1 + par.k_per_strain * strain)

@@ -23,10 +23,11 @@ is the rig's own supply.
 """
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
@@ -34,12 +35,10 @@ CRITICAL_RATIO = 0.3
 _GAUGE_PA, _CONTRACTION_M, _NOMINAL_SUPPLY_PA = 400e3, 0.010, 801_325.0
 _NO_LIMIT = 1e30
 _RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
-_FILL, _VENT, _SUPPLY, _ATMOSPHERE, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(8)
 
 
 def _pack(values, numbers):
-    dead, supply = numbers.parameters['V_dead'], numbers.parameters['supply_pa']
-    volume = dead + numbers.muscle.volume_m3(_CONTRACTION_M)
+    volume = numbers.parameters['V_dead'] + numbers.muscle.volume_m3(_CONTRACTION_M)
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
     if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:
@@ -48,7 +47,9 @@ def _pack(values, numbers):
     if values['vent_rate_at_400kpa_pa_per_s'] > 0.0:
         flow = mass_flow_kg_per_s(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
         vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow
-    return fill, vent, supply, P_ATM_PA, dead, *numbers.muscle.shape
+    return {'fill_m3_per_s': fill, 'vent_m3_per_s': vent,
+            'supply_pa': numbers.parameters['supply_pa'], 'atmosphere_pa': P_ATM_PA,
+            **pack_volume(numbers)}
 
 
 EFFECT = Effect(
@@ -72,7 +73,7 @@ EFFECT = Effect(
         Reported('vent_rate_at_400kpa_pa_per_s', 'Pa/s',
                  lambda values, rig: values['vent_rate_at_400kpa_pa_per_s']),
     ),
-    slots=8,
+    packed=record('fill_m3_per_s', 'vent_m3_per_s', 'supply_pa', 'atmosphere_pa', *VOLUME),
     pack=_pack,
     valves=('ppr',),
     order=40,               # the regulator's own rate: before what leaks behind it
@@ -84,14 +85,13 @@ EFFECT = Effect(
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
     """Return the pressure rate within what the orifices let through."""
-    volume = par[k + _DEAD] + volume_m3(
-        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
+    volume = air_volume_m3(contraction_m, par)
     if rate_pa_per_s > 0.0:
-        cap = par[k + _FILL] / volume
+        cap = par.fill_m3_per_s / volume
         return min(rate_pa_per_s, mass_flow_kg_per_s(
-            par[k + _SUPPLY], pressure_pa, cap, CRITICAL_RATIO))
-    cap = par[k + _VENT] / volume
+            par.supply_pa, pressure_pa, cap, CRITICAL_RATIO))
+    cap = par.vent_m3_per_s / volume
     return max(rate_pa_per_s, -mass_flow_kg_per_s(
-        pressure_pa, par[k + _ATMOSPHERE], cap, CRITICAL_RATIO))
+        pressure_pa, par.atmosphere_pa, cap, CRITICAL_RATIO))

@@ -36,6 +36,6 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+def sensor(pressure_pa, contraction_m, force_n, par):
     """Return the readings with the scale."""
-    return pressure_pa, contraction_m, force_n * (1.0 + par[k])
+    return pressure_pa, contraction_m, force_n * (1.0 + par.gain_error)

@@ -37,6 +37,6 @@ EFFECT = Effect(
 
 
 @compiled
-def load_friction(level_n, contraction_m, velocity_m_per_s, state, i, par, k):
+def load_friction(level_n, par):
     """Return the friction level of the guide with this part added."""
-    return level_n + par[k]
+    return level_n + par.force_n

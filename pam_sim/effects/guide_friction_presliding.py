@@ -21,10 +21,9 @@ from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.guide_friction import EFFECT as _SIBLING
 from pam_sim.effects.presliding import (
-    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_FREE, PRESLIDING_SLOTS,
+    advance_bending, BENDING, pack_presliding, PACKED, PARAMETERS, PRESLIDING_FREE,
     share_of_sliding, SOURCE)
-
-_LEVEL = PRESLIDING_SLOTS
+from pam_sim.records import record
 
 EFFECT = Effect(
     name='guide_friction_presliding',
@@ -39,8 +38,8 @@ EFFECT = Effect(
     parameters=(*_SIBLING.parameters, *PARAMETERS),
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
-    states=1,
-    slots=PRESLIDING_SLOTS + _SIBLING.slots,
+    packed=record(*PACKED, *_SIBLING.packed.names),
+    states=BENDING,
     pack=partial(pack_presliding, _SIBLING),
     fitting=Fitting(
         free=(FreeParameter('force_n', 1.0, 0.0, 50.0), *PRESLIDING_FREE),
@@ -49,13 +48,13 @@ EFFECT = Effect(
 
 
 @compiled
-def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def load_force(force_n, velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Return the force against contraction with the bent contact's added."""
-    return force_n + par[k + _LEVEL] * share_of_sliding(
-        velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+    return force_n + par.force_n * share_of_sliding(
+        velocity_m_per_s, dx_m, elapsed_s, state, par)
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Advance the bending of the contact."""
-    advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+    advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, par)

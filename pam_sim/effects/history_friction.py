@@ -37,22 +37,21 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
     pack_level)
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 _DEPTH = 8              # turning points remembered, the start included
-_INVERSE_WIDTH, _DRY = range(LEVEL_SLOTS, LEVEL_SLOTS + 2)
-_COUNT, _DIRECTION, _X, _H = range(4)       # then x, h of the next turn, and so on
 
 
 def _pack(values, numbers):
-    return (*pack_level(values, numbers),
-            1.0 / values['width_m'], values['dry_share'])
+    return {**pack_level(values, numbers), 'inverse_width_per_m': 1.0 / values['width_m'],
+            'dry_share': values['dry_share']}
 
 
 def _initial(values, numbers):
-    return 1.0, 0.0, numbers.contraction_m, 0.0
+    return {'count': 1.0, 'turn_m': [numbers.contraction_m] + [0.0] * (_DEPTH - 1)}
 
 
 EFFECT = Effect(
@@ -75,8 +74,9 @@ EFFECT = Effect(
     ),
     amplitude=LEVEL_AMPLITUDE,
     reported=LOOP_REPORTED,
-    states=2 + 2 * _DEPTH,
-    slots=LEVEL_SLOTS + 2,
+    # Where the muscle turned, and h there; the first is the start.
+    states=record('count', 'direction', ('turn_m', _DEPTH), ('turn_h', _DEPTH)),
+    packed=record(*LEVEL, 'inverse_width_per_m', 'dry_share'),
     pack=_pack,
     initial=_initial,
     fitting=Fitting(free=(*LEVEL_FREE, FreeParameter('width_m', 8e-4, 2e-4, 8e-3, True))),
@@ -84,85 +84,84 @@ EFFECT = Effect(
 
 
 @compiled
-def on_branch(x_m, direction, count, state, i, inverse_width):
+def on_branch(x_m, direction, count, state, inverse_width):
     """Return h at x on the branch that starts at the last of ``count`` remembered points."""
-    last = i + 2 * (count - 1)
-    widths = abs(x_m - state[last + _X]) * inverse_width
+    last = count - 1
+    widths = abs(x_m - state.turn_m[last]) * inverse_width
     if count == 1:
         return direction * (1.0 - math.exp(-widths))
-    return state[last + _H] + 2.0 * direction * (1.0 - math.exp(-0.5 * widths))
+    return state.turn_h[last] + 2.0 * direction * (1.0 - math.exp(-0.5 * widths))
 
 
 @compiled
-def still_open(x_m, direction, count, state, i):
+def still_open(x_m, direction, count, state):
     """Return how many points are left once those that the travel to x has closed are gone."""
-    while count > 2 and (x_m - state[i + _X + 2 * (count - 2)]) * direction >= 0.0:
+    while count > 2 and (x_m - state.turn_m[count - 2]) * direction >= 0.0:
         count -= 2
     if count == 2:          # grown beyond the first turn, mirrored at the start
-        mirrored = 2.0 * state[i + _X] - state[i + _X + 2]
+        mirrored = 2.0 * state.turn_m[0] - state.turn_m[1]
         if (x_m - mirrored) * direction >= 0.0:
             count = 1
     return count
 
 
 @compiled
-def travelled(x_m, dx_m, state, i, inverse_width):
+def travelled(x_m, dx_m, state, inverse_width):
     """
     Return what a travel ``dx_m`` that ends at x leads to, without noting it.
 
     Returns h, the number of points that stay remembered, the direction of the
     branch, and whether its start is a new turn to remember.
     """
-    count = int(state[i + _COUNT])
-    direction = state[i + _DIRECTION]
+    count = int(state.count)
+    direction = state.direction
     if dx_m == 0.0:
-        return on_branch(x_m, direction, count, state, i, inverse_width), count, direction, False
+        return on_branch(x_m, direction, count, state, inverse_width), count, direction, False
     onward = math.copysign(1.0, dx_m)
     if onward * direction < 0.0:
         start = x_m - dx_m
-        began = state[i + _X + 2 * (count - 1)]
+        began = state.turn_m[count - 1]
         if count == 1:
             began = 2.0 * began - start
         if (x_m - began) * onward < 0.0:
-            h = on_branch(start, direction, count, state, i, inverse_width)
+            h = on_branch(start, direction, count, state, inverse_width)
             if count < _DEPTH:
                 h += 2.0 * onward * (1.0 - math.exp(-0.5 * abs(dx_m) * inverse_width))
                 return h, count, onward, True
             # No place left: back on the same branch, the smallest cycles lose nothing.
-            h = on_branch(x_m, direction, count, state, i, inverse_width)
+            h = on_branch(x_m, direction, count, state, inverse_width)
             return h, count, direction, False
         count = max(count - 1, 1)       # turned and at once back beyond the turn before
-    count = still_open(x_m, onward, count, state, i)
-    return on_branch(x_m, onward, count, state, i, inverse_width), count, onward, False
+    count = still_open(x_m, onward, count, state)
+    return on_branch(x_m, onward, count, state, inverse_width), count, onward, False
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
+def muscle_friction(level_n, pressure_pa, par):
     """Return the friction level with the dry share added."""
-    full = loop_level_n(pressure_pa, par, k)
-    return level_n + par[k + _DRY] * max(full, 0.0)
+    full = loop_level_n(pressure_pa, par)
+    return level_n + par.dry_share * max(full, 0.0)
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, contraction_m, dx_m, state, par):
     """Return the force less the share with memory."""
-    full = loop_level_n(pressure_pa, par, k)
+    full = loop_level_n(pressure_pa, par)
     if full <= 0.0:
         return force_n
-    h, _, _, _ = travelled(contraction_m, dx_m, state, i, par[k + _INVERSE_WIDTH])
-    return force_n - full * (1.0 - par[k + _DRY]) * h
+    h, _, _, _ = travelled(contraction_m, dx_m, state, par.inverse_width_per_m)
+    return force_n - full * (1.0 - par.dry_share) * h
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(contraction_m, dx_m, state, par):
     """Remember a turn, forget the cycles that have closed."""
-    _, count, direction, turn = travelled(contraction_m, dx_m, state, i, par[k + _INVERSE_WIDTH])
+    _, count, direction, turn = travelled(contraction_m, dx_m, state, par.inverse_width_per_m)
     if turn:
         start = contraction_m - dx_m
-        state[i + _H + 2 * count] = on_branch(
-            start, state[i + _DIRECTION], count, state, i, par[k + _INVERSE_WIDTH])
-        state[i + _X + 2 * count] = start
+        state.turn_h[count] = on_branch(
+            start, state.direction, count, state, par.inverse_width_per_m)
+        state.turn_m[count] = start
         count += 1
-    state[i + _COUNT] = count
-    state[i + _DIRECTION] = direction
+    state.count = count
+    state.direction = direction

@@ -25,23 +25,22 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
     pack_level)
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 # Break-away travel and weight of each element, design values.
 WIDTHS_M = (0.1e-3, 0.4e-3, 1.2e-3, 3.0e-3)
 WEIGHTS = (0.25, 0.30, 0.25, 0.20)
 _ELEMENTS = len(WIDTHS_M)
-_TABLE = LEVEL_SLOTS
 
 
 def _pack(values, numbers):
     scale = values['width_scale']
-    table = []
-    for width, weight in zip(WIDTHS_M, WEIGHTS):
-        table += [1.0 / (width * scale), weight]
-    return (*pack_level(values, numbers), *table)
+    return {**pack_level(values, numbers),
+            'inverse_width_per_m': [1.0 / (width * scale) for width in WIDTHS_M],
+            'weight': WEIGHTS}
 
 
 EFFECT = Effect(
@@ -58,8 +57,8 @@ EFFECT = Effect(
     ),
     amplitude=LEVEL_AMPLITUDE,
     reported=LOOP_REPORTED,
-    states=_ELEMENTS,
-    slots=LEVEL_SLOTS + 2 * _ELEMENTS,
+    states=record(('slip', _ELEMENTS)),
+    packed=record(*LEVEL, ('inverse_width_per_m', _ELEMENTS), ('weight', _ELEMENTS)),
     pack=_pack,
     fitting=Fitting(
         free=(*LEVEL_FREE, FreeParameter('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
@@ -68,22 +67,21 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, dx_m, state, par):
     """Return the force less the slip elements' share at travel ``dx_m`` from the step start."""
-    level = loop_level_n(pressure_pa, par, k)
+    level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
         return force_n
     total = 0.0
     for j in range(_ELEMENTS):
-        z = state[i + j] + dx_m * par[k + _TABLE + 2 * j]
-        total += par[k + _TABLE + 2 * j + 1] * min(max(z, -1.0), 1.0)
+        z = state.slip[j] + dx_m * par.inverse_width_per_m[j]
+        total += par.weight[j] * min(max(z, -1.0), 1.0)
     return force_n - level * total
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(dx_m, state, par):
     """Advance the slip states."""
     for j in range(_ELEMENTS):
-        z = state[i + j] + dx_m * par[k + _TABLE + 2 * j]
-        state[i + j] = min(max(z, -1.0), 1.0)
+        z = state.slip[j] + dx_m * par.inverse_width_per_m[j]
+        state.slip[j] = min(max(z, -1.0), 1.0)

@@ -29,18 +29,18 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
     pack_level)
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
-_INVERSE_WIDTH, _EXPONENT, _BACK = range(LEVEL_SLOTS, LEVEL_SLOTS + 3)
 _LONGEST = 0.05         # of one midpoint step, in widths: z is good to 0.002
 _FAR = 20.0             # widths after which z no longer depends on where it began
 
 
 def _pack(values, numbers):
-    return (*pack_level(values, numbers),
-            1.0 / values['width_m'], values['exponent'], 2.0 * values['sigma'] - 1.0)
+    return {**pack_level(values, numbers), 'inverse_width_per_m': 1.0 / values['width_m'],
+            'exponent': values['exponent'], 'back': 2.0 * values['sigma'] - 1.0}
 
 
 EFFECT = Effect(
@@ -63,8 +63,8 @@ EFFECT = Effect(
     ),
     amplitude=LEVEL_AMPLITUDE,
     reported=LOOP_REPORTED,
-    states=1,
-    slots=LEVEL_SLOTS + 3,
+    states=record('share'),
+    packed=record(*LEVEL, 'inverse_width_per_m', 'exponent', 'back'),
     pack=_pack,
     fitting=Fitting(free=(*LEVEL_FREE, FreeParameter('width_m', 8e-4, 2e-4, 8e-3, True))),
 )
@@ -94,18 +94,17 @@ def loaded(z, widths, exponent, back):
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, dx_m, state, par):
     """Return the force less the loop's share at travel ``dx_m`` from the step start."""
-    level = loop_level_n(pressure_pa, par, k)
+    level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
         return force_n
     return force_n - level * loaded(
-        state[i], dx_m * par[k + _INVERSE_WIDTH], par[k + _EXPONENT], par[k + _BACK])
+        state.share, dx_m * par.inverse_width_per_m, par.exponent, par.back)
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(dx_m, state, par):
     """Advance the loop's state."""
-    state[i] = loaded(
-        state[i], dx_m * par[k + _INVERSE_WIDTH], par[k + _EXPONENT], par[k + _BACK])
+    state.share = loaded(
+        state.share, dx_m * par.inverse_width_per_m, par.exponent, par.back)

@@ -35,20 +35,21 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, LEVEL_SLOTS, loop_level_n, LOOP_REPORTED,
+    LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
     pack_level)
 from pam_sim.effects.presliding import bent
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
-_STIFFNESS, _DAMPING, _EXCESS, _INVERSE_SPEED = range(LEVEL_SLOTS, LEVEL_SLOTS + 4)
 
 _NARROW_M, _AT_PA = 1e-4, 4e5      # a loop that is narrower at this pressure is dry friction
 
 
 def _pack(values, numbers):
-    return (*pack_level(values, numbers),
-            values['stiffness_n_per_m'], values['bristle_damping_n_s_per_m'],
-            values['static_ratio'] - 1.0, 1.0 / values['stribeck_m_per_s'])
+    return {**pack_level(values, numbers), 'stiffness_n_per_m': values['stiffness_n_per_m'],
+            'bristle_damping_n_s_per_m': values['bristle_damping_n_s_per_m'],
+            'static_excess': values['static_ratio'] - 1.0,
+            'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s']}
 
 
 def _is_dry(values):
@@ -85,8 +86,9 @@ EFFECT = Effect(
     ),
     amplitude=LEVEL_AMPLITUDE,
     reported=LOOP_REPORTED,
-    states=1,
-    slots=LEVEL_SLOTS + 4,
+    states=record('bending_m'),
+    packed=record(*LEVEL, 'stiffness_n_per_m', 'bristle_damping_n_s_per_m', 'static_excess',
+                  'inverse_stribeck_s_per_m'),
     pack=_pack,
     fitting=Fitting(
         free=(*LEVEL_FREE, FreeParameter('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
@@ -95,31 +97,30 @@ EFFECT = Effect(
 
 
 @compiled
-def bending_when_sliding(pressure_pa, velocity_m_per_s, par, k):
+def bending_when_sliding(pressure_pa, velocity_m_per_s, par):
     """Return the bristles' bending [m] in steady sliding, g / sigma0; 0 without friction."""
-    level = loop_level_n(pressure_pa, par, k)
+    level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
         return 0.0
-    square = (velocity_m_per_s * par[k + _INVERSE_SPEED]) ** 2
+    square = (velocity_m_per_s * par.inverse_stribeck_s_per_m) ** 2
     if square < 40.0:           # beyond, less than the last bit
-        level *= 1.0 + par[k + _EXCESS] * math.exp(-square)
-    return level / par[k + _STIFFNESS]
+        level *= 1.0 + par.static_excess * math.exp(-square)
+    return level / par.stiffness_n_per_m
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, velocity_m_per_s, dx_m, state, par):
     """Return the force less that of the bristles at travel ``dx_m`` from the step start."""
-    sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par, k)
+    sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
     if sliding_m <= 0.0:
         return force_n
-    z = bent(state[i], dx_m, sliding_m)
+    z = bent(state.bending_m, dx_m, sliding_m)
     rate = velocity_m_per_s - abs(velocity_m_per_s) * z / sliding_m
-    return force_n - par[k + _STIFFNESS] * z - par[k + _DAMPING] * rate
+    return force_n - par.stiffness_n_per_m * z - par.bristle_damping_n_s_per_m * rate
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(pressure_pa, velocity_m_per_s, dx_m, state, par):
     """Advance the bending of the bristles."""
-    sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par, k)
-    state[i] = bent(state[i], dx_m, sliding_m) if sliding_m > 0.0 else 0.0
+    sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
+    state.bending_m = bent(state.bending_m, dx_m, sliding_m) if sliding_m > 0.0 else 0.0

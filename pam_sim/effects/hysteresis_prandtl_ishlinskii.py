@@ -34,22 +34,23 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 # Half width of each play over that of the loop, and its weight: design values.
 # The weights add to one and the products to one.
 RATIOS = (0.1, 0.4, 1.0, 2.5)
 WEIGHTS = (0.25, 0.25, 0.25, 0.25)
 _PLAYS = len(RATIOS)
-_WIDTH, _PER_PA, _ATMOSPHERE = range(3)
 _AT_PA, _AT_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
 def _pack(values, numbers):
-    return values['half_width_pa'], values['half_width_per_pa'], numbers.parameters['p_atm']
+    return {**values, 'atmosphere_pa': numbers.parameters['p_atm']}
 
 
 def _initial(values, numbers):
-    return (numbers.pressure_pa - numbers.parameters['p_atm'],) * _PLAYS     # all centred
+    # All centred.
+    return {'play_pa': [numbers.pressure_pa - numbers.parameters['p_atm']] * _PLAYS}
 
 
 def _half_width_n(values, rig):
@@ -80,8 +81,8 @@ EFFECT = Effect(
     ),
     amplitude=('half_width_pa', 'half_width_per_pa'),
     reported=(Reported('loop_half_width_at_400kpa_n', 'N', _half_width_n),),
-    states=_PLAYS,
-    slots=3,
+    states=record(('play_pa', _PLAYS)),
+    packed=record('half_width_pa', 'half_width_per_pa', 'atmosphere_pa'),
     pack=_pack,
     initial=_initial,
     order=40,               # on the true pressure, before a threshold is taken off
@@ -99,19 +100,19 @@ def played(y, gauge_pa, half_width_pa):
 
 
 @compiled
-def map_input(gauge_pa, strain, state, i, par, k):
+def map_input(gauge_pa, strain, state, par):
     """Return the pressure behind the plays."""
-    half = max(par[k + _WIDTH] + par[k + _PER_PA] * gauge_pa, 0.0)
+    half = max(par.half_width_pa + par.half_width_per_pa * gauge_pa, 0.0)
     shift = 0.0
     for j in range(_PLAYS):
-        shift += WEIGHTS[j] * (played(state[i + j], gauge_pa, RATIOS[j] * half) - gauge_pa)
+        shift += WEIGHTS[j] * (played(state.play_pa[j], gauge_pa, RATIOS[j] * half) - gauge_pa)
     return gauge_pa + shift, strain
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(pressure_pa, state, par):
     """Advance the plays."""
-    gauge_pa = pressure_pa - par[k + _ATMOSPHERE]
-    half = max(par[k + _WIDTH] + par[k + _PER_PA] * gauge_pa, 0.0)
+    gauge_pa = pressure_pa - par.atmosphere_pa
+    half = max(par.half_width_pa + par.half_width_per_pa * gauge_pa, 0.0)
     for j in range(_PLAYS):
-        state[i + j] = played(state[i + j], gauge_pa, RATIOS[j] * half)
+        state.play_pa[j] = played(state.play_pa[j], gauge_pa, RATIOS[j] * half)

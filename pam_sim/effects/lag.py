@@ -22,37 +22,39 @@ as linear between its samples, a command as held.
 import math
 
 from pam_sim.compiled import compiled
+from pam_sim.records import record
 
-_DECAY, _STEPS = range(2)           # of samples: exp(-dt / tau); tau / dt
+SAMPLED = record('decay', 'steps')          # of samples: exp(-dt / tau); tau / dt
+READING = record('reading', 'true')         # of a sensor: lagged, and the sample it follows
+HELD = record('decay', 'mean_share')        # of a held input, over a physics step
+
 _MEAN = 1                           # of a held input, behind the decay over a physics step
-_READING, _TRUE = range(2)
 
 
 def pack_sampled(values, numbers):
     """Return the packed values of a lag of samples: decay over a step, steps per tau."""
     steps = values['time_constant_s'] / numbers.dt_s
-    return math.exp(-1.0 / steps), steps
+    return {'decay': math.exp(-1.0 / steps), 'steps': steps}
 
 
 def pack_held(values, numbers):
     """Return the packed values of a lag of a held input: decay over a physics step, its mean."""
     ratio = numbers.substep_s / values['time_constant_s']
     decay = math.exp(-ratio)
-    return decay, -math.expm1(-ratio) / ratio
+    return {'decay': decay, 'mean_share': -math.expm1(-ratio) / ratio}
 
 
 @compiled
-def advance_sampled(true, state, i, par, k):
-    """Advance the lagged reading ``state[i]`` to the sample ``true``, kept behind it."""
-    slope = (true - state[i + _TRUE]) * par[k + _STEPS]
-    state[i + _READING] = true - slope + (
-        state[i + _READING] - state[i + _TRUE] + slope) * par[k + _DECAY]
-    state[i + _TRUE] = true
+def advance_sampled(true, state, par):
+    """Advance the lagged reading, a ``READING``, to the sample ``true``."""
+    slope = (true - state.true) * par.steps
+    state.reading = true - slope + (
+        state.reading - state.true + slope) * par.decay
+    state.true = true
 
 
 @compiled
-def mean_of_held(u, state, i, par, k):
-    """Return the mean of the lagged value ``state[i]`` over a physics step and advance it."""
-    distance = state[i] - u
-    state[i] = u + distance * par[k + _DECAY]
-    return u + distance * par[k + _MEAN]
+def mean_of_held(u, lagged, par):
+    """Return (mean of a lagged value over a physics step, its value at the end)."""
+    distance = lagged - u
+    return u + distance * par.mean_share, u + distance * par.decay

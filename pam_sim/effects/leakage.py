@@ -20,23 +20,23 @@ left with a small droop.
 """
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.units import (
     GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
 CRITICAL_RATIO = 0.5
 _KG_PER_S_PA = RHO_REFERENCE * (T_REFERENCE_K / TEMPERATURE_K) ** 0.5
-_CONDUCTANCE, _ATMOSPHERE, _RT, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE = range(7)
 
 
 def _pack(values, numbers):
-    return (values['conductance_m3_per_s_pa'] * _KG_PER_S_PA, P_ATM_PA,
-            GAS_CONSTANT_AIR * TEMPERATURE_K, numbers.parameters['V_dead'],
-            *numbers.muscle.shape)
+    return {'conductance_kg_per_s_pa': values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
+            'atmosphere_pa': P_ATM_PA, 'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K,
+            **pack_volume(numbers)}
 
 
 def flow_at_400kpa(values, rig):
@@ -64,24 +64,23 @@ EFFECT = Effect(
                  lambda values, rig: values['conductance_m3_per_s_pa']),
         Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', flow_at_400kpa),
     ),
-    slots=7,
+    packed=record('conductance_kg_per_s_pa', 'atmosphere_pa', 'rt_j_per_kg', *VOLUME),
     pack=_pack,
     fitting=Fitting(free=(FreeParameter('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),)),
 )
 
 
 @compiled
-def mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, i, par, k):
+def mass_flow(flow_kg_per_s, pressure_pa, par):
     """Return the net flow less the leak."""
     return flow_kg_per_s - mass_flow_kg_per_s(
-        pressure_pa, par[k + _ATMOSPHERE], par[k + _CONDUCTANCE], CRITICAL_RATIO)
+        pressure_pa, par.atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
     """Return the pressure rate behind the PPR less the leak's share."""
     lost = mass_flow_kg_per_s(
-        pressure_pa, par[k + _ATMOSPHERE], par[k + _CONDUCTANCE], CRITICAL_RATIO)
-    volume = par[k + _DEAD] + volume_m3(
-        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
-    return rate_pa_per_s - par[k + _RT] / volume * lost
+        pressure_pa, par.atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)
+    volume = air_volume_m3(contraction_m, par)
+    return rate_pa_per_s - par.rt_j_per_kg / volume * lost

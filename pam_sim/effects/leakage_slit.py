@@ -21,21 +21,21 @@ grows with p.
 
 import numpy as np
 from pam_sim.compiled import compiled
+from pam_sim.effects.air_volume import air_volume_m3
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.leakage import CRITICAL_RATIO, EFFECT as _SIBLING, flow_at_400kpa
-from pam_sim.muscle.geometry import volume_m3
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
 _SQUARED = (400e3 + P_ATM_PA) ** 2 - P_ATM_PA**2
-_CONDUCTANCE, _ATMOSPHERE, _RT, _DEAD, _LENGTH, _THREAD_SQUARED, _INVERSE, _SLIT = range(8)
 
 
 def _pack(values, numbers):
-    return (*_SIBLING.pack(values, numbers),
-            values['slit_flow_at_400kpa_kg_per_s'] / _SQUARED)
+    return {**_SIBLING.pack(values, numbers),
+            'slit_kg_per_s_pa2': values['slit_flow_at_400kpa_kg_per_s'] / _SQUARED}
 
 
 def slit_share(pressure_pa):
@@ -71,7 +71,7 @@ EFFECT = Effect(
         Reported('conductance_m3_per_s_pa', 'm3/(s Pa)', _conductance),
         Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', _flow_at_400kpa),
     ),
-    slots=8,
+    packed=record('slit_kg_per_s_pa2', *_SIBLING.packed.names),
     pack=_pack,
     fitting=Fitting(
         free=(
@@ -81,25 +81,25 @@ EFFECT = Effect(
 
 
 @compiled
-def lost_kg_per_s(pressure_pa, par, k):
+def lost_kg_per_s(pressure_pa, par):
     """Return the mass flow of orifice and slit [kg/s]."""
-    atmosphere_pa = par[k + _ATMOSPHERE]
+    atmosphere_pa = par.atmosphere_pa
     lost = mass_flow_kg_per_s(
-        pressure_pa, atmosphere_pa, par[k + _CONDUCTANCE], CRITICAL_RATIO)
+        pressure_pa, atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)
     if pressure_pa > atmosphere_pa:
-        lost += par[k + _SLIT] * (pressure_pa - atmosphere_pa) * (pressure_pa + atmosphere_pa)
+        lost += par.slit_kg_per_s_pa2 * (
+            pressure_pa - atmosphere_pa) * (pressure_pa + atmosphere_pa)
     return lost
 
 
 @compiled
-def mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, i, par, k):
+def mass_flow(flow_kg_per_s, pressure_pa, par):
     """Return the net flow less the leak."""
-    return flow_kg_per_s - lost_kg_per_s(pressure_pa, par, k)
+    return flow_kg_per_s - lost_kg_per_s(pressure_pa, par)
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, i, par, k):
+def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
     """Return the pressure rate behind the PPR less the leak's share."""
-    volume = par[k + _DEAD] + volume_m3(
-        contraction_m, par[k + _LENGTH], par[k + _THREAD_SQUARED], par[k + _INVERSE])
-    return rate_pa_per_s - par[k + _RT] / volume * lost_kg_per_s(pressure_pa, par, k)
+    volume = air_volume_m3(contraction_m, par)
+    return rate_pa_per_s - par.rt_j_per_kg / volume * lost_kg_per_s(pressure_pa, par)

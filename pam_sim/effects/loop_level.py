@@ -15,8 +15,8 @@
 """
 The level of friction that the effects with a loop share: F_h = F0 + k_p p_g.
 
-An effect lists ``level_parameters`` first, packs ``pack_level`` first, and finds its own
-packed values from ``par[k + LEVEL_SLOTS]`` on.
+An effect lists ``level_parameters`` among its parameters and packs the fields ``LEVEL`` with
+``pack_level``.
 """
 
 from pam_sim.compiled import compiled
@@ -25,8 +25,7 @@ from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 
 LEVEL_AMPLITUDE = ('force_n', 'force_per_pa')
-LEVEL_SLOTS = 3
-_FORCE, _PER_PA, _ATMOSPHERE = range(LEVEL_SLOTS)
+LEVEL = 'force_n', 'force_per_pa', 'atmosphere_pa'
 LOOP_REPORTED = (Reported(
     'loop_half_width_at_400kpa_n', 'N',
     lambda values, rig: values['force_n'] + 400e3 * values['force_per_pa']),)
@@ -47,10 +46,11 @@ def level_parameters(what='half width of the loop'):
 
 def pack_level(values, numbers):
     """Return the packed values of the level."""
-    return values['force_n'], values['force_per_pa'], numbers.parameters['p_atm']
+    return {'force_n': values['force_n'], 'force_per_pa': values['force_per_pa'],
+            'atmosphere_pa': numbers.parameters['p_atm']}
 
 
 @compiled
-def loop_level_n(pressure_pa, par, k):
+def loop_level_n(pressure_pa, par):
     """Return the level [N] at an absolute pressure [Pa]; it may be negative far below one bar."""
-    return par[k + _FORCE] + par[k + _PER_PA] * (pressure_pa - par[k + _ATMOSPHERE])
+    return par.force_n + par.force_per_pa * (pressure_pa - par.atmosphere_pa)

@@ -36,6 +36,6 @@ EFFECT = Effect(
 
 
 @compiled
-def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def load_force(force_n, contraction_m, par):
     """Return the force against contraction with the spring's added."""
-    return force_n + par[k] * contraction_m
+    return force_n + par.stiffness_n_per_m * contraction_m

@@ -19,7 +19,7 @@ from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.parallel_spring import EFFECT as _SIBLING
 from pam_sim.effects.progressive import (
-    HARDENING, HARDENING_FREE, pack_progressive, SECANT_REPORTED, SOURCE, spring_n)
+    HARDENING, HARDENING_FREE, pack_progressive, PROGRESSIVE, SECANT_REPORTED, SOURCE, spring_n)
 
 EFFECT = Effect(
     name='parallel_spring_progressive',
@@ -33,12 +33,13 @@ EFFECT = Effect(
     parameters=(*_SIBLING.parameters, HARDENING),
     amplitude=_SIBLING.amplitude,
     reported=SECANT_REPORTED,
+    packed=PROGRESSIVE,
     pack=pack_progressive,
     fitting=Fitting(free=(FreeParameter('stiffness_n_per_m', 300.0, 0.0, 1e4), HARDENING_FREE)),
 )
 
 
 @compiled
-def load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def load_force(force_n, contraction_m, par):
     """Return the force against contraction with the spring's added."""
-    return force_n + spring_n(contraction_m, par, k)
+    return force_n + spring_n(contraction_m, par)

@@ -31,6 +31,7 @@ import math
 from pam_sim.compiled import compiled
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 SOURCE = ('LuGre, Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE Trans. Automatic '
           'Control 40(3). Sizes: design values.')
@@ -48,16 +49,17 @@ PARAMETERS = (
 PRESLIDING_FREE = (
     FreeParameter('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
     FreeParameter('static_excess', 0.05, 0.0, 0.6))
-PRESLIDING_SLOTS = 4
-_WAY, _TIME, _EXCESS, _INVERSE_SPEED = range(PRESLIDING_SLOTS)
+PACKED = 'presliding_m', 'bristle_time_s', 'static_excess', 'inverse_stribeck_s_per_m'
+BENDING = record('bending_m')
 _SLIDING = 40.0             # square of a relative speed; beyond, less than the last bit
 
 
 def pack_presliding(plain, values, numbers):
     """Return the packed values: those of presliding, then those of the ``plain`` effect."""
-    return (values['presliding_m'], values['bristle_time_s'], values['static_excess'],
-            1.0 / values['stribeck_m_per_s'],
-            *plain.pack({p.name: values[p.name] for p in plain.parameters}, numbers))
+    return {'presliding_m': values['presliding_m'], 'bristle_time_s': values['bristle_time_s'],
+            'static_excess': values['static_excess'],
+            'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s'],
+            **plain.pack({p.name: values[p.name] for p in plain.parameters}, numbers)}
 
 
 @compiled
@@ -84,32 +86,32 @@ def bent_there_and_back(z_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m):
 
 
 @compiled
-def at_rest(velocity_m_per_s, par, k):
+def at_rest(velocity_m_per_s, par):
     """Return how much a velocity is as rest: 1 at none, 0 far above the Stribeck speed."""
-    square = (velocity_m_per_s * par[k + _INVERSE_SPEED]) ** 2
+    square = (velocity_m_per_s * par.inverse_stribeck_s_per_m) ** 2
     return math.exp(-square) if square < _SLIDING else 0.0
 
 
 @compiled
-def bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def bending(velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Return (bending, that in steady sliding [m], how much it is at rest) at travel ``dx_m``."""
-    rest = at_rest(velocity_m_per_s, par, k)
-    sliding_m = par[k + _WAY] * (1.0 + par[k + _EXCESS] * rest)
-    z = bent_there_and_back(state[i], dx_m, velocity_m_per_s, elapsed_s, sliding_m)
+    rest = at_rest(velocity_m_per_s, par)
+    sliding_m = par.presliding_m * (1.0 + par.static_excess * rest)
+    z = bent_there_and_back(state.bending_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m)
     return z, sliding_m, rest
 
 
 @compiled
-def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
-    z, sliding_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+    z, sliding_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)
     if rest > 0.0:
         rate = velocity_m_per_s - abs(velocity_m_per_s) * z / sliding_m
-        z += par[k + _TIME] * rest * rate
-    return z / par[k + _WAY]
+        z += par.bristle_time_s * rest * rate
+    return z / par.presliding_m
 
 
 @compiled
-def advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Advance the bending by the travel of a step."""
-    state[i] = bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)[0]
+    state.bending_m = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)[0]

@@ -37,6 +37,6 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+def sensor(pressure_pa, contraction_m, force_n, par):
     """Return the readings with the offset."""
-    return pressure_pa + par[k], contraction_m, force_n
+    return pressure_pa + par.bias_pa, contraction_m, force_n

@@ -18,14 +18,14 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 
 _REFERENCE_PA = 400e3
-_PER_PA, _ATMOSPHERE = range(2)
 
 
 def _pack(values, numbers):
-    return values['force_at_400kpa_n'] / _REFERENCE_PA, P_ATM_PA
+    return {'force_per_pa': values['force_at_400kpa_n'] / _REFERENCE_PA, 'atmosphere_pa': P_ATM_PA}
 
 
 EFFECT = Effect(
@@ -43,13 +43,13 @@ EFFECT = Effect(
     amplitude=('force_at_400kpa_n',),
     reported=(Reported(
         'force_at_400kpa_n', 'N', lambda values, rig: values['force_at_400kpa_n']),),
-    slots=2,
+    packed=record('force_per_pa', 'atmosphere_pa'),
     pack=_pack,
     fitting=Fitting(free=(FreeParameter('force_at_400kpa_n', 1.0, 0.0, 100.0),)),
 )
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, i, par, k):
+def muscle_friction(level_n, pressure_pa, par):
     """Return the friction level with this part added."""
-    return level_n + par[k + _PER_PA] * max(pressure_pa - par[k + _ATMOSPHERE], 0.0)
+    return level_n + par.force_per_pa * max(pressure_pa - par.atmosphere_pa, 0.0)

@@ -20,11 +20,10 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.presliding import (
-    advance_bending, pack_presliding, PARAMETERS, PRESLIDING_FREE, PRESLIDING_SLOTS,
+    advance_bending, BENDING, pack_presliding, PACKED, PARAMETERS, PRESLIDING_FREE,
     share_of_sliding, SOURCE)
 from pam_sim.effects.pressure_friction import EFFECT as _SIBLING
-
-_LEVEL = PRESLIDING_SLOTS
+from pam_sim.records import record
 
 EFFECT = Effect(
     name='pressure_friction_presliding',
@@ -39,8 +38,8 @@ EFFECT = Effect(
     parameters=(*_SIBLING.parameters, *PARAMETERS),
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
-    states=1,
-    slots=PRESLIDING_SLOTS + _SIBLING.slots,
+    packed=record(*PACKED, *_SIBLING.packed.names),
+    states=BENDING,
     pack=partial(pack_presliding, _SIBLING),
     fitting=Fitting(
         free=(FreeParameter('force_at_400kpa_n', 1.0, 0.0, 100.0), *PRESLIDING_FREE),
@@ -49,15 +48,14 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Return the force less that of the bent contact."""
-    level_n = par[k + _LEVEL] * max(pressure_pa - par[k + _LEVEL + 1], 0.0)
+    level_n = par.force_per_pa * max(pressure_pa - par.atmosphere_pa, 0.0)
     return force_n - level_n * share_of_sliding(
-        velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+        velocity_m_per_s, dx_m, elapsed_s, state, par)
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(velocity_m_per_s, dx_m, elapsed_s, state, par):
     """Advance the bending of the contact."""
-    advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, i, par, k)
+    advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, par)

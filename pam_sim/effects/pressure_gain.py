@@ -37,6 +37,6 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+def sensor(pressure_pa, contraction_m, force_n, par):
     """Return the readings with the scale."""
-    return pressure_pa + par[k] * (pressure_pa - P_ATM_PA), contraction_m, force_n
+    return pressure_pa + par.gain_error * (pressure_pa - P_ATM_PA), contraction_m, force_n

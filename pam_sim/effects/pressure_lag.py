@@ -17,12 +17,12 @@
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
-from pam_sim.effects.lag import advance_sampled, pack_sampled
+from pam_sim.effects.lag import advance_sampled, pack_sampled, READING, SAMPLED
 from pam_sim.parameters import Parameter
 
 
 def _initial(values, numbers):
-    return numbers.pressure_pa, numbers.pressure_pa
+    return {'reading': numbers.pressure_pa, 'true': numbers.pressure_pa}
 
 
 EFFECT = Effect(
@@ -37,9 +37,9 @@ EFFECT = Effect(
     ),
     amplitude=('time_constant_s',),
     reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
-    states=2,
-    slots=2,
+    packed=SAMPLED,
     pack=pack_sampled,
+    states=READING,
     initial=_initial,
     active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
     order=30,               # before scale and offset
@@ -51,12 +51,12 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor_commit(pressure_pa, contraction_m, force_n, dt_s, state, i, par, k):
+def sensor_commit(pressure_pa, state, par):
     """Advance the lagged reading by one step."""
-    advance_sampled(pressure_pa, state, i, par, k)
+    advance_sampled(pressure_pa, state, par)
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, state, i, par, k):
+def sensor(contraction_m, force_n, state):
     """Return the readings with the lag."""
-    return state[i], contraction_m, force_n
+    return state.reading, contraction_m, force_n

@@ -22,24 +22,27 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Reported
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 SOURCE = 'Spring with a linear rise of its secant; form and size: design choice.'
 HARDENING = Parameter('hardening_m', 'm', 0.1, 2e-3, 100.0,
                       description='Contraction x_h at which the secant has doubled.')
 HARDENING_FREE = FreeParameter('hardening_m', 0.1, 0.01, 1.0, True, ends=())
-_STIFFNESS, _PER_M = range(2)
 _AT_M = 14e-3               # where the secant is that of a linear spring fitted over the stroke
 SECANT_REPORTED = (Reported(
     'stiffness_n_per_m', 'N/m', lambda values, rig: values['stiffness_n_per_m'] * (
         1.0 + _AT_M / values['hardening_m'])),)
+PROGRESSIVE = record('stiffness_n_per_m', 'inverse_hardening_per_m')
 
 
 def pack_progressive(values, numbers):
     """Return the packed values: stiffness, inverse hardening."""
-    return values['stiffness_n_per_m'], 1.0 / values['hardening_m']
+    return {'stiffness_n_per_m': values['stiffness_n_per_m'],
+            'inverse_hardening_per_m': 1.0 / values['hardening_m']}
 
 
 @compiled
-def spring_n(contraction_m, par, k):
+def spring_n(contraction_m, par):
     """Return the force of the spring [N] at a contraction."""
-    return par[k + _STIFFNESS] * contraction_m * (1.0 + contraction_m * par[k + _PER_M])
+    return par.stiffness_n_per_m * contraction_m * (
+        1.0 + contraction_m * par.inverse_hardening_per_m)

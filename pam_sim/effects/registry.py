@@ -20,11 +20,12 @@ from pathlib import Path
 from pam_sim.effects.effect import Effect
 from pam_sim.errors import InputError
 from pam_sim.plugins import pick, plugin_files, plugin_module
-from pam_sim.rollout.hooks import HOOKS
+from pam_sim.rollout.hooks import check_hook, HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('effect', 'fitting', 'registry')
-_SHARED = ('lag', 'loop_level', 'presliding', 'progressive')   # that several effects call
+# What several effects call.
+_SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive')
 
 
 def effect_files():
@@ -40,7 +41,7 @@ def effects():
     Raises
     ------
     InputError
-        A file without ``EFFECT``, or a name defined twice.
+        A file without ``EFFECT``, a name defined twice, or a hook that names what it has not.
 
     """
     found = {}
@@ -56,6 +57,8 @@ def effects():
                 f'effect `{effect.name}` must be defined once, in a file of its name', str(path))
         effect.hooks.update(
             {hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)})
+        for hook, function in effect.hooks.items():
+            check_hook(hook, function, effect.states is not None, path)
         found[effect.name] = effect
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
 

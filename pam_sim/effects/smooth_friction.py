@@ -27,14 +27,13 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
-    LEVEL_AMPLITUDE, LEVEL_FREE, LEVEL_SLOTS, loop_level_n, pack_level)
+    LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, loop_level_n, pack_level)
 from pam_sim.parameters import Parameter
-
-_INVERSE_SPEED = LEVEL_SLOTS
+from pam_sim.records import record
 
 
 def _pack(values, numbers):
-    return (*pack_level(values, numbers), 1.0 / values['speed_m_per_s'])
+    return {**pack_level(values, numbers), 'inverse_speed_s_per_m': 1.0 / values['speed_m_per_s']}
 
 
 EFFECT = Effect(
@@ -54,7 +53,7 @@ EFFECT = Effect(
     ),
     amplitude=LEVEL_AMPLITUDE,
     reported=(Reported('force_n', 'N', lambda values, rig: values['force_n']),),
-    slots=LEVEL_SLOTS + 1,
+    packed=record(*LEVEL, 'inverse_speed_s_per_m'),
     pack=_pack,
     fitting=Fitting(
         free=(*LEVEL_FREE, FreeParameter('speed_m_per_s', 1e-3, 2e-4, 0.02, True, ends=()))),
@@ -62,8 +61,7 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, pressure_pa, velocity_m_per_s, par):
     """Return the force less that of the contact."""
-    return force_n - loop_level_n(pressure_pa, par, k) * math.tanh(
-        velocity_m_per_s * par[k + _INVERSE_SPEED])
+    return force_n - loop_level_n(pressure_pa, par) * math.tanh(
+        velocity_m_per_s * par.inverse_speed_s_per_m)

@@ -26,12 +26,10 @@ from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
-from pam_sim.rollout.layout import S_FILLED, S_SUPPLY
+from pam_sim.records import record
 from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 
 _SMALLEST_M3 = 1e-6         # below, one step would empty it
-_PA_PER_KG, _COMPRESSOR, _LOW, _HIGH = range(4)
-_PRESSURE, _CHANGE, _FILLED, _RUNS = range(4)
 
 
 def _pack(values, numbers):
@@ -39,12 +37,13 @@ def _pack(values, numbers):
     if volume < _SMALLEST_M3:
         raise InputError(f'`reservoir_volume_m3` is {volume:g}; allowed 0 (no reservoir) or at '
                          f'least {_SMALLEST_M3:g} m3', 'supply_droop')
-    return (GAS_CONSTANT_AIR * TEMPERATURE_K / volume,
-            values['compressor_flow_kg_per_s'], full - values['band_pa'], full)
+    return {'pa_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K / volume,
+            'compressor_flow_kg_per_s': values['compressor_flow_kg_per_s'],
+            'low_pa': full - values['band_pa'], 'high_pa': full}
 
 
 def _initial(values, numbers):
-    return numbers.parameters['supply_pa'], 0.0, 0.0, 0.0
+    return {'pressure_pa': numbers.parameters['supply_pa']}
 
 
 EFFECT = Effect(
@@ -66,8 +65,8 @@ EFFECT = Effect(
     amplitude=('reservoir_volume_m3',),
     reported=(Reported(
         'reservoir_volume_m3', 'm3', lambda values, rig: values['reservoir_volume_m3']),),
-    states=4,
-    slots=4,
+    states=record('pressure_pa', 'change_pa', 'filled_kg', 'compressor_runs'),
+    packed=record('pa_per_kg', 'compressor_flow_kg_per_s', 'low_pa', 'high_pa'),
     pack=_pack,
     initial=_initial,
     valves=('hsv',),
@@ -80,23 +79,23 @@ EFFECT = Effect(
 
 
 @compiled
-def supply(supply_pa, state, i, par, k):
+def supply(state):
     """Return the pressure of the reservoir at the middle of the step, by the last change."""
-    return state[i + _PRESSURE] + 0.5 * state[i + _CHANGE]
+    return state.pressure_pa + 0.5 * state.change_pa
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(elapsed_s, state, par, plant):
     """Take what the fill valve let through out of the reservoir."""
-    used = state[S_FILLED] - state[i + _FILLED]
-    given = par[k + _COMPRESSOR] * elapsed_s if state[i + _RUNS] != 0.0 else 0.0
-    change = par[k + _PA_PER_KG] * (given - used)
-    now = state[i + _PRESSURE] + change
-    state[i + _PRESSURE] = now
-    state[i + _CHANGE] = change
-    state[i + _FILLED] = state[S_FILLED]
-    if now <= par[k + _LOW]:
-        state[i + _RUNS] = 1.0
-    elif now >= par[k + _HIGH]:
-        state[i + _RUNS] = 0.0
-    state[S_SUPPLY] = now
+    used = plant.filled_kg - state.filled_kg
+    given = par.compressor_flow_kg_per_s * elapsed_s if state.compressor_runs != 0.0 else 0.0
+    change = par.pa_per_kg * (given - used)
+    now = state.pressure_pa + change
+    state.pressure_pa = now
+    state.change_pa = change
+    state.filled_kg = plant.filled_kg
+    if now <= par.low_pa:
+        state.compressor_runs = 1.0
+    elif now >= par.high_pa:
+        state.compressor_runs = 0.0
+    plant.supply_pa = now

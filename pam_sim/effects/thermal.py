@@ -30,22 +30,24 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 
 GAMMA = 1.4
 REFERENCE_MASS_KG = 8e-5
 CV = GAS_CONSTANT_AIR / (GAMMA - 1.0)
-_CONDUCTANCE, _AMBIENT_RT = range(2)        # hA / cv [kg/s]; R T_0 [J/kg]
-_RT, _STAGE = range(2)                      # R T at the start and at a stage of the step
 _SMALL_LOSS = 0.02
 
 
 def _pack(values, numbers):
-    return (REFERENCE_MASS_KG / values['heat_exchange_time_s'], GAS_CONSTANT_AIR * TEMPERATURE_K)
+    # hA / cv and R T_0.
+    return {'conductance_kg_per_s': REFERENCE_MASS_KG / values['heat_exchange_time_s'],
+            'ambient_rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K}
 
 
 def _initial(values, numbers):
-    return (GAS_CONSTANT_AIR * TEMPERATURE_K,) * 2
+    ambient = GAS_CONSTANT_AIR * TEMPERATURE_K
+    return {'rt_j_per_kg': ambient, 'stage_rt_j_per_kg': ambient}
 
 
 EFFECT = Effect(
@@ -65,8 +67,9 @@ EFFECT = Effect(
     amplitude=('heat_exchange_time_s',),
     reported=(Reported(
         'heat_exchange_time_s', 's', lambda values, rig: values['heat_exchange_time_s']),),
-    states=2,
-    slots=2,
+    # At the start and at a stage of the step.
+    states=record('rt_j_per_kg', 'stage_rt_j_per_kg'),
+    packed=record('conductance_kg_per_s', 'ambient_rt_j_per_kg'),
     pack=_pack,
     initial=_initial,
     valves=('hsv',),
@@ -79,18 +82,18 @@ EFFECT = Effect(
 
 
 @compiled
-def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa, volume_m3,
-           elapsed_s, state, i, par, k):
+def air_rt(mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa, volume_m3, elapsed_s, state,
+           par):
     """Return R T of the air ``elapsed_s`` into the step."""
-    before = state[i + _RT]
+    before = state.rt_j_per_kg
     start_m3 = mass_kg * before / pressure_pa
     # The balance of energy less that of mass, divided by m cv: dT/dt = a - b T.
     middle = mass_kg + 0.5 * elapsed_s * (inflow_kg_per_s - outflow_kg_per_s)
     share = elapsed_s / middle
     loss = share * (
-        inflow_kg_per_s + (GAMMA - 1.0) * outflow_kg_per_s + par[k + _CONDUCTANCE]) + (
+        inflow_kg_per_s + (GAMMA - 1.0) * outflow_kg_per_s + par.conductance_kg_per_s) + (
         GAMMA - 1.0) * 2.0 * (volume_m3 - start_m3) / (volume_m3 + start_m3)
-    source = share * (GAMMA * inflow_kg_per_s + par[k + _CONDUCTANCE]) * par[k + _AMBIENT_RT]
+    source = share * (GAMMA * inflow_kg_per_s + par.conductance_kg_per_s) * par.ambient_rt_j_per_kg
     if abs(loss) < _SMALL_LOSS:
         # (1 - exp(-loss)) / loss as a series, to the last bits; in pairs, which need not wait.
         square = loss * loss
@@ -99,20 +102,20 @@ def air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
     else:
         mean = (1.0 - math.exp(-loss)) / loss
     after = before + (source - loss * before) * mean
-    state[i + _STAGE] = after
+    state.stage_rt_j_per_kg = after
     return after
 
 
 @compiled
-def valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, i, par, k):
+def valve_flow(fill_kg_per_s, vent_kg_per_s, state, par):
     """Return the vent flow of air at its temperature."""
     if vent_kg_per_s > 0.0:
         return fill_kg_per_s, vent_kg_per_s * math.sqrt(
-            par[k + _AMBIENT_RT] / state[i + _STAGE])
+            par.ambient_rt_j_per_kg / state.stage_rt_j_per_kg)
     return fill_kg_per_s, vent_kg_per_s
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(state):
     """Keep the temperature of the end of the step."""
-    state[i + _RT] = state[i + _STAGE]
+    state.rt_j_per_kg = state.stage_rt_j_per_kg

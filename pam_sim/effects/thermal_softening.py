@@ -27,14 +27,15 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 _REFERENCE_M_PER_S = 0.020
-_LOSS, _DECAY, _SUBSTEP = range(3)
 
 
 def _pack(values, numbers):
-    return (values['gain_loss_at_20mm_per_s'],
-            math.exp(-numbers.substep_s / values['time_constant_s']), numbers.substep_s)
+    return {'gain_loss_at_20mm_per_s': values['gain_loss_at_20mm_per_s'],
+            'decay': math.exp(-numbers.substep_s / values['time_constant_s']),
+            'substep_s': numbers.substep_s}
 
 
 EFFECT = Effect(
@@ -53,8 +54,8 @@ EFFECT = Effect(
     amplitude=('gain_loss_at_20mm_per_s',),
     reported=(Reported('gain_loss_at_20mm_per_s', '-',
                        lambda values, rig: values['gain_loss_at_20mm_per_s']),),
-    states=1,
-    slots=3,
+    states=record('warmth'),
+    packed=record('gain_loss_at_20mm_per_s', 'decay', 'substep_s'),
     pack=_pack,
     fitting=Fitting(
         free=(
@@ -64,13 +65,13 @@ EFFECT = Effect(
 
 
 @compiled
-def map_output(tension_n, pressure_pa, contraction_m, state, i, par, k):
+def map_output(tension_n, state, par):
     """Return the tension with the gain lost by warmth, never below zero."""
-    return tension_n * max(1.0 - par[k + _LOSS] * state[i], 0.0)
+    return tension_n * max(1.0 - par.gain_loss_at_20mm_per_s * state.warmth, 0.0)
 
 
 @compiled
-def commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, i, par, k):
+def commit(dx_m, state, par):
     """Advance the warmth, exact for the mean speed of the step."""
-    drive = abs(dx_m) / (par[k + _SUBSTEP] * _REFERENCE_M_PER_S)
-    state[i] = drive + (state[i] - drive) * par[k + _DECAY]
+    drive = abs(dx_m) / (par.substep_s * _REFERENCE_M_PER_S)
+    state.warmth = drive + (state.warmth - drive) * par.decay

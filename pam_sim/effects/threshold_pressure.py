@@ -39,6 +39,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, state, i, par, k):
+def map_input(gauge_pa, strain, par):
     """Return the pressure less the threshold."""
-    return gauge_pa - par[k], strain
+    return gauge_pa - par.pressure_pa, strain

@@ -24,17 +24,20 @@ each valve. The mean of y over a physics step is used, exact for a held u.
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
-from pam_sim.effects.lag import mean_of_held, pack_held
+from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.valve.hsv import clip_duty
 from pam_sim.valve.ppr import set_point_pa
 
 
 def _initial(values, numbers):
     if numbers.valve == 'ppr':
-        return (set_point_pa(
-            numbers.signal[0], numbers.parameters['K_m'], numbers.parameters['p_atm']), 0.0)
-    return clip_duty(numbers.signal[0]), clip_duty(numbers.signal[1])
+        voltage, *_ = numbers.signal
+        return {'set_point_pa': set_point_pa(
+            voltage, numbers.parameters['K_m'], numbers.parameters['p_atm'])}
+    fill, vent = numbers.signal
+    return {'fill_opening': clip_duty(fill), 'vent_opening': clip_duty(vent)}
 
 
 EFFECT = Effect(
@@ -50,8 +53,8 @@ EFFECT = Effect(
     ),
     amplitude=('time_constant_s',),
     reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
-    states=2,
-    slots=2,
+    states=record('set_point_pa', 'fill_opening', 'vent_opening'),
+    packed=HELD,
     pack=pack_held,
     initial=_initial,
     order=40,               # before the threshold of the main stage
@@ -62,12 +65,15 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, state, par):
     """Return the lagged set point of the PPR."""
-    return mean_of_held(set_point_pa, state, i, par, k), time_constant_s
+    mean_pa, state.set_point_pa = mean_of_held(set_point_pa, state.set_point_pa, par)
+    return mean_pa, time_constant_s
 
 
 @compiled
-def flow_opening(fill, vent, step_s, state, i, par, k):
+def flow_opening(fill, vent, state, par):
     """Return the lagged openings of the HSV pair."""
-    return mean_of_held(fill, state, i, par, k), mean_of_held(vent, state, i + 1, par, k)
+    mean_fill, state.fill_opening = mean_of_held(fill, state.fill_opening, par)
+    mean_vent, state.vent_opening = mean_of_held(vent, state.vent_opening, par)
+    return mean_fill, mean_vent

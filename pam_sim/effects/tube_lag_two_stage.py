@@ -23,23 +23,26 @@ PPR: y is the set point that reaches the regulator. HSV: y is the opening of eac
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.effects.lag import mean_of_held, pack_held
+from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.effects.tube_lag import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 _SHORTEST_S = 1e-9             # of a stage that is not there
-_SECOND = 2                    # packed values, and states, of the second stage begin here
+_STAGES = 'first', 'second'
 
 
 def _initial(values, numbers):
-    return 2 * tuple(_SIBLING.initial(values, numbers))
+    at_rest = _SIBLING.initial(values, numbers)
+    return {f'{stage}_{name}': value for stage in _STAGES for name, value in at_rest.items()}
 
 
 def _pack(values, numbers):
     whole_s, second = values['time_constant_s'], values['second_stage_share']
-    packed = ()
-    for share in (1.0 - second, second):
-        packed += pack_held({'time_constant_s': max(share * whole_s, _SHORTEST_S)}, numbers)
+    packed = {}
+    for stage, share in zip(_STAGES, (1.0 - second, second)):
+        held = pack_held({'time_constant_s': max(share * whole_s, _SHORTEST_S)}, numbers)
+        packed[stage] = [held[name] for name in HELD.names]
     return packed
 
 
@@ -59,8 +62,8 @@ EFFECT = Effect(
     ),
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
-    states=4,
-    slots=4,
+    states=record(*(f'{stage}_{name}' for stage in _STAGES for name in _SIBLING.states.names)),
+    packed=record(*((stage, HELD) for stage in _STAGES)),
     pack=_pack,
     initial=_initial,
     order=_SIBLING.order,
@@ -73,15 +76,22 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, state, par):
     """Return the set point of the PPR behind both stages."""
-    first_pa = mean_of_held(set_point_pa, state, i, par, k)
-    return mean_of_held(first_pa, state, i + _SECOND, par, k + _SECOND), time_constant_s
+    mean_pa, state.first_set_point_pa = mean_of_held(
+        set_point_pa, state.first_set_point_pa, par.first)
+    mean_pa, state.second_set_point_pa = mean_of_held(
+        mean_pa, state.second_set_point_pa, par.second)
+    return mean_pa, time_constant_s
 
 
 @compiled
-def flow_opening(fill, vent, step_s, state, i, par, k):
+def flow_opening(fill, vent, state, par):
     """Return the openings of the HSV pair behind both stages."""
-    fill, vent = mean_of_held(fill, state, i, par, k), mean_of_held(vent, state, i + 1, par, k)
-    return (mean_of_held(fill, state, i + _SECOND, par, k + _SECOND),
-            mean_of_held(vent, state, i + _SECOND + 1, par, k + _SECOND))
+    mean_fill, state.first_fill_opening = mean_of_held(fill, state.first_fill_opening, par.first)
+    mean_vent, state.first_vent_opening = mean_of_held(vent, state.first_vent_opening, par.first)
+    mean_fill, state.second_fill_opening = mean_of_held(
+        mean_fill, state.second_fill_opening, par.second)
+    mean_vent, state.second_vent_opening = mean_of_held(
+        mean_vent, state.second_vent_opening, par.second)
+    return mean_fill, mean_vent

@@ -16,15 +16,14 @@
 
 import math
 
-import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 SLOTS = 1024                # samples remembered of each command
-_DELAY, _WHOLE, _SHARE, _SWITCHING = range(4)
 
 
 def _pack(values, numbers):
@@ -37,15 +36,13 @@ def _pack(values, numbers):
     share = max(steps - whole, 0.0)
     if share < 1e-9:
         share = 0.0
-    return values['delay_s'], whole, share, float(numbers.fidelity == 'switching')
+    return {'delay_s': values['delay_s'], 'whole_steps': whole, 'share': share,
+            'switching': numbers.fidelity == 'switching'}
 
 
 def _initial(values, numbers):
-    signal = tuple(numbers.signal) + (0.0, 0.0)
-    remembered = np.zeros(1 + 2 * SLOTS)
-    remembered[1:1 + SLOTS] = signal[0]
-    remembered[1 + SLOTS:] = signal[1]
-    return remembered
+    signal_0, signal_1, *_ = (*numbers.signal, 0.0)
+    return {'signal_0': signal_0, 'signal_1': signal_1}      # all of them
 
 
 EFFECT = Effect(
@@ -60,8 +57,8 @@ EFFECT = Effect(
     ),
     amplitude=('delay_s',),
     reported=(Reported('delay_s', 's', lambda values, rig: values['delay_s']),),
-    states=1 + 2 * SLOTS,
-    slots=4,
+    states=record('position', ('signal_0', SLOTS), ('signal_1', SLOTS)),
+    packed=record('delay_s', 'whole_steps', 'share', 'switching'),
     pack=_pack,
     initial=_initial,
     order=90,               # after anything that changes the command itself
@@ -72,25 +69,25 @@ EFFECT = Effect(
 
 
 @compiled
-def command(signal_0, signal_1, dt_s, state, i, par, k):
-    """Return the command of ``delay_s`` ago; state[i] is the position written last."""
-    position = (int(state[i]) + 1) % SLOTS
-    state[i] = position
-    state[i + 1 + position] = signal_0
-    state[i + 1 + SLOTS + position] = signal_1
-    newer = (position - int(par[k + _WHOLE])) % SLOTS
-    share = par[k + _SHARE]
-    new_0 = state[i + 1 + newer]
-    new_1 = state[i + 1 + SLOTS + newer]
+def command(signal_0, signal_1, state, par):
+    """Return the command of ``delay_s`` ago; ``position`` is the one written last."""
+    position = (int(state.position) + 1) % SLOTS
+    state.position = position
+    state.signal_0[position] = signal_0
+    state.signal_1[position] = signal_1
+    newer = (position - int(par.whole_steps)) % SLOTS
+    share = par.share
+    new_0 = state.signal_0[newer]
+    new_1 = state.signal_1[newer]
     # The switching valves latch a duty at the (delayed) period start: no mean of two samples.
-    if share == 0.0 or par[k + _SWITCHING] != 0.0:
+    if share == 0.0 or par.switching != 0.0:
         return new_0, new_1
     older = (newer - 1) % SLOTS
-    return (new_0 + share * (state[i + 1 + older] - new_0),
-            new_1 + share * (state[i + 1 + SLOTS + older] - new_1))
+    return (new_0 + share * (state.signal_0[older] - new_0),
+            new_1 + share * (state.signal_1[older] - new_1))
 
 
 @compiled
-def clock_shift(shift_s, state, i, par, k):
+def clock_shift(shift_s, par):
     """Return how late the PWM clock of the switching valves is."""
-    return shift_s + par[k + _DELAY]
+    return shift_s + par.delay_s

@@ -25,7 +25,6 @@ from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
-_HALF_WIDTH, _OPEN, _CLOSE = range(3)
 
 # Their difference is added up by the valve, pulse by pulse; their sum is hardly seen.
 _TRIED_S = (1e-3, 1e-4, 0.0)
@@ -73,10 +72,10 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, pressure_pa, par):
     """Return the set point less the threshold; the lag towards it stays exact."""
     distance = set_point_pa - pressure_pa
-    width = par[k + _HALF_WIDTH]
+    width = par.half_width_pa
     return set_point_pa - min(max(distance, -width), width), time_constant_s
 
 
@@ -94,13 +93,13 @@ def mean_opening(duty, period_s, open_s, close_s):
 
 
 @compiled
-def opening(fill, vent, period_s, state, i, par, k):
+def opening(fill, vent, period_s, par):
     """Return the mean openings of the averaged pair."""
-    return (mean_opening(fill, period_s, par[k + _OPEN], par[k + _CLOSE]),
-            mean_opening(vent, period_s, par[k + _OPEN], par[k + _CLOSE]))
+    return (mean_opening(fill, period_s, par.open_time_s, par.close_time_s),
+            mean_opening(vent, period_s, par.open_time_s, par.close_time_s))
 
 
 @compiled
-def switch_times(open_s, close_s, state, i, par, k):
+def switch_times(open_s, close_s, par):
     """Return the delays of the switching pair."""
-    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]
+    return open_s + par.open_time_s, close_s + par.close_time_s

@@ -33,8 +33,6 @@ from pam_sim.effects.valve_dead_zone import (
     EFFECT as _SIBLING, SWITCHING_EDGES, SWITCHING_FREE)
 from pam_sim.parameters import Parameter
 
-_HALF_WIDTH, _OPEN, _CLOSE, _RAMP = range(4)
-
 
 EFFECT = Effect(
     name='valve_dead_zone_gradual',
@@ -71,10 +69,10 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, pressure_pa, par):
     """Return the set point less what the overlap swallows of the distance."""
     distance = set_point_pa - pressure_pa
-    width = par[k + _HALF_WIDTH]
+    width = par.half_width_pa
     if width > 0.0:
         set_point_pa -= width * distance / math.sqrt(width * width + distance * distance)
     return set_point_pa, time_constant_s
@@ -103,15 +101,15 @@ def mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s):
 
 
 @compiled
-def opening(fill, vent, period_s, state, i, par, k):
+def opening(fill, vent, period_s, par):
     """Return the mean openings of the averaged pair."""
-    open_s, close_s = par[k + _OPEN], par[k + _CLOSE]
-    ramp_s = min(par[k + _RAMP], 2.0 * open_s, 2.0 * close_s)
+    open_s, close_s = par.open_time_s, par.close_time_s
+    ramp_s = min(par.ramp_s, 2.0 * open_s, 2.0 * close_s)
     return (mean_opening_with_lift(fill, period_s, open_s, close_s, ramp_s, ramp_s),
             mean_opening_with_lift(vent, period_s, open_s, close_s, ramp_s, ramp_s))
 
 
 @compiled
-def switch_times(open_s, close_s, state, i, par, k):
+def switch_times(open_s, close_s, par):
     """Return the delays of the switching pair, which has no partial lift."""
-    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]
+    return open_s + par.open_time_s, close_s + par.close_time_s

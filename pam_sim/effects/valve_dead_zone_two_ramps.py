@@ -27,8 +27,6 @@ from pam_sim.effects.valve_dead_zone import (
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.parameters import Parameter
 
-_OPEN, _CLOSE, _RISE, _FALL = range(4)
-
 
 EFFECT = Effect(
     name='valve_dead_zone_two_ramps',
@@ -63,15 +61,15 @@ EFFECT = Effect(
 
 
 @compiled
-def opening(fill, vent, period_s, state, i, par, k):
+def opening(fill, vent, period_s, par):
     """Return the mean openings of the averaged pair."""
     open_s, close_s, rise_s, fall_s = (
-        par[k + _OPEN], par[k + _CLOSE], par[k + _RISE], par[k + _FALL])
+        par.open_time_s, par.close_time_s, par.rise_s, par.fall_s)
     return (mean_opening_with_lift(fill, period_s, open_s, close_s, rise_s, fall_s),
             mean_opening_with_lift(vent, period_s, open_s, close_s, rise_s, fall_s))
 
 
 @compiled
-def switch_times(open_s, close_s, state, i, par, k):
+def switch_times(open_s, close_s, par):
     """Return the delays of the switching pair, which has no partial lift."""
-    return open_s + par[k + _OPEN], close_s + par[k + _CLOSE]
+    return open_s + par.open_time_s, close_s + par.close_time_s

@@ -18,12 +18,14 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 from pam_sim.valve.ppr import set_point_pa
 
 
 def _initial(values, numbers):
-    return (set_point_pa(
-        numbers.signal[0], numbers.parameters['K_m'], numbers.parameters['p_atm']),)
+    voltage, *_ = numbers.signal
+    return {'set_point_pa': set_point_pa(
+        voltage, numbers.parameters['K_m'], numbers.parameters['p_atm'])}
 
 
 EFFECT = Effect(
@@ -40,7 +42,7 @@ EFFECT = Effect(
     ),
     amplitude=('half_width_pa',),
     reported=(Reported('half_width_pa', 'Pa', lambda values, rig: values['half_width_pa']),),
-    states=1,
+    states=record('set_point_pa'),
     initial=_initial,
     valves=('ppr',),
     order=30,               # the command's side of every lag
@@ -49,7 +51,8 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, state, par):
     """Return the set point behind the play."""
-    state[i] = min(max(state[i], set_point_pa - par[k]), set_point_pa + par[k])
-    return state[i], time_constant_s
+    width = par.half_width_pa
+    state.set_point_pa = min(max(state.set_point_pa, set_point_pa - width), set_point_pa + width)
+    return state.set_point_pa, time_constant_s

@@ -23,13 +23,12 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
-
-_RATIO, _INVERSE = range(2)
+from pam_sim.records import record
 
 
 def _pack(values, numbers):
     ratio = 1.0 + values['ratio_minus_1']
-    return ratio, 1.0 / ratio
+    return {'ratio': ratio, 'inverse_ratio': 1.0 / ratio}
 
 
 EFFECT = Effect(
@@ -48,7 +47,7 @@ EFFECT = Effect(
     amplitude=('ratio_minus_1',),
     reported=(Reported(
         'vent_to_fill_time_ratio', '-', lambda values, rig: 1.0 + values['ratio_minus_1']),),
-    slots=2,
+    packed=record('ratio', 'inverse_ratio'),
     pack=_pack,
     order=60,               # after what changes the set point
     fitting=Fitting(free=(FreeParameter('ratio_minus_1', 0.2, -0.4, 4.0),)),
@@ -56,14 +55,14 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, i, par, k):
+def set_point(set_point_pa, time_constant_s, pressure_pa, par):
     """Return the time constant longer while venting."""
     if set_point_pa < pressure_pa:
-        return set_point_pa, time_constant_s * par[k + _RATIO]
+        return set_point_pa, time_constant_s * par.ratio
     return set_point_pa, time_constant_s
 
 
 @compiled
-def valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, i, par, k):
+def valve_flow(fill_kg_per_s, vent_kg_per_s, par):
     """Return the vent flow smaller."""
-    return fill_kg_per_s, vent_kg_per_s * par[k + _INVERSE]
+    return fill_kg_per_s, vent_kg_per_s * par.inverse_ratio

@@ -40,7 +40,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, velocity_m_per_s, par):
     """Return the force less that of the damper."""
-    return force_n - par[k] * velocity_m_per_s
+    return force_n - par.damping_n_s_per_m * velocity_m_per_s

@@ -24,13 +24,14 @@ from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.viscous_damping import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
-_DAMPING, _INVERSE_SPEED = range(2)
 _AT_M_PER_S = 0.05
 
 
 def _pack(values, numbers):
-    return values['damping_n_s_per_m'], 1.0 / values['speed_m_per_s']
+    return {'damping_n_s_per_m': values['damping_n_s_per_m'],
+            'inverse_speed_s_per_m': 1.0 / values['speed_m_per_s']}
 
 
 def _reported(values, rig):
@@ -54,6 +55,7 @@ EFFECT = Effect(
     ),
     amplitude=_SIBLING.amplitude,
     reported=(Reported('force_at_50mm_per_s_n', 'N', _reported),),
+    packed=record('damping_n_s_per_m', 'inverse_speed_s_per_m'),
     pack=_pack,
     fitting=Fitting(
         free=(
@@ -63,8 +65,7 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                 state, i, par, k):
+def muscle_force(force_n, velocity_m_per_s, par):
     """Return the force less that of the damper."""
-    return force_n - par[k + _DAMPING] * velocity_m_per_s / (
-        1.0 + abs(velocity_m_per_s) * par[k + _INVERSE_SPEED])
+    return force_n - par.damping_n_s_per_m * velocity_m_per_s / (
+        1.0 + abs(velocity_m_per_s) * par.inverse_speed_s_per_m)

@@ -14,20 +14,20 @@
 
 """The compiled step of the joint, made anew whenever the muscle's kernel is another one."""
 
-import hashlib
 from pathlib import Path
 
-from pam_sim.rollout.generate import kernel_hash, load_cached_module
+from pam_sim.compiled import source_key
+from pam_sim.generated import generated_module
+from pam_sim.joint import layout
+from pam_sim.rollout import kernel
 
 _FOLDER = Path(__file__).parent
 
 
 def _load():
     source = (_FOLDER / 'step_template.py').read_text(encoding='utf-8')
-    key = hashlib.sha256(source.encode())
-    key.update((_FOLDER / 'layout.py').read_bytes())
-    key.update(kernel_hash().encode())
-    return load_cached_module('pam_joint_kernel', source, key.hexdigest()[:12])
+    return generated_module(
+        'pam_joint_kernel', f'# Of sources {source_key(kernel, layout):x}.\n{source}')
 
 
 _module = _load()

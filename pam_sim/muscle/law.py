@@ -20,6 +20,7 @@ import warnings
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters
+from pam_sim.records import record
 
 # The chapter's rules of PAM behaviour (section 4.1, after Daerden and Lefeber).
 RULES = {
@@ -96,10 +97,12 @@ class MuscleLaw:
         Set name to ParameterSet.
     CLAIMS : tuple of int
         Which of ``RULES`` the law claims.
+    PACKED : numpy.dtype
+        Record ``par`` of the compiled formula; by default of the parameters, by their names.
     COMPILED, COMPILED_DAMPER : callable or None
-        ``tension_n(gauge_pa, strain, par, k)`` and, for a law with a damper,
-        ``damper_force_n(velocity_m_per_s, gauge_pa, strain, par, k)`` of the file; compiled,
-        not clipped, with the values of :meth:`pack` at ``par[k]`` on.
+        ``tension_n(gauge_pa, strain, par)`` and, for a law with a damper,
+        ``damper_force_n(velocity_m_per_s, gauge_pa, strain, par)`` of the file; compiled, not
+        clipped, with the values of :meth:`pack` in the record ``par``.
     EXTRAPOLATES : bool
         Whether the formula goes on outside its range; else a rollout flags it.
 
@@ -122,6 +125,13 @@ class MuscleLaw:
     COMPILED = None
     COMPILED_DAMPER = None
     EXTRAPOLATES = True
+    PACKED = record()
+
+    def __init_subclass__(cls, **kwargs):
+        """Let the record of a law that states none hold its parameters."""
+        super().__init_subclass__(**kwargs)
+        if 'PACKED' not in vars(cls):
+            cls.PACKED = record(*(parameter.name for parameter in cls.PARAMETERS))
 
     def __init__(self, values=None, muscle=None, where=''):
         muscle = next(iter(self.SETS)) if muscle is None else muscle
@@ -144,8 +154,8 @@ class MuscleLaw:
         raise NotImplementedError(f'{type(self).__name__} states no force')
 
     def pack(self):
-        """Return the floats that the compiled formula reads."""
-        return tuple(self.values.values())
+        """Return what the record ``PACKED`` holds, by name."""
+        return self.values
 
     def outside(self, pressure_gauge_pa, strain):
         """Return True where the point is outside the range of the numbers; arrays broadcast."""

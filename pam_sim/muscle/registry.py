@@ -17,11 +17,13 @@
 from functools import lru_cache
 from pathlib import Path
 
+from pam_sim.compiled import named_arguments
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
 from pam_sim.plugins import pick, plugin_files, plugin_module
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
+_POINT = 'gauge_pa', 'strain', 'par'
 
 
 def law_files():
@@ -37,7 +39,7 @@ def laws():
     Raises
     ------
     InputError
-        A file without ``LAW``, or a name defined twice.
+        A file without ``LAW``, a name defined twice, or a formula of other arguments.
 
     """
     found = {}
@@ -49,10 +51,22 @@ def laws():
         if law.NAME in found or law.NAME != path.stem:
             raise InputError(
                 f'law `{law.NAME}` must be defined once, in a file of its name', str(path))
-        law.COMPILED = getattr(module, 'tension_n', None)
-        law.COMPILED_DAMPER = getattr(module, 'damper_force_n', None)
+        law.COMPILED = _formula(module, 'tension_n', _POINT, path)
+        law.COMPILED_DAMPER = _formula(
+            module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
         found[law.NAME] = law
     return found
+
+
+def _formula(module, name, arguments, path):
+    """Return a compiled function of a law's file, None where it has none."""
+    function = getattr(module, name, None)
+    if function is not None and len(named_arguments(function)) != len(arguments):
+        raise InputError(
+            f'`{name}` takes {len(named_arguments(function))} arguments; write `def '
+            f'{name}({", ".join(arguments)})` and read the numbers by name, `par.length_m`',
+            str(path))
+    return function
 
 
 def get_law(name, where=''):

@@ -13,190 +13,137 @@
 # limitations under the License.
 
 """
-The places where an effect can act, each as a function that does nothing.
+The places where an effect can act: the hooks of a step.
 
-The kernel is ``step_template.py`` with these functions replaced by generated
-ones that call every effect of the registry whose amplitude is not zero. An
-effect implements any of them under the name after ``apply_``; it gets the same
-arguments, with its own positions put in: ``..., state, i, par, k``, where
-``state[i]`` is its first state and ``par[k]`` its first packed parameter.
+An effect file implements a hook as a compiled function of the hook's name. Of the arguments
+declared here it takes those it names, in any order, and returns all that the hook ``returns``,
+changed or not. Further arguments it may name:
 
-Pressures are absolute Pa unless called gauge; ``dx_m`` is the travel since the
-start of the physics step and ``elapsed_s`` the time since then, so that a
-memory can be evaluated inside a step and advanced once, in ``commit``.
+* ``par``, the record of its packed parameters, ``par.stiffness_n_per_m``;
+* ``state``, the record of its states, which it may change;
+* ``plant``, the state of the rig itself, ``layout.STATE``.
+
+Pressures are absolute Pa unless called gauge; ``dx_m`` is the travel since the start of the
+physics step and ``elapsed_s`` the time since then, so that a memory can be evaluated inside a
+step and advanced once, in ``commit``.
 """
 
-from pam_sim.compiled import inlined
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-# Hook name -> how many leading arguments it returns, changed or not.
+from pam_sim.compiled import named_arguments
+from pam_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class Hook:
+    """
+    One place where effects can act.
+
+    Parameters
+    ----------
+    sentence : str
+        What the hook returns, or what it is for.
+    returns : tuple of str
+        Arguments it returns, changed or not.
+    sees : tuple of str
+        Further arguments.
+
+    """
+
+    sentence: str
+    returns: tuple[str, ...] = ()
+    sees: tuple[str, ...] = ()
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Return all arguments, those it returns first."""
+        return self.returns + self.sees
+
+
+OWN = 'state', 'par', 'plant'       # arguments any hook may name
+_MOTION = 'contraction_m', 'velocity_m_per_s'
+_STEP = 'dx_m', 'elapsed_s'
+_READINGS = 'pressure_pa', 'contraction_m', 'force_n'
 HOOKS = {
-    'command': 2, 'clock_shift': 1, 'set_point': 2, 'pressure_rate': 1, 'opening': 2,
-    'switch_times': 2, 'flow_opening': 2, 'supply': 1, 'valve_flow': 2, 'mass_flow': 1,
-    'volume': 1, 'air_rt': 1, 'map_input': 2, 'map_output': 1, 'muscle_force': 1,
-    'muscle_friction': 1, 'load_force': 1, 'load_friction': 1, 'commit': 0,
-    'sensor_commit': 0, 'sensor': 3,
+    'command': Hook(
+        'The valve signal that arrives in this step; called once a step, may advance state.',
+        ('signal_0', 'signal_1'), ('dt_s',)),
+    'clock_shift': Hook(
+        'By how much [s] the PWM clock of the switching valves is late.', ('shift_s',)),
+    'set_point': Hook(
+        'Set point [Pa] and time constant [s] of the PPR; called once a physics step, may '
+        'advance state.', ('set_point_pa', 'time_constant_s'), ('pressure_pa', 'contraction_m')),
+    'pressure_rate': Hook(
+        'The pressure rate [Pa/s] behind the PPR.',
+        ('rate_pa_per_s',), ('pressure_pa', 'contraction_m')),
+    'opening': Hook(
+        'Mean openings of the averaged HSV pair from its duties.',
+        ('fill', 'vent'), ('period_s',)),
+    'switch_times': Hook(
+        'Opening and closing delay [s] of the switching HSV pair.', ('open_s', 'close_s')),
+    'flow_opening': Hook(
+        'Mean openings of either HSV pair over the physics step of ``step_s``; called once a '
+        'physics step, may advance state.', ('fill', 'vent'), ('step_s',)),
+    'supply': Hook('The supply pressure [Pa absolute].', ('supply_pa',)),
+    'valve_flow': Hook(
+        'Mass flows [kg/s] through the fill and the vent valve, HSV.',
+        ('fill_kg_per_s', 'vent_kg_per_s'), ('pressure_pa', 'supply_pa')),
+    'mass_flow': Hook(
+        'The net air flow into the muscle [kg/s], HSV.',
+        ('flow_kg_per_s',), ('pressure_pa', 'contraction_m', 'supply_pa')),
+    'volume': Hook('The air volume [m^3].', ('volume_m3',), ('pressure_pa', 'contraction_m')),
+    'air_rt': Hook(
+        'R T [J/kg] of the air in the muscle ``elapsed_s`` into the physics step, HSV. Mass and '
+        'pressure are those at the start of the step, the flows means over ``elapsed_s``, the '
+        'volume that at its end. The last call of a step is the one that holds.',
+        ('rt_j_per_kg',), ('mass_kg', 'inflow_kg_per_s', 'outflow_kg_per_s', 'pressure_pa',
+                           'volume_m3', 'elapsed_s')),
+    'map_input': Hook(
+        'Gauge pressure [Pa] and strain [-] at which the force map is read.',
+        ('gauge_pa', 'strain')),
+    'map_output': Hook(
+        'The static tension [N] of the force map, gain included.',
+        ('tension_n',), ('pressure_pa', 'contraction_m')),
+    'muscle_force': Hook(
+        'The force the muscle transmits [N], dry friction excepted.',
+        ('force_n',), ('pressure_pa', *_MOTION, *_STEP)),
+    'muscle_friction': Hook(
+        'The dry friction level inside the muscle [N], not negative.',
+        ('level_n',), ('pressure_pa', *_MOTION)),
+    'load_force': Hook(
+        'The force of the load side against contraction [N], weight and F_ext excepted.',
+        ('force_n',), (*_MOTION, *_STEP)),
+    'load_friction': Hook(
+        'The dry friction level of the guide [N], not negative.', ('level_n',), _MOTION),
+    'commit': Hook(
+        'Advances the states of effects at the end of a physics step; arguments as of its end.',
+        (), ('pressure_pa', *_MOTION, *_STEP)),
+    'sensor_commit': Hook(
+        'Advances the states of sensor effects at the end of a step.',
+        (), (*_READINGS, 'dt_s')),
+    'sensor': Hook(
+        'What the sensors read: pressure [Pa absolute], contraction [m], force [N].', _READINGS),
 }
 
 
-@inlined
-def apply_command(signal_0, signal_1, dt_s, state, par):
-    """Return the valve signal that arrives in this step; called once a step, may advance state."""
-    return signal_0, signal_1
-
-
-@inlined
-def apply_clock_shift(shift_s, state, par):
-    """Return by how much [s] the PWM clock of the switching valves is late."""
-    return shift_s
-
-
-@inlined
-def apply_set_point(set_point_pa, time_constant_s, pressure_pa, contraction_m, state, par):
+def check_hook(name: str, function: Callable[..., Any], has_states: bool,
+               path: str | Path) -> None:
     """
-    Return (set point [Pa], time constant [s]) of the PPR for this physics step.
+    Refuse a function that names arguments its hook has not.
 
-    Called once a physics step, may advance state.
+    Raises
+    ------
+    InputError
+        The sentence says what the hook could name.
+
     """
-    return set_point_pa, time_constant_s
-
-
-@inlined
-def apply_pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, state, par):
-    """Return the pressure rate [Pa/s] behind the PPR."""
-    return rate_pa_per_s
-
-
-@inlined
-def pressure_rate_active(par):
-    """Return whether any effect changes the PPR pressure rate (else the lag is exact)."""
-    return False
-
-
-@inlined
-def apply_opening(fill, vent, period_s, state, par):
-    """Return mean openings of the averaged HSV pair from its duties."""
-    return fill, vent
-
-
-@inlined
-def apply_switch_times(open_s, close_s, state, par):
-    """Return opening and closing delay [s] of the switching HSV pair."""
-    return open_s, close_s
-
-
-@inlined
-def apply_flow_opening(fill, vent, step_s, state, par):
-    """
-    Return the mean openings of either HSV pair over the physics step of ``step_s``.
-
-    Called once a physics step, may advance state.
-    """
-    return fill, vent
-
-
-@inlined
-def apply_supply(supply_pa, state, par):
-    """Return the supply pressure [Pa absolute]."""
-    return supply_pa
-
-
-@inlined
-def apply_valve_flow(fill_kg_per_s, vent_kg_per_s, pressure_pa, supply_pa, state, par):
-    """Return the mass flows [kg/s] through the fill and the vent valve, HSV."""
-    return fill_kg_per_s, vent_kg_per_s
-
-
-@inlined
-def valve_flow_active(par):
-    """Return whether any effect changes the flows through the valves."""
-    return False
-
-
-@inlined
-def apply_mass_flow(flow_kg_per_s, pressure_pa, contraction_m, supply_pa, state, par):
-    """Return the net air flow into the muscle [kg/s], HSV."""
-    return flow_kg_per_s
-
-
-@inlined
-def mass_flow_active(par):
-    """Return whether any effect changes the net flow (else it is that of the valves)."""
-    return False
-
-
-@inlined
-def apply_volume(volume_m3, pressure_pa, contraction_m, state, par):
-    """Return the air volume [m^3]."""
-    return volume_m3
-
-
-@inlined
-def apply_air_rt(rt_j_per_kg, mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa,
-                 volume_m3, elapsed_s, state, par):
-    """
-    Return R T [J/kg] of the air in the muscle ``elapsed_s`` into the physics step, HSV.
-
-    Mass and pressure are those at the start of the step, the flows means over
-    ``elapsed_s``, the volume that at its end. The last call of a step is the one
-    that holds.
-    """
-    return rt_j_per_kg
-
-
-@inlined
-def air_rt_active(par):
-    """Return whether any effect changes the air temperature (else it is constant)."""
-    return False
-
-
-@inlined
-def apply_map_input(gauge_pa, strain, state, par):
-    """Return gauge pressure [Pa] and strain [-] at which the force map is read."""
-    return gauge_pa, strain
-
-
-@inlined
-def apply_map_output(tension_n, pressure_pa, contraction_m, state, par):
-    """Return the static tension [N] of the force map, gain included."""
-    return tension_n
-
-
-@inlined
-def apply_muscle_force(force_n, pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s,
-                       state, par):
-    """Return the force the muscle transmits [N], dry friction excepted."""
-    return force_n
-
-
-@inlined
-def apply_muscle_friction(level_n, pressure_pa, contraction_m, velocity_m_per_s, state, par):
-    """Return the dry friction level inside the muscle [N], not negative."""
-    return level_n
-
-
-@inlined
-def apply_load_force(force_n, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, par):
-    """Return the force of the load side against contraction [N], weight and F_ext excepted."""
-    return force_n
-
-
-@inlined
-def apply_load_friction(level_n, contraction_m, velocity_m_per_s, state, par):
-    """Return the dry friction level of the guide [N], not negative."""
-    return level_n
-
-
-@inlined
-def apply_commit(pressure_pa, contraction_m, velocity_m_per_s, dx_m, elapsed_s, state, par):
-    """Advance the states of effects at the end of a physics step; arguments as of its end."""
-
-
-@inlined
-def apply_sensor_commit(pressure_pa, contraction_m, force_n, dt_s, state, par):
-    """Advance the states of sensor effects at the end of a step."""
-
-
-@inlined
-def apply_sensor(pressure_pa, contraction_m, force_n, state, par):
-    """Return what the sensors read: pressure [Pa absolute], contraction [m], force [N]."""
-    return pressure_pa, contraction_m, force_n
+    allowed = (*HOOKS[name].arguments, *(own for own in OWN if own != 'state' or has_states))
+    unknown = [one for one in named_arguments(function) if one not in allowed]
+    if unknown:
+        raise InputError(
+            f'hook `{name}` names `{unknown[0]}`; write `def {name}({", ".join(allowed)})` with '
+            'those of them it needs, and read the numbers by name, `par.'
+            'stiffness_n_per_m`', str(path))

@@ -13,19 +13,110 @@
 # limitations under the License.
 
 """
-The compiled kernel of the registered effects.
+The compiled entry points of the rig: from float64 arrays to records and back.
 
-``step(state, par, inp, out)`` may be called from other compiled functions;
-arrays are laid out as in :mod:`pam_sim.rollout.layout`.
+``step(state, par, inp, out)`` may be called from other compiled functions; arrays are laid
+out as in :mod:`pam_sim.rollout.layout`.
 """
 
-from pam_sim.rollout.generate import load_kernel
+from collections.abc import Callable
+from typing import Any
 
-_module = load_kernel()
-step = _module.step
-look = _module.look
-settle = _module.settle
-driven_tension = _module.driven_tension
-driven_force = _module.driven_force
-rest_contraction = _module.rest_contraction
-rollout = _module.rollout
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import allocating_entry_point, compiled, entry_point, source_key
+from pam_sim.records import part, size_of
+from pam_sim.rollout import step as steps
+from pam_sim.rollout.dispatch import hooks
+from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
+
+_INPUT_SIZE, _OUTPUT_SIZE = size_of(INPUT), size_of(OUTPUT)
+
+
+@compiled
+def _step_beyond(state: np.record, par: np.record, given: np.record, seen: np.record) -> None:
+    """Advance a rig with effects: one piece of machine code, called."""
+    steps.step_body(True, state, par, given, seen)
+
+
+def _entries(key: int) -> tuple[Callable[..., Any], ...]:
+    """Return the entry points as units of compiled code, stored under ``key``."""
+    @entry_point
+    def step(state: FloatArray, par: FloatArray, inp: FloatArray, out: FloatArray) -> None:
+        """Advance ``state`` by one step and fill ``out`` (see pam_sim.rollout.layout)."""
+        if key < 0:         # never; makes the key part of what is stored
+            return
+        of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
+        given, seen = part(inp, 0, INPUT), part(out, 0, OUTPUT)
+        if numbers.beyond_nominal > 0.0:
+            _step_beyond(of_rig, numbers, given, seen)
+        else:
+            steps.step_body(False, of_rig, numbers, given, seen)
+
+    @entry_point
+    def look(state: FloatArray, par: FloatArray, inp: FloatArray, out: FloatArray) -> None:
+        """Fill ``out`` from ``state`` without a step."""
+        if key >= 0:
+            steps.look_body(True, part(state, 0, STATE), part(par, 0, PARAMETERS),
+                            part(inp, 0, INPUT), part(out, 0, OUTPUT))
+
+    @entry_point
+    def settle(state: FloatArray, par: FloatArray) -> None:
+        """Make the dependent states agree with pressure and contraction before the first step."""
+        if key >= 0:
+            steps.settle_body(True, part(state, 0, STATE), part(par, 0, PARAMETERS))
+
+    @entry_point
+    def rest_contraction(p: float, state: FloatArray, par: FloatArray) -> float:
+        """Return the contraction [m] at which a free load rests at a pressure [Pa]."""
+        if key < 0:
+            return 0.0
+        return steps.rest_body(p, True, part(state, 0, STATE), part(par, 0, PARAMETERS))
+
+    @entry_point
+    def driven_tension(state: FloatArray, par: FloatArray) -> float:
+        """Return the static tension [N] of the present state: force map and what changes it."""
+        if key < 0:
+            return 0.0
+        of_rig = part(state, 0, STATE)
+        return steps.map_tension(of_rig.pressure_pa, of_rig.contraction_m, True, of_rig,
+                                 part(par, 0, PARAMETERS))
+
+    @entry_point
+    def driven_force(tension: float, velocity: float, state: FloatArray,
+                     par: FloatArray) -> tuple[float, float]:
+        """Return (force without dry friction, its level) [N] of the present state."""
+        if key < 0:
+            return 0.0, 0.0
+        of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
+        p, x = of_rig.pressure_pa, of_rig.contraction_m
+        return (steps.muscle_force(tension, p, x, velocity, 0.0, 0.0, True, of_rig, numbers),
+                hooks.muscle_friction(0.0, p, x, velocity, True, of_rig, numbers))
+
+    @allocating_entry_point
+    def rollout(state: FloatArray, par: FloatArray, inputs: FloatArray,
+                outputs: FloatArray) -> None:
+        """
+        Step through ``inputs``, N rows of ``INPUT``; ``outputs`` has N + 1 of ``OUTPUT``.
+
+        Row 0 is the start. Both contiguous.
+        """
+        if key < 0:
+            return
+        of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
+        flat_in, flat_out = inputs.reshape(inputs.size), outputs.reshape(outputs.size)
+        steps.look_body(True, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
+        if numbers.beyond_nominal > 0.0:
+            for i in range(inputs.shape[0]):
+                _step_beyond(of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
+                             part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
+        else:
+            for i in range(inputs.shape[0]):
+                steps.step_body(False, of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
+                                part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
+
+    return step, look, settle, rest_contraction, driven_tension, driven_force, rollout
+
+
+(step, look, settle, rest_contraction, driven_tension, driven_force, rollout) = _entries(
+    source_key(steps))

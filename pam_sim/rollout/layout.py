@@ -97,7 +97,6 @@ PARAMETERS = record(
     'inverse_rt_kg_per_j',
     'law',                          # number of the force law, see places.law_codes
     'law_damper',                   # 1: the law has a damper of its own
-    'law_place',                    # where in par the numbers of the law begin
     'beyond_nominal',               # 1: an effect acts or the law is not that of the nominal rig
     ('used', record(*HOOKS)),       # 1: an effect with this hook acts
 )
@@ -106,71 +105,7 @@ PARAMETERS = record(
 PPR, HSV_AVERAGED, HSV_SWITCHING = 0, 1, 2
 
 # Places of the fields, for code that reads the arrays by index.
-INP_SIGNAL_0 = 0            # PPR: voltage [V]; HSV: fill duty [0..1]
-INP_SIGNAL_1 = 1            # HSV: vent duty [0..1]
-INP_EXTERNAL_FORCE = 2      # N, against contraction positive
-INP_CONTRACTION = 3         # m, at the END of the step; isometric and driven loads only
-INP_SIZE = 4
-OUT_TIME = 0                # s since the start
-OUT_PRESSURE = 1            # Pa absolute, as the sensor (with its effects) reads it
-OUT_CONTRACTION = 2         # m, as the sensor reads it
-OUT_VELOCITY = 3            # m/s, true
-OUT_FORCE = 4               # N, load cell, as the sensor reads it
-OUT_AIR_MASS = 5            # kg in muscle and dead volume
-OUT_SUPPLY = 6              # Pa absolute
-OUT_TRUE_PRESSURE = 7       # Pa absolute
-OUT_TRUE_CONTRACTION = 8    # m
-OUT_TRUE_FORCE = 9          # N
-OUT_FILLED = 10             # kg through the fill valve since the start (HSV)
-OUT_VENTED = 11             # kg through the vent valve since the start (HSV)
-OUT_ACCELERATION = 12       # m/s^2
-OUT_SIZE = 13
-S_STEPS = 0                 # steps done
-S_TIME = 1                  # s
-S_PRESSURE = 2              # Pa absolute
-S_CONTRACTION = 3           # m
-S_VELOCITY = 4              # m/s
-S_MUSCLE_FORCE = 5          # N, force of the muscle without its dry friction
-S_AIR_MASS = 6              # kg (HSV: the integrated state)
-S_SUPPLY = 7                # Pa absolute
-S_FILLED = 8                # kg
-S_VENTED = 9                # kg
-S_DIRECTION = 10            # -1, 0, 1: last direction of a prescribed motion
-S_PERIOD = 11               # index of the running PWM period
-S_FILL_ON = 12              # s from the period start
-S_FILL_OFF = 13
-S_VENT_ON = 14
-S_VENT_OFF = 15
-STATE_BASE = 16
-PAR_DT = 0                  # s, one step
-PAR_SUBSTEPS = 1            # physics steps in it
-PAR_SUBSTEP = 2             # s
-PAR_VALVE = 3               # VALVE_*
-PAR_FREE_LOAD = 4           # 1: hanging mass, 0: contraction prescribed
-PAR_ATMOSPHERE = 5          # Pa
-PAR_LENGTH = 6              # m
-PAR_FORCE_GAIN = 7          # -
-PAR_DAMPING = 8             # N s/m
-PAR_MASS = 9                # kg
-PAR_WEIGHT = 10             # N
-PAR_MAX_CONTRACTION = 11    # m
-PAR_THREAD_SQUARED = 12     # m^2
-PAR_INVERSE_4_PI_N2 = 13    # -
-PAR_DEAD_VOLUME = 14        # m^3
-PAR_RT = 15                 # J/kg
-PAR_CONDUCTANCE = 16        # kg/(s Pa)
-PAR_CRITICAL_RATIO = 17     # -
-PAR_SUPPLY = 18             # Pa absolute
-PAR_GAIN_PPR = 19           # Pa/V
-PAR_TIME_CONSTANT = 20      # s
-PAR_DECAY_HALF = 21         # exp(-substep / 2 T_m)
-PAR_PWM_PERIOD = 22         # s
-PAR_INVERSE_LENGTH = 23     # 1/m
-PAR_INVERSE_MASS = 24       # 1/kg
-PAR_INVERSE_RT = 25         # kg/J
-PAR_LAW = 26                # which force law, see generate.law_codes
-PAR_LAW_DAMPER = 27         # 1: the law has a damper of its own
-PAR_LAW_PLACE = 28          # where in par the numbers of the law begin
-PAR_BEYOND_NOMINAL = 29     # 1: an effect acts or the law is another than the nominal one
-PAR_BASE = 30
-VALVE_PPR, VALVE_HSV_AVERAGED, VALVE_HSV_SWITCHING = PPR, HSV_AVERAGED, HSV_SWITCHING
+INP_SIGNAL_0, INP_SIGNAL_1, INP_CONTRACTION = 0, 1, 3
+OUT_TIME, OUT_SIZE = 0, 13
+S_VELOCITY, S_MUSCLE_FORCE, S_DIRECTION = 4, 5, 10
+PAR_MAX_CONTRACTION = 11

@@ -23,33 +23,31 @@ from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.records import fields, put
+from pam_sim.records import put, put_some, size_of
 from pam_sim.rollout import kernel, layout
-from pam_sim.rollout.generate import effect_layout, hook_flag, law_codes
+from pam_sim.rollout.places import FLAGS, law_codes, LAW_PLACE, PLACES, STATE_SIZE
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve import hsv
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
-_PLACES, _PAR_SIZE, _STATE_SIZE = effect_layout()
 _LAW_CODES = law_codes()
-_FLAGS = {name: [hook_flag(hook) for hook in effect.hooks] for name, effect in effects().items()}
 
 
 def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
     """Return (state, par); arguments and errors as of ``Rig.pack``."""
     numbers = _numbers(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
-    law = rig.muscle.law.law.pack()
-    state = np.zeros(_STATE_SIZE)
-    par = np.zeros(_PAR_SIZE + len(law))
-    par[_PAR_SIZE:] = law
+    law = rig.muscle.law.law
+    state = np.zeros(STATE_SIZE)
+    par = np.zeros(LAW_PLACE + size_of(law.PACKED))
+    put(par, law.PACKED, law.pack(), LAW_PLACE)
     _pack_base(rig, numbers, state, par)
     _pack_effects(rig, numbers, state, par)
     if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
         rest_m = kernel.rest_contraction(numbers.pressure_pa, state, par)
         if rest_m != numbers.contraction_m:         # effects start from where the load rests
             numbers = replace(numbers, contraction_m=rest_m)
-            fields(state, layout.STATE).contraction_m = rest_m
+            put_some(state, layout.STATE, {'contraction_m': rest_m})
             _pack_effects(rig, numbers, state, par)
     kernel.settle(state, par)
     return state, par
@@ -57,12 +55,11 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
 
 def _pack_effects(rig, numbers, state, par):
     for setting in rig.effects:
-        k, i = _PLACES[setting.name]
-        effects()[setting.name].pack_into(setting.parameters, numbers, par, k, state, i)
-        if par[k - 1] != 0.0:
-            fields(par, layout.PARAMETERS).beyond_nominal = 1.0
-            for place in _FLAGS[setting.name]:
-                par[place] = 1.0
+        effect = effects()[setting.name]
+        place, state_place = PLACES[setting.name]
+        if effect.pack_into(setting.parameters, numbers, par, place, state, state_place):
+            for flag in FLAGS[setting.name]:
+                par[flag] = 1.0
 
 
 def _numbers(rig, dt_s, pressure, contraction, signal):
@@ -160,11 +157,11 @@ def _pack_base(rig, numbers, state, par):
         'inverse_rt_kg_per_j': 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K),
         'law': law,
         'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
-        'law_place': _PAR_SIZE,
         'beyond_nominal': law != 0.0,
         'used': 0.0,
     })
-    start = fields(state, layout.STATE)
-    start.pressure_pa = numbers.pressure_pa
-    start.contraction_m = numbers.contraction_m
-    start.period = -1e9         # no PWM period yet
+    put_some(state, layout.STATE, {
+        'pressure_pa': numbers.pressure_pa,
+        'contraction_m': numbers.contraction_m,
+        'period': -1e9,         # no PWM period yet
+    })

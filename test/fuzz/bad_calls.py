@@ -45,7 +45,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).resolve().parent)]   # the tree as
 from bad_call_kinds import COMBINATIONS, VALUES, VERBS  # noqa: E402
 from bad_call_place import changes, clear, look, prepare  # noqa: E402
 from pam_actuation.cli.main import main as pam  # noqa: E402
-from pam_sim.rollout.generate import cache_folder  # noqa: E402
+from pam_sim.generated import cache_folder  # noqa: E402
 
 LONGEST_LINE = 2500     # of which names to choose from take most
 PROCESSES = 24          # of the calls are made again as real processes

@@ -79,8 +79,8 @@ EFFECT = Effect(
     fitting=Fitting(free=(FreeParameter('force_n', 0.4, 0.0, 9.5),),
                     limits=('guide_friction',)))
 @compiled
-def load_force(force_n, x, v, dx, elapsed, state, i, par, k):
-    return force_n + par[k] * math.sin(x / 0.0006)
+def load_force(force_n, contraction_m, par):
+    return force_n + par.force_n * math.sin(contraction_m / 0.0006)
 """
 LAW_FILE = """'Force proportional to pressure.'
 from pam_sim.muscle.law import MuscleLaw

@@ -221,8 +221,8 @@ def test_a_file_in_a_folder_is_a_new_effect(tmp_path):
         '    sentence="Ripple.", source="test",\n'
         '    parameters=(Parameter("force_n", "N", 1.0, 0.0, 10.0),), amplitude=("force_n",))\n'
         '@compiled\n'
-        'def muscle_force(force_n, p, x, v, dx, elapsed, state, i, par, k):\n'
-        '    return force_n - par[k] * math.sin(x / 0.0006)\n')
+        'def muscle_force(force_n, contraction_m, par):\n'
+        '    return force_n - par.force_n * math.sin(contraction_m / 0.0006)\n')
     script = (
         'from pam_sim import load_rig\n'
         'import numpy as np\n'
@@ -235,3 +235,35 @@ def test_a_file_in_a_folder_is_a_new_effect(tmp_path):
         env={**os.environ, 'PAM_EFFECTS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.stdout.strip() == 'True', answer.stderr
+
+
+EFFECT_FILE = """
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.parameters import Parameter
+EFFECT = Effect(name="ripple", family="static_map", subsystem="muscle", sentence="Ripple.",
+    source="test", parameters=(Parameter("depth_n", "N", 1.0, 0.0, 10.0),),
+    amplitude=("depth_n",))
+@compiled
+def muscle_force({arguments}):
+    return force_n
+"""
+
+
+@pytest.mark.parametrize('arguments, named', [
+    ('force_n, p, x, v, dx, elapsed, state, i, par, k', 'p'),
+    ('force_n, contraction_m, state, par', 'state'), ('force_n, strain, par', 'strain')])
+def test_a_hook_that_names_what_it_has_not_is_refused_in_one_sentence(
+        tmp_path, monkeypatch, arguments, named):
+    path = tmp_path / 'ripple.py'
+    path.write_text(EFFECT_FILE.format(arguments=arguments))
+    monkeypatch.setenv('PAM_EFFECTS_PATH', str(tmp_path))
+    effects.cache_clear()
+    try:
+        with pytest.raises(InputError, match=f'hook `muscle_force` names `{named}`; write `def '
+                           r'muscle_force\(force_n, pressure_pa, .* by name') as caught:
+            effects()
+        assert caught.value.where == str(path)
+    finally:
+        monkeypatch.undo()
+        effects.cache_clear()

@@ -70,3 +70,8 @@ def test_every_field_is_named_once(values):
     """A missing or unknown name is refused and said."""
     with pytest.raises(ValueError, match='gain|gian'):
         values_of(INNER, values)
+
+
+def test_a_name_that_numpy_has_taken_is_refused():
+    with pytest.raises(ValueError, match='`fill` cannot be a field'):
+        record('supply_pa', 'fill')

@@ -19,7 +19,8 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
-from pam_sim.rollout import layout
+from pam_sim.records import columns, fields
+from pam_sim.rollout.layout import OUTPUT, STATE
 from pam_sim.rollout.simulate import check_outputs
 import pytest
 
@@ -85,14 +86,14 @@ def test_every_parameter_of_rig_and_effects_refuses_what_is_not_physical(valve):
                     rig.with_(effects=[{'name': name, 'parameters': {parameter.name: value}}])
 
 
-@pytest.mark.parametrize('column, value', [
-    (layout.OUT_CONTRACTION, np.nan), (layout.OUT_FORCE, np.inf),
-    (layout.OUT_TRUE_PRESSURE, -5.0), (layout.OUT_TRUE_PRESSURE, np.nan)])
-def test_a_result_that_is_no_physics_is_not_handed_over(column, value):
+@pytest.mark.parametrize('signal, value', [
+    ('contraction_m', np.nan), ('force_n', np.inf), ('true_pressure_pa', -5.0),
+    ('true_pressure_pa', np.nan)])
+def test_a_result_that_is_no_physics_is_not_handed_over(signal, value):
     rig = load_rig(RIG)
     outputs = rig.simulate(np.full(20, 3.0)).outputs
     check_outputs(rig, outputs)
-    outputs[7, column] = value
+    columns(outputs, OUTPUT)[signal][7] = value
     with pytest.raises(InputError, match='leaves what is physical at step 7'):
         check_outputs(rig, outputs)
 
@@ -100,7 +101,7 @@ def test_a_result_that_is_no_physics_is_not_handed_over(column, value):
 def test_the_live_plant_stops_as_well():
     plant = load_rig(RIG).plant()
     plant.step(3.0)
-    plant.state[layout.S_PRESSURE] = np.nan
+    fields(plant.state, STATE).pressure_pa = np.nan
     with pytest.raises(InputError, match='not finite'):
         plant.step(3.0)
 

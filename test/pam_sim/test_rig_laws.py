@@ -26,6 +26,7 @@ from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.muscle.lookup_table import table_from_law
 from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names
 from pam_sim.muscle.registry import get_law, laws, make_law
+from pam_sim.records import fields, values_of
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -48,9 +49,9 @@ def test_the_compiled_formula_is_that_of_the_law(name, chosen):
     law = make_law('lookup', table_of()) if name == 'lookup' else make_law(name, muscle=chosen)
     pressure = np.linspace(*law.validity.pressure_gauge_pa, 23)
     strain = np.linspace(*law.validity.strain, 29)
-    packed = np.array([-7.0, *law.pack()])
+    packed = fields(values_of(law.PACKED, law.pack()), type(law).PACKED)
     one = type(law).COMPILED
-    compiled = [[one(p, e, packed, 1) for e in strain] for p in pressure]
+    compiled = [[one(p, e, packed) for e in strain] for p in pressure]
     wanted = law.formula_n(pressure[:, None], strain)
     assert np.allclose(compiled, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
 
@@ -213,8 +214,8 @@ from pam_sim.muscle.law import MuscleLaw, ParameterSet
 from pam_sim.parameters import Parameter
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
-    return par[k] * gauge_pa * (1.0 - strain / 0.2)
+def tension_n(gauge_pa, strain, par):
+    return par.a_m2 * gauge_pa * (1.0 - strain / 0.2)
 
 class Straight(MuscleLaw):
     NAME = 'straight'
@@ -248,3 +249,16 @@ def test_a_law_in_a_folder_of_the_user_moves_a_rig(tmp_path):
         env={**os.environ, 'PAM_MUSCLE_LAWS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.stdout.split() == ['True', 'True'], answer.stderr
+
+
+def test_a_formula_that_takes_a_place_is_refused_in_one_sentence(tmp_path, monkeypatch):
+    path = tmp_path / 'straight.py'
+    path.write_text(LAW.replace('strain, par)', 'strain, par, k)'))
+    monkeypatch.setenv('PAM_MUSCLE_LAWS_PATH', str(tmp_path))
+    laws.cache_clear()
+    try:
+        with pytest.raises(InputError, match=r'write `def tension_n\(gauge_pa, strain, par\)`'):
+            laws()
+    finally:
+        monkeypatch.undo()
+        laws.cache_clear()

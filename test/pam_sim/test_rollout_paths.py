@@ -19,8 +19,9 @@ import math
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects, get_effect
-from pam_sim.rollout import kernel, layout
-from pam_sim.rollout.generate import hook_flag
+from pam_sim.records import columns, fields, size_of, values_of
+from pam_sim.rollout import kernel
+from pam_sim.rollout.layout import OUTPUT, PARAMETERS
 from pam_sim.rollout.simulate import input_array
 from pam_sim.valve.flow import flow_function, mass_flow_kg_per_s
 import pytest
@@ -29,8 +30,8 @@ STEPS = 600
 VALVES = (('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching'))
 
 
-def rolled(rig, par_changes=()):
-    """Return the outputs of a rollout with some entries of ``par`` set by hand."""
+def rolled(rig, used=None):
+    """Return the outputs of a rollout; with hooks ``used``, as if effects acted through them."""
     phase = np.arange(STEPS) * 0.02
     signal = 3.0 + 2.0 * np.sin(phase)
     if rig.valve == 'hsv':
@@ -38,9 +39,12 @@ def rolled(rig, par_changes=()):
         signal = np.stack([np.clip(drive, 0.0, 1.0), np.clip(-drive, 0.0, 1.0)], axis=1)
     inputs, _ = input_array(rig, signal, 2.0 * np.cos(phase))
     state, par = rig.pack(initial_pressure_pa=300e3)
-    for index, value in par_changes:
-        par[index] = value
-    outputs = np.empty((STEPS + 1, layout.OUT_SIZE))
+    if used is not None:
+        numbers = fields(par, PARAMETERS)
+        numbers.beyond_nominal = 1.0
+        for hook in used:
+            numbers.used[hook] = 1.0
+    outputs = np.empty((STEPS + 1, size_of(OUTPUT)))
     kernel.rollout(state, par, inputs, outputs)
     return outputs
 
@@ -49,15 +53,15 @@ def rolled(rig, par_changes=()):
 @pytest.mark.parametrize('hooks', [(), ('mass_flow', 'volume', 'muscle_force', 'sensor')])
 def test_the_nominal_step_has_the_bits_of_the_step_with_hooks(valve, fidelity, hooks):
     rig = load_rig('dmsp_5_300_hanging_mass', valve=valve, fidelity=fidelity)
-    changes = [(layout.PAR_BEYOND_NOMINAL, 1.0), *((hook_flag(hook), 1.0) for hook in hooks)]
     nominal = rolled(rig)
-    assert np.ptp(nominal[:, layout.OUT_CONTRACTION]) > 2e-3
-    assert np.array_equal(nominal, rolled(rig, changes))
+    assert np.ptp(columns(nominal, OUTPUT)['contraction_m']) > 2e-3
+    assert np.array_equal(nominal, rolled(rig, hooks))
 
 
 def test_only_the_nominal_rig_takes_the_short_way():
     def beyond(rig):
-        return rig.pack()[1][layout.PAR_BEYOND_NOMINAL]
+        _, par = rig.pack()
+        return fields(par, PARAMETERS).beyond_nominal
 
     nominal = load_rig('dmsp_5_300_hanging_mass')
     assert beyond(nominal) == 0.0
@@ -84,16 +88,20 @@ def test_the_flow_is_continuous_where_the_law_changes():
 @pytest.mark.parametrize('scale', [-1.0, 1.0])
 def test_the_heat_exchange_by_series_is_that_by_exponential(scale):
     from pam_sim.effects import thermal
-    par, state = np.array([0.0, 84_148.0]), np.array([80_000.0, 0.0])
+    before_rt = 80_000.0
+    par = fields(values_of(thermal.EFFECT.packed, {
+        'conductance_kg_per_s': 0.0, 'ambient_rt_j_per_kg': 84_148.0}), thermal.EFFECT.packed)
+    state = fields(values_of(thermal.EFFECT.states, {
+        'rt_j_per_kg': before_rt, 'stage_rt_j_per_kg': 0.0}), thermal.EFFECT.states)
     found = {}
     for name, factor in (('series', 0.99), ('exponential', 1.01)):
         # A loss a little to either side of the limit between the two, by the volume alone.
         loss = scale * factor * thermal._SMALL_LOSS
         grown = (2.0 + loss / 0.4) / (2.0 - loss / 0.4)
-        start_m3 = 1e-4 * state[0] / 4e5
+        start_m3 = 1e-4 * before_rt / 4e5
         found[name] = thermal.air_rt(
-            84_148.0, 1e-4, 0.0, 0.0, 4e5, grown * start_m3, 1e-3, state, 0, par, 0)
-        assert found[name] == pytest.approx(state[0] * math.exp(-loss), rel=1e-12)
+            1e-4, 0.0, 0.0, 4e5, grown * start_m3, 1e-3, state, par)
+        assert found[name] == pytest.approx(before_rt * math.exp(-loss), rel=1e-12)
     assert found['series'] != found['exponential']
 
 
@@ -107,5 +115,5 @@ def test_every_effect_at_once_stays_within_the_numbers():
         assert np.isfinite(outputs).all()
         here = [name for name in effects() if valve in get_effect(name).valves]
         state, par = rig.with_(effects=every).pack()
-        assert len(here) > 20 and par[layout.PAR_BEYOND_NOMINAL] == 1.0
+        assert len(here) > 20 and fields(par, PARAMETERS).beyond_nominal == 1.0
         assert np.abs(outputs - rolled(rig)).max() > 1.0

@@ -26,8 +26,10 @@ from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 ANGLE_RAD = math.radians(28.6)
+CYLINDER = 'area_m2', 'a', 'b'          # of F = p S (a (1 - eps)^2 - b)
 _EFFECTIVE = ('effective diameter, chosen so that the force at rest is the {} of the data '
               'sheet; the bore gives about half; braid angle 28.6 degrees')
 
@@ -72,10 +74,10 @@ GEOMETRY = (
 
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
-    """Return p S (a (1 - eps)^2 - b) [N], one point; S [m^2], a, b at ``par[k]``."""
+def tension_n(gauge_pa, strain, par):
+    """Return p S (a (1 - eps)^2 - b) [N], one point."""
     ratio = 1.0 - strain
-    return gauge_pa * par[k] * (par[k + 1] * ratio * ratio - par[k + 2])
+    return gauge_pa * par.area_m2 * (par.a * ratio * ratio - par.b)
 
 
 def check_angle(values, where):
@@ -96,6 +98,7 @@ class ChouHannaford(MuscleLaw):
     PARAMETERS = GEOMETRY
     SETS = GEOMETRY_SETS
     CLAIMS = (1, 2, 3, 4)
+    PACKED = record(*CYLINDER)
 
     def _check(self, where):
         check_angle(self.values, where)
@@ -106,7 +109,7 @@ class ChouHannaford(MuscleLaw):
 
     def pack(self):
         """Return force per pressure [m^2], a and b."""
-        return shape(self.values)
+        return dict(zip(CYLINDER, shape(self.values)))
 
     def volume_m3(self, pressure_gauge_pa, strain):
         """Return the inner volume [m^3]; the pressure does not change it. Arrays broadcast."""

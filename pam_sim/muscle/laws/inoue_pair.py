@@ -24,8 +24,9 @@ J phi'' + c phi' + k phi = g dp; without friction model, as in the paper.
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet
-from pam_sim.muscle.laws.chou_hannaford import GEOMETRY_SETS, shape, tension_n
+from pam_sim.muscle.laws.chou_hannaford import CYLINDER, GEOMETRY_SETS, shape, tension_n
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 __all__ = ['InouePair', 'tension_n']
 _SOURCE = 'Inoue 1988, Rubbertuators and applications for robots'
@@ -65,6 +66,7 @@ class InouePair(MuscleLaw):
     )
     SETS = {name: _braid(name) for name in ('dmsp_5', 'dmsp_10', 'dmsp_20', 'dmsp_40')}
     CLAIMS = (2, 3, 4)
+    PACKED = record(*CYLINDER)
 
     def _check(self, where):
         value = self.values
@@ -79,7 +81,8 @@ class InouePair(MuscleLaw):
 
     def pack(self):
         """Return D^2 [m^2], a and b of the single muscle; its formula is that of eq. 4.6."""
-        return self.values['diameter_m'] ** 2, self.values['a'], self.values['b']
+        return {'area_m2': self.values['diameter_m'] ** 2, 'a': self.values['a'],
+                'b': self.values['b']}
 
     def torque_n_m(self, first_pa, second_pa, angle_rad, outside='warn'):
         """

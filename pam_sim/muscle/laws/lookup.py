@@ -30,11 +30,15 @@ from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
+from pam_sim.records import part, record, size_of
 
 STRAIN_POINTS = 41
 SHIPPED = Path(__file__).parent.parent / 'lookup_tables'
 _SMALL = 1e-7           # contraction below this counts as rest
-_ROWS, _COLUMNS, _PER_STRAIN, _HEAD = range(4)
+# What the compiled formula reads: a head, and behind it the values of each pressure.
+HEAD = record('pressures', 'points_per_strain')
+ISOBAR = record('pressure_pa', ('force_n', STRAIN_POINTS), ('slope_n', STRAIN_POINTS))
+_HEAD_SIZE, _ISOBAR_SIZE = size_of(HEAD), size_of(ISOBAR)
 
 
 @compiled
@@ -67,37 +71,39 @@ def end_slope(width0, width1, slope0, slope1):
 
 
 @compiled
-def row_force(row, column, share, width, par, k):
+def row_force(isobar, column, share, width):
     """Return F [N] of one tabulated pressure within a strain interval."""
-    columns = int(par[k + _COLUMNS])
-    rows = int(par[k + _ROWS])
-    force = k + _HEAD + rows + row * columns + column
-    slope = force + rows * columns
-    return hermite(par[force], par[force + 1], par[slope], par[slope + 1], width, share)
+    return hermite(isobar.force_n[column], isobar.force_n[column + 1], isobar.slope_n[column],
+                   isobar.slope_n[column + 1], width, share)
 
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
+def isobar_of(par, row):
+    """Return the tabulated values of one pressure, an ``ISOBAR``; they stand behind the head."""
+    return part(par, _HEAD_SIZE + row * _ISOBAR_SIZE, ISOBAR)
+
+
+@compiled
+def tension_n(gauge_pa, strain, par):
     """
     Return F(eps, P) [N], one point; PCHIP along contraction, then along pressure.
 
-    Beyond the table its edge is used. ``par[k]``: numbers of pressures and of
-    contractions, contractions per unit, pressures, forces, their slopes.
+    Beyond the table its edge is used.
     """
-    rows = int(par[k + _ROWS])
-    columns = int(par[k + _COLUMNS])
-    place = min(max(strain * par[k + _PER_STRAIN], 0.0), columns - 1.0)
-    column = min(int(place), columns - 2)
+    rows = int(par.pressures)
+    place = min(max(strain * par.points_per_strain, 0.0), STRAIN_POINTS - 1.0)
+    column = min(int(place), STRAIN_POINTS - 2)
     share = place - column
-    width = 1.0 / par[k + _PER_STRAIN]
-    axis = k + _HEAD
-    pressure = min(max(gauge_pa, par[axis]), par[axis + rows - 1])
+    width = 1.0 / par.points_per_strain
+    pressure = min(max(gauge_pa, isobar_of(par, 0).pressure_pa),
+                   isobar_of(par, rows - 1).pressure_pa)
     row = 0
-    while row < rows - 2 and par[axis + row + 1] < pressure:
+    while row < rows - 2 and isobar_of(par, row + 1).pressure_pa < pressure:
         row += 1
-    y0 = row_force(row, column, share, width, par, k)
-    y1 = row_force(row + 1, column, share, width, par, k)
-    h = par[axis + row + 1] - par[axis + row]
+    low, high = isobar_of(par, row), isobar_of(par, row + 1)
+    y0 = row_force(low, column, share, width)
+    y1 = row_force(high, column, share, width)
+    h = high.pressure_pa - low.pressure_pa
     slope = (y1 - y0) / h
     slope0 = 0.0
     slope1 = 0.0
@@ -106,18 +112,20 @@ def tension_n(gauge_pa, strain, par, k):
     h_before = h
     h_after = h
     if row > 0:
-        h_before = par[axis + row] - par[axis + row - 1]
-        before = (y0 - row_force(row - 1, column, share, width, par, k)) / h_before
+        lower = isobar_of(par, row - 1)
+        h_before = low.pressure_pa - lower.pressure_pa
+        before = (y0 - row_force(lower, column, share, width)) / h_before
         slope0 = middle_slope(h_before, h, before, slope)
     if row < rows - 2:
-        h_after = par[axis + row + 2] - par[axis + row + 1]
-        after = (row_force(row + 2, column, share, width, par, k) - y1) / h_after
+        higher = isobar_of(par, row + 2)
+        h_after = higher.pressure_pa - high.pressure_pa
+        after = (row_force(higher, column, share, width) - y1) / h_after
         slope1 = middle_slope(h, h_after, slope, after)
     if row == 0:
         slope0 = end_slope(h, h_after, slope, after)
     if row == rows - 2:
         slope1 = end_slope(h, h_before, slope, before)
-    return hermite(y0, y1, slope0, slope1, h, (pressure - par[axis + row]) / h)
+    return hermite(y0, y1, slope0, slope1, h, (pressure - low.pressure_pa) / h)
 
 
 def _isobar(strain, load):
@@ -168,6 +176,7 @@ class Lookup(MuscleLaw):
         'table': ParameterSet({}, 'the table given; its source line says what it is')}
     CLAIMS = (1, 2, 3, 4)
     EXTRAPOLATES = False
+    PACKED = HEAD
 
     def __init__(self, table=None, muscle=None, where=''):
         table = None if table == {} else table
@@ -199,12 +208,14 @@ class Lookup(MuscleLaw):
         strain = np.linspace(0.0, limit, STRAIN_POINTS)
         force = np.array([self._pulls(row, strain) for row in self.table.strain])
         slope = np.array([PchipInterpolator(strain, row).derivative()(strain) for row in force])
-        self._packed = (*force.shape, (STRAIN_POINTS - 1) / limit, *pressure, *force.ravel(),
-                        *slope.ravel())
+        self.PACKED = record(*HEAD.names, ('isobars', (ISOBAR, pressure.size)))
+        self._packed = {
+            'pressures': pressure.size, 'points_per_strain': (STRAIN_POINTS - 1) / limit,
+            'isobars': np.column_stack([pressure, force, slope])}
         self._force = RegularGridInterpolator((pressure, strain), force, 'pchip')
 
     def pack(self):
-        """Return sizes, pressures, forces and their slopes along contraction."""
+        """Return the head, then pressures, forces and their slopes along contraction."""
         return self._packed
 
     def _pulls(self, strain_of_load, strain):

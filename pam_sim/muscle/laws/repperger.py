@@ -38,20 +38,23 @@ def _number(name, unit, nominal, lower, upper, text):
 
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
-    """Return F_ce - K x [N], one point; values in the order of PARAMETERS at ``par[k]``."""
-    x = strain * par[k]
-    bend = par[k + 6]
-    spring = (par[k + 3] + par[k + 4] * min(gauge_pa, bend)
-              + par[k + 5] * max(gauge_pa - bend, 0.0) + par[k + 7] * x)
-    return par[k + 1] + par[k + 2] * gauge_pa - spring * x
+def tension_n(gauge_pa, strain, par):
+    """Return F_ce - K x [N], one point."""
+    x = strain * par.length_m
+    bend = par.k_pressure_pa
+    spring = (par.k0_n_per_m + par.k1_n_per_m_pa * min(gauge_pa, bend)
+              + par.k2_n_per_m_pa * max(gauge_pa - bend, 0.0) + par.k_x_n_per_m2 * x)
+    return par.f0_n + par.f1_n_per_pa * gauge_pa - spring * x
 
 
 @compiled
-def damper_force_n(velocity_m_per_s, gauge_pa, strain, par, k):
+def damper_force_n(velocity_m_per_s, gauge_pa, strain, par):
     """Return B v [N], one point; never pushes the way the muscle moves."""
-    place = k + 8 if velocity_m_per_s >= 0.0 else k + 10
-    return max(0.0, par[place] + par[place + 1] * gauge_pa) * velocity_m_per_s
+    if velocity_m_per_s >= 0.0:
+        damper = par.b0_n_s_per_m + par.b1_n_s_per_m_pa * gauge_pa
+    else:
+        damper = par.c0_n_s_per_m + par.c1_n_s_per_m_pa * gauge_pa
+    return max(0.0, damper) * velocity_m_per_s
 
 
 class Repperger(MuscleLaw):

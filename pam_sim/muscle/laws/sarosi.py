@@ -56,10 +56,10 @@ def _scaled(coefficients, factor):
 
 
 @inlined
-def tension_n(gauge_pa, strain, par, k):
-    """Return the formula's value [N], one point; coefficients at ``par[k]``."""
-    return ((par[k] * gauge_pa + par[k + 1]) * math.exp(par[k + 2] * strain)
-            + (par[k + 3] * strain + par[k + 4]) * gauge_pa + par[k + 5])
+def tension_n(gauge_pa, strain, par):
+    """Return the formula's value [N], one point."""
+    return ((par.a1_n_per_pa * gauge_pa + par.a2_n) * math.exp(par.a3 * strain)
+            + (par.a4_n_per_pa * strain + par.a5_n_per_pa) * gauge_pa + par.a6_n)
 
 
 class Sarosi(MuscleLaw):

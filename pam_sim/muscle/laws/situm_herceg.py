@@ -36,9 +36,10 @@ def _chosen(length_m, force_n, pressure_pa, shortest):
 
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
-    """Return the formula's value [N], one point; lengths [m] and Kp at ``par[k]``."""
-    return par[k + 2] * gauge_pa * (par[k] * (1.0 - strain) - par[k + 1])
+def tension_n(gauge_pa, strain, par):
+    """Return the formula's value [N], one point."""
+    return par.k_p_n_per_pa_m * gauge_pa * (
+        par.length_m * (1.0 - strain) - par.shortest_length_m)
 
 
 class SitumHerceg(MuscleLaw):

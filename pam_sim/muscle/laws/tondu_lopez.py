@@ -27,18 +27,20 @@ import math
 import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
-from pam_sim.muscle.laws.chou_hannaford import check_angle, GEOMETRY, GEOMETRY_SETS, shape
+from pam_sim.muscle.laws.chou_hannaford import (
+    check_angle, CYLINDER, GEOMETRY, GEOMETRY_SETS, shape)
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 
 _CONSTANT = {'k0': 1.25, 'k_rise': 0.0, 'k_pressure_pa': 235e3}
 
 
 @compiled
-def tension_n(gauge_pa, strain, par, k):
-    """Return the formula's value [N], one point; S, a, b, k0, k_rise, 1 / k_pressure at k."""
-    factor = par[k + 3] + par[k + 4] * math.exp(-gauge_pa * par[k + 5])
+def tension_n(gauge_pa, strain, par):
+    """Return the formula's value [N], one point."""
+    factor = par.k0 + par.k_rise * math.exp(-gauge_pa * par.inverse_k_pressure_per_pa)
     left = max(0.0, 1.0 - factor * strain)
-    return gauge_pa * par[k] * (par[k + 1] * left * left - par[k + 2])
+    return gauge_pa * par.area_m2 * (par.a * left * left - par.b)
 
 
 class TonduLopez(MuscleLaw):
@@ -69,6 +71,7 @@ class TonduLopez(MuscleLaw):
            for name in ('dmsp_5', 'dmsp_10', 'dmsp_20', 'dmsp_40')},
     }
     CLAIMS = (1, 2, 3, 4)
+    PACKED = record(*CYLINDER, 'k0', 'k_rise', 'inverse_k_pressure_per_pa')
 
     def _check(self, where):
         check_angle(self.values, where)
@@ -87,7 +90,9 @@ class TonduLopez(MuscleLaw):
     def pack(self):
         """Return force per pressure [m^2], a, b, k0, k_rise and 1 / k_pressure [1/Pa]."""
         value = self.values
-        return (*shape(value), value['k0'], value['k_rise'], 1.0 / value['k_pressure_pa'])
+        return {**dict(zip(CYLINDER, shape(value))), 'k0': value['k0'],
+                'k_rise': value['k_rise'],
+                'inverse_k_pressure_per_pa': 1.0 / value['k_pressure_pa']}
 
     def volume_m3(self, pressure_gauge_pa, strain):
         """

@@ -1,0 +1,127 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The calls of effects and force laws in a step, written from what is registered.
+
+Which functions these are is known at run time only, and numba compiles no call through a
+table of functions without losing its cache or the speed of a direct call. So the calls are
+written as text, one function per hook, and imported as a module. ``hooks`` is that module:
+``hooks.volume(volume_m3, pressure_pa, contraction_m, beyond, state, par)`` has the arguments
+of the hook, whether the rig is ``beyond`` the nominal one, and its records. Where it is not,
+the compiler leaves nothing of the call.
+"""
+
+from collections.abc import Iterator
+
+from pam_sim.compiled import named_arguments
+from pam_sim.effects.registry import effects
+from pam_sim.generated import generated_module
+from pam_sim.muscle.registry import laws
+from pam_sim.rollout.hooks import HOOKS
+from pam_sim.rollout.places import law_codes
+
+_HEAD = '''"""Calls of the registered effects and laws; written by pam_sim.rollout.dispatch."""
+
+from pam_sim.compiled import compiled, inlined
+from pam_sim.effects.registry import effects
+from pam_sim.muscle.registry import laws
+from pam_sim.records import part
+from pam_sim.rollout.places import (
+    ACTING, ACTING_PLACE, LAW_PLACE, PACKED, PACKED_PLACE, STATES, STATES_PLACE)
+
+_EFFECTS = effects()
+_LAWS = laws()
+'''
+_OWN = {'state': 'states.{}', 'par': 'packed.{}', 'plant': 'state'}
+
+
+def _functions() -> Iterator[str]:
+    """Write the names under which effects' functions are called."""
+    for name, effect in effects().items():
+        for hook in effect.hooks:
+            yield f'_{name}_{hook} = _EFFECTS[{name!r}].hooks[{hook!r}]'
+
+
+def _call(name: str, hook: str) -> str:
+    """Write the call of an effect's hook with the arguments it names."""
+    function = effects()[name].hooks[hook]
+    given = ', '.join(f'{one}={_OWN[one].format(name)}' if one in _OWN else f'{one}={one}'
+                      for one in named_arguments(function))
+    return f'_{name}_{hook}({given})'
+
+
+def _hook(hook: str) -> Iterator[str]:
+    """Write the function of a hook: all its effects behind one comparison."""
+    declared = HOOKS[hook]
+    given = ', '.join(declared.arguments)
+    result = ', '.join(declared.returns)
+    users = [name for name, effect in effects().items() if hook in effect.hooks]
+    if users:
+        yield from ('', '', '@compiled', f'def _acting_{hook}({given}, state, par):',
+                    '    acting = part(par, ACTING_PLACE, ACTING)',
+                    '    packed = part(par, PACKED_PLACE, PACKED)',
+                    '    states = part(state, STATES_PLACE, STATES)')
+        for name in users:
+            # Flags are 0 or 1; `> 0.0` is one branch, `!= 0.0` two, as it must tell NaN.
+            yield f'    if acting.{name} > 0.0:'
+            yield f'        {result}{" = " if result else ""}{_call(name, hook)}'
+        if result:
+            yield f'    return {result}'
+    yield from ('', '', '@inlined', f'def {hook}({given}, beyond, state, par):',
+                f'    """{declared.sentence}"""')
+    if users:
+        yield f'    if beyond and par.used.{hook} > 0.0:'
+        yield f'        {"return " if result else ""}_acting_{hook}({given}, state, par)'
+    if result:
+        yield f'    return {result}'
+
+
+def _law_calls() -> Iterator[str]:
+    """Write the calls of the force laws and of their dampers."""
+    fast, *others = law_codes()
+    dampers = [name for name in law_codes() if laws()[name].COMPILED_DAMPER is not None]
+    for name in law_codes():
+        yield f'_law_{name} = _LAWS[{name!r}].COMPILED'
+        yield f'_packed_{name} = _LAWS[{name!r}].PACKED'
+    for name in dampers:
+        yield f'_damper_{name} = _LAWS[{name!r}].COMPILED_DAMPER'
+    yield from ('', '', '@compiled', 'def _other_law(gauge_pa, strain, par):')
+    for name in others:
+        yield f'    if par.law == {law_codes()[name]}:'
+        yield f'        return _law_{name}(gauge_pa, strain, part(par, LAW_PLACE, _packed_{name}))'
+    yield from ('    return 0.0', '', '', '@inlined',
+                'def law_tension(gauge_pa, strain, beyond, par):',
+                '    """Value of the force law [N], negative where it would push."""',
+                '    if beyond and par.law > 0.0:',
+                '        return _other_law(gauge_pa, strain, par)',
+                f'    return _law_{fast}(gauge_pa, strain, part(par, LAW_PLACE, _packed_{fast}))',
+                '', '', '@compiled', 'def law_damper(velocity_m_per_s, gauge_pa, strain, par):',
+                '    """Force of the law\'s own damper [N]."""')
+    for name in dampers:
+        yield f'    if par.law == {law_codes()[name]}:'
+        yield (f'        return _damper_{name}(velocity_m_per_s, gauge_pa, strain, '
+               f'part(par, LAW_PLACE, _packed_{name}))')
+    yield '    return 0.0'
+
+
+def dispatch_source() -> str:
+    """Return the text of the module with the calls."""
+    lines = [*_functions(), *_law_calls()]
+    for hook in HOOKS:
+        lines += _hook(hook)
+    return _HEAD + '\n'.join(lines) + '\n'
+
+
+hooks = generated_module('pam_hooks', dispatch_source())

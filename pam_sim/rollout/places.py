@@ -1,0 +1,58 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What stands behind the rig's own records in ``state`` and ``par``: effects and force law.
+
+``state`` holds ``layout.STATE``, then ``STATES``. ``par`` holds ``layout.PARAMETERS``, then
+``ACTING``, ``PACKED``, and last the record of the law, which may be of any length.
+"""
+
+from pam_sim.effects.registry import effects
+from pam_sim.muscle.registry import laws
+from pam_sim.records import place_of, record, size_of
+from pam_sim.rollout.layout import PARAMETERS, STATE
+
+_EFFECTS = effects()
+ACTING = record(*_EFFECTS)                  # 1: the effect acts
+PACKED = record(*((name, effect.packed) for name, effect in _EFFECTS.items()))
+STATES = record(*((name, effect.states) for name, effect in _EFFECTS.items()
+                  if effect.states is not None))
+
+STATES_PLACE = size_of(STATE)
+ACTING_PLACE = size_of(PARAMETERS)
+PACKED_PLACE = ACTING_PLACE + size_of(ACTING)
+LAW_PLACE = PACKED_PLACE + size_of(PACKED)
+STATE_SIZE = STATES_PLACE + size_of(STATES)
+
+# Where each effect has its packed parameters in ``par`` and its states in ``state``.
+PLACES = {
+    name: (PACKED_PLACE + place_of(PACKED, name),
+           STATES_PLACE + place_of(STATES, name) if effect.states is not None else STATE_SIZE)
+    for name, effect in _EFFECTS.items()}
+
+# The numbers of ``par`` that are 1 when an effect acts.
+FLAGS = {name: (place_of(PARAMETERS, 'beyond_nominal'), ACTING_PLACE + place_of(ACTING, name),
+                *(place_of(PARAMETERS, 'used') + place_of(PARAMETERS['used'], hook)
+                  for hook in effect.hooks))
+         for name, effect in _EFFECTS.items()}
+
+_FAST_LAW = 'sarosi'                        # of the nominal rig: no call is left of it
+
+
+def law_codes() -> dict[str, float]:
+    """Return {law name: its number in ``par.law``} of the laws a rig can use, 0 the fast one."""
+    usable = [name for name, law in laws().items() if law.COMPILED is not None]
+    return {name: float(code) for code, name in enumerate(
+        sorted(usable, key=lambda name: (name != _FAST_LAW, name)))}
