@@ -22,7 +22,7 @@ nanoseconds.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 import math
 from typing import Protocol
 
@@ -36,6 +36,12 @@ SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 def valve_of(names: Iterable[str]) -> str:
     """Return 'ppr' or 'hsv' by the names of the efforts of a valve signal, '' for others."""
     return next((valve for valve, own in VALVE_NAMES.items() if {*own} & {*names}), '')
+
+
+def message_of(*names: str) -> type:
+    """Return a plain class of a stamp and numbers, for a topic that needs none of its own."""
+    return make_dataclass('Numbers', [('stamp_ns', int), *((name, float) for name in names)],
+                          frozen=True, slots=True)
 
 
 class Message(Protocol):

@@ -30,6 +30,10 @@ def add_arguments(parser):
     parser.add_argument('--markdown', type=out_path, metavar='DIR', default=None,
                         help='write a Markdown page per node into this folder; pages made this '
                              'way before are made again')
+    parser.add_argument('--topics', type=out_path, metavar='DIR', default=None,
+                        help='write the list of topics anew into this folder of their pages, '
+                             'and a page of each topic that has none written by hand; needs no '
+                             'ROS')
     add_overwrite_option(parser)
 
 
@@ -37,6 +41,11 @@ def run(args):
     """Print the names, or one page; write the pages asked for."""
     from pam_sim.errors import did_you_mean, InputError
     from pam_sim.files import check_folder, whole_files, write_text
+    if args.topics is not None:
+        written = _write_topics(Path(args.topics))
+        emit(args, {'schema': 1, 'nodes': {}, 'written': written},
+             '\n'.join(f'page: {path}' for path in written))
+        return EXIT_DONE
     if args.markdown is not None:
         check_folder(args.markdown)
     try:
@@ -63,3 +72,18 @@ def run(args):
             f'{name}: {text.splitlines()[2]}' for name, text in texts.items())
     emit(args, {'schema': 1, 'nodes': texts, 'written': written}, shown)
     return EXIT_DONE
+
+
+def _write_topics(folder):
+    """Write list and pages of the topics; return their paths."""
+    from pam_actuation.models.topics import INDEX, pages
+    from pam_sim.errors import InputError
+    from pam_sim.files import whole_files, write_text
+    if not (folder / INDEX).is_file():
+        raise InputError(
+            f'has no {INDEX}; give the folder of the pages of the topics', str(folder))
+    files = pages(folder)
+    with whole_files(folder) as temporary:
+        for name, text in files.items():
+            write_text(temporary / name, text)
+    return [str(folder / name) for name in files]

@@ -24,9 +24,7 @@ A topic may be given by its short name (``pressure``) or in full
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from pam_actuation.messages import (
-    AngleReference, AngleTrajectory, Contraction, ControllerState, Force, JointAngle,
-    NamedEfforts, Pressure, Reference, ReferenceTrajectory, ValveSignal)
+from pam_actuation import messages
 from pam_actuation.topics.contents import (
     AnyJoints, Content, JOINT_STATE, NamedNumbers, Numbers, Numeric, Statuses, Trajectory, Value)
 from pam_actuation.topics.quality import Service, USUAL
@@ -71,6 +69,8 @@ class Topic:
         What a number that is not there means.
     internals : bool
         Whether its numbers are internals of a node, which may be anything.
+    drawn : bool
+        Whether the layouts for other programs in ``config/layouts`` show it.
     limits : dict of str to tuple of float
         Lowest and highest plausible number of a value, SI, where ``bags/plausibility.py`` does
         not know the value.
@@ -90,6 +90,7 @@ class Topic:
     steady: bool = False
     missing: str = TOLD
     internals: bool = False
+    drawn: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     service: Service = USUAL
 
@@ -116,49 +117,53 @@ REFERENCE = ('reference_generator',)
 DRIVER = ('valve_driver',)
 
 _PRESSURE = Numbers(
-    'sensor_msgs/msg/FluidPressure', Pressure, (Value('pressure_pa', 'fluid_pressure'),))
+    'sensor_msgs/msg/FluidPressure', messages.Pressure, (Value('pressure_pa', 'fluid_pressure'),))
 _FORCE = Numbers(
-    'geometry_msgs/msg/WrenchStamped', Force, (Value('force_n', 'wrench.force.x'),))
+    'geometry_msgs/msg/WrenchStamped', messages.Force, (Value('force_n', 'wrench.force.x'),))
 _MOTION = (Value('contraction_m', 'position'), Value('velocity_m_per_s', 'velocity'))
-_SIGNAL = NamedNumbers(ValveSignal, 'efforts', 'effort')
+_SIGNAL = NamedNumbers(messages.ValveSignal, 'efforts', 'effort')
 
 # Of messages at equal times those of an earlier row act first: measured, wanted, decided, acted.
 TOPICS = (
     Topic('pressure', _PRESSURE, 'measured muscle pressure', SENSORS, (*CONTROLLERS, *DRIVER),
-          need=NEEDED, steady=True),
-    Topic('contraction', Numbers(JOINT_STATE, Contraction, _MOTION), 'measured contraction',
-          SENSORS, LAWS, need=NEEDED, steady=True),
-    Topic('force', _FORCE, 'measured force', SENSORS, CONTROLLERS, need=USED, steady=True),
-    Topic('supply_pressure', _PRESSURE, 'measured supply pressure', SENSORS, DRIVER, need=USED),
+          need=NEEDED, steady=True, drawn=True),
+    Topic('contraction', Numbers(JOINT_STATE, messages.Contraction, _MOTION),
+          'measured contraction', SENSORS, LAWS, need=NEEDED, steady=True, drawn=True),
+    Topic('force', _FORCE, 'measured force', SENSORS, CONTROLLERS, need=USED, steady=True,
+          drawn=True),
+    Topic('supply_pressure', _PRESSURE, 'measured supply pressure', SENSORS, DRIVER, need=USED,
+          drawn=True),
     Topic('external_force', _FORCE, 'disturbance on the simulated load', REFERENCE,
-          ('plant_simulator',)),
-    Topic('reference', Numbers(JOINT_STATE, Reference, _MOTION, (Value('force_n', 'effort'),)),
-          'wanted contraction, now', REFERENCE, LAWS, held=True, need=USED),
+          ('plant_simulator',), drawn=True),
+    Topic('reference', Numbers(
+        JOINT_STATE, messages.Reference, _MOTION, (Value('force_n', 'effort'),)),
+          'wanted contraction, now', REFERENCE, LAWS, held=True, need=USED, drawn=True),
     Topic('reference_trajectory', Trajectory(
-        ReferenceTrajectory, 'contraction_m', 'velocity_m_per_s', 'force_n'),
+        messages.ReferenceTrajectory, 'contraction_m', 'velocity_m_per_s', 'force_n'),
           'wanted contraction, known ahead', REFERENCE, LAWS),
-    Topic('controller_state', NamedNumbers(ControllerState, 'values', 'position'),
-          'every internal of a controller tick', CONTROLLERS, (), held=True, internals=True),
+    Topic('controller_state', NamedNumbers(messages.ControllerState, 'values', 'position'),
+          'every internal of a controller tick', CONTROLLERS, (), held=True, internals=True,
+          drawn=True),
     Topic('pressure_command', _PRESSURE, 'wanted muscle pressure', (*CONTROLLERS, *REFERENCE),
-          DRIVER, held=True, need=USED, steady=True),
+          DRIVER, held=True, need=USED, steady=True, drawn=True),
     Topic('valve_command', _SIGNAL, 'wanted raw valve signal', REFERENCE, DRIVER, held=True,
           missing=ALLOWED),
     Topic('valve_signal', _SIGNAL, 'what goes to the valve', (*DRIVER, 'valve_watchdog'),
           (*PLANTS, *DRIVER, 'valve_watchdog'), held=True, need=NEEDED, steady=True,
-          missing=KEPT),
+          missing=KEPT, drawn=True),
     Topic('followed_pressure', _PRESSURE, 'what the driver makes of the command', DRIVER,
-          CONTROLLERS, held=True),
+          CONTROLLERS, held=True, drawn=True),
     Topic('diagnostics', Statuses(), 'health of every node', (EVERY_NODE,), (), place=ROOT),
-    Topic('joint_state', Numbers(JOINT_STATE, JointAngle, (
+    Topic('joint_state', Numbers(JOINT_STATE, messages.JointAngle, (
         Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
           'measured angle, and torque of both tendons', ('joint_simulator',),
           ('joint_controller',), place=JOINT),
-    Topic('joint_reference', Numbers(JOINT_STATE, AngleReference, (
+    Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
           'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True),
-    Topic('joint_trajectory', AnyJoints(AngleTrajectory, 'angle_rad', 'rate_rad_per_s'),
+    Topic('joint_trajectory', AnyJoints(messages.AngleTrajectory, 'angle_rad', 'rate_rad_per_s'),
           'wanted angle, known ahead', REFERENCE, ('joint_controller',), place=JOINT),
-    Topic('joint_effort', NamedNumbers(NamedEfforts, 'efforts', 'effort'),
+    Topic('joint_effort', NamedNumbers(messages.NamedEfforts, 'efforts', 'effort'),
           'wanted torque of both tendons', (), ('joint_controller',), place=JOINT, held=True),
     Topic('co_contraction', _PRESSURE, 'wanted mean pressure of both muscles', (),
           ('joint_controller',), place=JOINT, held=True),

@@ -19,6 +19,7 @@ import math
 from pam_actuation import messages
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.topics.codec import encode
+from pam_actuation.topics.contents import Numbers
 from pam_actuation.topics.table import RECORDED
 
 START_NS = 1_790_000_000_123_456_789
@@ -30,6 +31,19 @@ METADATA = {
 
 def example_messages(i=0, valve='ppr'):
     """Return short name to one plain message of every topic, number ``i`` of a run."""
+    return {**{name: plain_numbers(topic, i) for name, topic in RECORDED.items()
+               if isinstance(topic.content, Numbers)}, **messages_of_a_rig(i, valve)}
+
+
+def plain_numbers(topic, i=0):
+    """Return a plain message, number ``i`` of a run, of a topic that carries numbers."""
+    values = topic.content.values
+    return topic.content.message(START_NS + i * STEP_NS, *(
+        sum(topic.limits.get(value.name, (0.0, 1.0))) / 2 for value in values))
+
+
+def messages_of_a_rig(i, valve):
+    """Return short name to plain messages that hang together."""
     stamp_ns = START_NS + i * STEP_NS
     phase = 0.05 * i
     signal = (('ppr_voltage',), (2.0 + 0.1 * math.sin(phase),))

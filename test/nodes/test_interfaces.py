@@ -26,6 +26,7 @@ from pam_actuation.nodes.interfaces import Inspector, VARIANTS              # no
 from pam_actuation.nodes.pages import pages                                 # noqa: E402
 from pam_actuation.nodes.policy import policy                               # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
+from pam_actuation.topics import table                                      # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
@@ -57,6 +58,22 @@ def test_what_comes_with_certain_parameters_is_said_so(made):
     assert '`accept_valve_command:=true`' in line
     assert '| serves | `~/pause` | `std_srvs/srv/SetBool` | `use_sim_time:=true` |' in (
         made['plant_simulator.md'])
+
+
+def test_nodes_speak_and_listen_as_the_table_of_topics_says():
+    with Inspector() as inspector:
+        found = {name: inspector.whole_interface(name)[0] for name in VARIANTS}
+    offered = {kind: {name: {table.short_name(topic): type_name
+                             for topic, type_name in getattr(one, kind).items()}
+                      for name, one in found.items() if name != table.RECORDER}
+               for kind in ('publishes', 'subscribes')}
+    for topic in (one for one in table.TOPICS if one.place != table.ROOT):
+        for nodes, known in zip((topic.published_by, topic.consumed_by), offered.values()):
+            there = {name for name in known if topic.name in known[name]}
+            # Where such a sensor is connected: the dummy has none.
+            unseen = {'hardware_sensors'} if topic.name == 'supply_pressure' else set()
+            assert there == set(nodes) - unseen, topic.name
+            assert {known[name][topic.name] for name in there} <= {topic.type_name}
 
 
 @pytest.mark.parametrize('name', POLICIES)

@@ -32,7 +32,8 @@ from pam_actuation.nodes.ros_messages import class_of, set_stamp            # no
 from pam_actuation.rigging.client import RigClient                          # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.topics.codec import decode, encode, Reader, Writer       # noqa: E402
-from pam_actuation.topics.table import TOPICS                               # noqa: E402
+from pam_actuation.topics.contents import Numbers                           # noqa: E402
+from pam_actuation.topics.table import RECORDED, TOPICS                     # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message      # noqa: E402
 from rosbags.typesys import get_typestore, Stores                           # noqa: E402
 from sensor_msgs.msg import FluidPressure, JointState                       # noqa: E402
@@ -129,7 +130,10 @@ def test_bytes_are_those_of_the_ros_message(topic, plain, message):
 
 
 def test_there_is_a_sample_of_every_topic():
-    assert {*ONE_OF_EACH, 'joint_trajectory', 'diagnostics'} == {topic.name for topic in TOPICS}
+    """Plain numbers in a bag are held against ROS's own serializer in test_middleware_bytes.py."""
+    others = {topic.name for topic in TOPICS if topic.name not in RECORDED
+              or not isinstance(topic.content, Numbers)}
+    assert others <= {*ONE_OF_EACH, 'joint_trajectory', 'diagnostics'}
 
 
 def test_a_trajectory_of_a_joint_arrives_with_names_and_points():
