@@ -54,7 +54,8 @@ class NodeInterface:
     What one node offers.
 
     ``publishes``, ``subscribes`` and ``serves`` map a name, relative to the node's namespace or
-    with ``~/`` to the node, to its type. Those of every node are left out.
+    with ``~/`` to the node, to its type. Those of every node are left out. ``settings`` are
+    those that its controller files know.
     """
 
     name: str
@@ -63,6 +64,7 @@ class NodeInterface:
     publishes: dict
     subscribes: dict
     serves: dict
+    settings: tuple = ()
 
 
 def node_class(name):
@@ -111,7 +113,8 @@ class Inspector:
                 _by_name(namespace, (
                     (one.topic_name, one.msg_type) for one in node.subscriptions)),
                 _by_name(namespace, ((one.srv_name, one.srv_type) for one in node.services
-                                     if one.srv_name.startswith('~/'))))
+                                     if one.srv_name.startswith('~/'))),
+                kind.controller_settings())
         finally:
             node.destroy_node()
 

@@ -125,6 +125,11 @@ class ManagedNode(LifecycleNode):
 
     # What derived nodes override.
 
+    @staticmethod
+    def controller_settings():
+        """Return the settings that its controller files know, for its page."""
+        return ()
+
     def check(self):
         """Raise InputError if the parameters given at start do not make sense."""
 

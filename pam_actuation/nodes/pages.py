@@ -44,6 +44,10 @@ def page(interface, notes):
         '`/diagnostics` is published by every node; with `use_sim_time` it takes `/clock`.',
         '## Parameters', _parameters(interface.parameters),
         '## Parameters of every node', _parameters(COMMON_PARAMETERS)]
+    if interface.settings:
+        parts += ['## Settings in its controller files',
+                  'Below `settings:`, each where it differs from the default.',
+                  _settings(interface.settings)]
     return '\n\n'.join(part.rstrip() for part in parts) + '\n'
 
 
@@ -85,4 +89,12 @@ def _parameters(parameters):
         default = f'`{one.default!r}`' if one.default != '' else ''
         lines.append(row((f'`{one.name}`', default, one.unit, escaped(one.allowed),
                           'yes' if one.live else 'no', escaped(one.description))))
+    return '\n'.join(lines)
+
+
+def _settings(settings):
+    lines = [row(('setting', 'default', 'unit', 'allowed', 'meaning')), '|---|---|---|---|---|']
+    lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit),
+                   f'{one.lower:g} to {one.upper:g}', escaped(one.description)))
+              for one in settings]
     return '\n'.join(lines)

@@ -27,6 +27,12 @@ class PidNode(ControllerNode):
     REALTIME_RANK = 1
     DEFAULT_CONTROLLERS = {'ppr': 'pid', 'hsv': 'pid_hsv'}
 
+    @staticmethod
+    def controller_settings():
+        """Return the settings that its controller files know, for its page."""
+        from pam_actuation.control.pid import SETTINGS
+        return SETTINGS
+
 
 def main(args=None):
     """Run the node; return its exit code."""

@@ -40,6 +40,12 @@ class SofcNode(LearningSwitch, ControllerNode):
             'learning', True, 'Whether the rules change while running.', live=True),
     )
 
+    @staticmethod
+    def controller_settings():
+        """Return the settings that its controller files know, for its page."""
+        from pam_actuation.control.sofc.settings import SETTINGS
+        return SETTINGS
+
     def setup(self):
         """Load the controller and its rules, offer the services for the rules."""
         super().setup()
