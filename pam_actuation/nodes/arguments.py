@@ -141,12 +141,12 @@ def _columns(rows):
 def _parameters(head, rows, width):
     """Return the lines of parameters: name, default, unit, allowed; below them the meaning."""
     lines = []
-    for row in rows:
-        name, default, unit, allowed, live, meaning = (
-            row[head.index(key)] for key in (
-                'parameter', 'default', 'unit', 'allowed', 'live', 'meaning'))
+    for name, *cells in rows:
+        told = dict(zip(head[1:], cells))
+        default, unit, allowed, meaning = (
+            told[key] for key in ('default', 'unit', 'allowed', 'meaning'))
         facts = [f'default {default or repr("")}{unit and f" {unit}"}', f'allowed: {allowed}']
-        facts += ['may change while it runs'] if live == 'yes' else []
+        facts += ['may change while it runs'] if told.get('live') == 'yes' else []
         lines += textwrap.wrap(f'{name}  ({", ".join(facts)})', width,
                                initial_indent='  ', subsequent_indent='      ')
         lines += textwrap.wrap(meaning, width, initial_indent='      ',

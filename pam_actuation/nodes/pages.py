@@ -94,7 +94,7 @@ def _parameters(parameters):
 
 def _settings(settings):
     lines = [row(('setting', 'default', 'unit', 'allowed', 'meaning')), '|---|---|---|---|---|']
-    lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit),
+    lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit.strip('-')),
                    f'{one.lower:g} to {one.upper:g}', escaped(one.description)))
               for one in settings]
     return '\n'.join(lines)
