@@ -14,19 +14,27 @@
 
 """The rig: muscle, valve, load, effects and sensors as one object that can be simulated."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, overload, TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
+from pam_sim.annotations import FloatArray, Number
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.muscle.muscle import get_muscle, Muscle
-from pam_sim.parameters import check_parameters
+from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig_parameters import rig_parameters, VALVES
 from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from pam_sim.valve import hsv, ppr
+
+if TYPE_CHECKING:
+    from pam_sim.plant import Plant
+    from pam_sim.response import Response
 
 
 @dataclass(frozen=True)
@@ -45,11 +53,11 @@ class EffectSetting:
     """
 
     name: str
-    parameters: dict = field(default_factory=dict)
-    source: dict = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    source: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, item):
+    def of(cls, item: 'EffectSetting | Mapping[str, Any] | str') -> 'EffectSetting':
         """
         Return a checked setting from a name, a mapping (name, parameters) or a setting.
 
@@ -61,7 +69,7 @@ class EffectSetting:
         """
         if isinstance(item, str):
             item = {'name': item}
-        if not isinstance(item, cls):
+        if not isinstance(item, EffectSetting):
             item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
         return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
 
@@ -96,13 +104,13 @@ class Rig:
     load: str
     valve: str = 'ppr'
     fidelity: str = 'averaged'
-    parameters: dict = field(default_factory=dict)
-    effects: list = field(default_factory=list)
-    sensors: dict = field(default_factory=dict)
-    tolerance: dict = field(default_factory=dict)
-    muscle: Muscle = 'dmsp_5_300'
+    parameters: dict[str, float] = field(default_factory=dict)
+    effects: list[EffectSetting] = field(default_factory=list)
+    sensors: dict[str, float] = field(default_factory=dict)
+    tolerance: dict[str, float] = field(default_factory=dict)
+    muscle: Muscle = field(default_factory=lambda: get_muscle('dmsp_5_300'))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check the choices and fill in nominal numbers."""
         for value, choices, where in ((self.load, tuple(LOADS), 'load'),
                                       (self.valve, VALVES, 'valve'),
@@ -118,39 +126,44 @@ class Rig:
                 f'{self.muscle.stroke_m:g} m with muscle {self.muscle.name}', 'parameters')
         tolerance = {parameter.name: parameter.tolerance for parameter in known}
         tolerance.update(self.tolerance)
-        settings = {}
+        settings: dict[str, EffectSetting] = {}
         for item in self.effects:
             setting = EffectSetting.of(item)
             if setting.name in settings:
                 raise InputError(f'effect `{setting.name}` is listed twice', 'effects')
             settings[setting.name] = setting
-        for name, value in (
-                ('parameters', check_parameters(known, self.parameters)),
-                ('sensors', check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting')),
-                ('tolerance', tolerance), ('effects', list(settings.values()))):
-            object.__setattr__(self, name, value)
+        checked: dict[str, object] = {
+            'parameters': check_parameters(known, self.parameters),
+            'sensors': check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting'),
+            'tolerance': tolerance, 'effects': list(settings.values())}
+        for name, ready in checked.items():
+            object.__setattr__(self, name, ready)
 
     @property
-    def parameter_list(self):
+    def parameter_list(self) -> tuple[Parameter, ...]:
         """Parameter descriptions (unit, bounds, nominal, tolerance) of this rig."""
         return rig_parameters(self.load)
 
     @property
-    def signal_names(self):
+    def signal_names(self) -> tuple[str, ...]:
         """Names of the valve signals, in order."""
         return ppr.SIGNAL_NAMES if self.valve == 'ppr' else hsv.SIGNAL_NAMES
 
     @property
-    def signal_range(self):
+    def signal_range(self) -> tuple[float, float, str]:
         """Smallest and largest value of a valve signal, and its unit."""
         return ppr.SIGNAL_RANGE if self.valve == 'ppr' else hsv.SIGNAL_RANGE
 
-    def effect(self, name):
+    def effect(self, name: str) -> EffectSetting | None:
         """Return the setting of an effect of this rig, or None."""
         return next((item for item in self.effects if item.name == name), None)
 
-    def with_(self, parameters=None, effects=None, valve=None, fidelity=None, load=None,
-              sensors=None, name=None, muscle=None, law=None):
+    def with_(self, parameters: dict[str, float] | None = None,
+              effects: Sequence[EffectSetting | Mapping[str, Any] | str] | None = None,
+              valve: str | None = None, fidelity: str | None = None, load: str | None = None,
+              sensors: Mapping[str, float] | None = None, name: str | None = None,
+              muscle: Muscle | str | None = None,
+              law: LawChoice | str | None = None) -> 'Rig':
         """
         Return a changed copy.
 
@@ -176,21 +189,31 @@ class Rig:
 
         """
         new_load = load or self.load
-        muscle = muscle or self.muscle
+        chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
         if law is not None:
-            muscle = get_muscle(muscle) if isinstance(muscle, str) else muscle
-            muscle = muscle.with_law(law)
+            chosen = chosen.with_law(law)
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
         tolerance = {key: value for key, value in self.tolerance.items() if key in known}
         return replace(
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
             fidelity=fidelity or self.fidelity, parameters={**kept, **(parameters or {})},
-            effects=self.effects if effects is None else effects, tolerance=tolerance,
-            sensors={**self.sensors, **(sensors or {})}, muscle=muscle)
+            effects=self.effects if effects is None else [
+                EffectSetting.of(item) for item in effects], tolerance=tolerance,
+            sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
 
     # -- statics ---------------------------------------------------------------------------
-    def static_pressure_pa(self, contraction_m, load_n=None):
+    @overload
+    def static_pressure_pa(self, contraction_m: float, load_n: float | None = None) -> float:
+        ...
+
+    @overload
+    def static_pressure_pa(self, contraction_m: FloatArray,
+                           load_n: FloatArray | float | None = None) -> FloatArray:
+        ...
+
+    def static_pressure_pa(self, contraction_m: FloatArray | float,
+                           load_n: FloatArray | float | None = None) -> FloatArray | float:
         """
         Return the absolute pressure [Pa] at which the muscle holds a contraction.
 
@@ -217,7 +240,17 @@ class Rig:
             np.asarray(contraction_m, float) / self.muscle.length_m)
         return float(pressure) if np.ndim(pressure) == 0 else pressure
 
-    def static_contraction_m(self, pressure_pa, load_n=None):
+    @overload
+    def static_contraction_m(self, pressure_pa: float, load_n: float | None = None) -> float:
+        ...
+
+    @overload
+    def static_contraction_m(self, pressure_pa: FloatArray,
+                             load_n: FloatArray | float | None = None) -> FloatArray:
+        ...
+
+    def static_contraction_m(self, pressure_pa: FloatArray | float,
+                             load_n: FloatArray | float | None = None) -> FloatArray | float:
         """
         Return the contraction [m] at rest, 0 to the stroke, at an absolute pressure [Pa].
 
@@ -237,14 +270,15 @@ class Rig:
         contraction = self.muscle.length_m * np.minimum(strain, self.muscle.max_strain)
         return float(contraction) if np.ndim(contraction) == 0 else contraction
 
-    def _weight_n(self):
+    def _weight_n(self) -> float:
         if 'mass_kg' not in self.parameters:
             raise InputError(f'load `{self.load}` has no weight; give load_n', self.name)
         return self.parameters['mass_kg'] * GRAVITY_M_PER_S2
 
     # -- dynamics --------------------------------------------------------------------------
-    def pack(self, dt_s=0.001, initial_pressure_pa=P_ATM_PA, initial_contraction_m=None,
-             initial_signal=None):
+    def pack(self, dt_s: float = 0.001, initial_pressure_pa: float = P_ATM_PA,
+             initial_contraction_m: float | None = None,
+             initial_signal: npt.ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
         """
         Return (state, par), float64 arrays for the kernel (see pam_sim.rollout.layout).
 
@@ -269,9 +303,10 @@ class Rig:
         from pam_sim.rollout.packing import pack_rig
         return pack_rig(self, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
 
-    def simulate(self, valve_signal, external_force_n=None, contraction_m=None,
-                 initial_pressure_pa=P_ATM_PA, dt_s=0.001, initial_contraction_m=None,
-                 initial_signal=None):
+    def simulate(self, valve_signal: npt.ArrayLike, external_force_n: npt.ArrayLike | None = None,
+                 contraction_m: npt.ArrayLike | None = None, initial_pressure_pa: float = P_ATM_PA,
+                 dt_s: float = 0.001, initial_contraction_m: float | None = None,
+                 initial_signal: npt.ArrayLike | None = None) -> 'Response':
         """
         Simulate with recorded or made-up inputs, each held from sample i to i + 1.
 
@@ -306,16 +341,16 @@ class Rig:
             'initial_pressure_pa': initial_pressure_pa,
             'initial_contraction_m': initial_contraction_m, 'initial_signal': initial_signal})
 
-    def plant(self, seed=0, dt_s=0.001, **initial):
+    def plant(self, seed: int = 0, dt_s: float = 0.001, **initial: float) -> 'Plant':
         """Return a live :class:`pam_sim.plant.Plant` of this rig."""
         from pam_sim.plant import Plant
         return Plant(self, seed, dt_s, **initial)
 
     # -- text ------------------------------------------------------------------------------
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return a model file that :func:`pam_sim.load_rig` turns into an equal rig."""
         return rig_to_yaml(self)
 
-    def volume_m3(self, contraction_m):
+    def volume_m3(self, contraction_m: Number) -> Number:
         """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
         return self.parameters['V_dead'] + self.muscle.volume_m3(contraction_m)

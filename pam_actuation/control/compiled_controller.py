@@ -14,12 +14,18 @@
 
 """What all control laws have in common: the arrays of a compiled step function."""
 
+from collections.abc import Callable
 import math
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.inputs import INPUT, write_inputs
 from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
 from pam_sim.records import zeros
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 
 class CompiledController:
@@ -40,9 +46,15 @@ class CompiledController:
 
     """
 
-    rules = None
-    made_for = None         # facts of the rig, see ``made_for``
+    kind: str                               # name of the law in controller files
+    state_names: tuple[str, ...]            # of ``state_values``
+    static_inverse: FloatArray
+    rules: 'RuleBase | None' = None
+    made_for: dict[str, Any] | None = None  # facts of the rig, see ``made_for``
     other_rig = ''          # how the rig it runs on differs, if that was accepted
+
+    _step: Callable[..., float]
+    _arguments: tuple[Any, ...]
 
     def __init__(self, settings: dict[str, float], state: 'np.dtype[np.record]',
                  rig_name: str = '') -> None:
@@ -109,7 +121,7 @@ class CompiledController:
         """Run one tick on what ``input_array`` holds; return the command, absolute Pa."""
         return self._step(*self._arguments)
 
-    def compiled_arguments(self) -> tuple[object, ...]:
+    def compiled_arguments(self) -> tuple[Any, ...]:
         """Return the arrays the compiled step takes, for compiled closed loops."""
         return self._arguments
 
@@ -121,6 +133,29 @@ class CompiledController:
     def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
         return tuple(self._outputs.tolist())
+
+    def learning_reason(self) -> str:
+        """Return in words whether the last tick learned, or why not."""
+        raise NotImplementedError
+
+    def replace_rules(self, rules: 'RuleBase', where: str = 'rules') -> None:
+        """
+        Exchange the rules without a step in the command.
+
+        Raises
+        ------
+        InputError
+            This law has none, or these do not fit.
+
+        """
+        raise InputError(f'a {self.kind} controller has no rules', where)
+
+    def reset_rules(self) -> None:
+        """Return to the initial rules, if there are any, without a step in the command."""
+
+    def reset(self) -> None:
+        """Return to the initial rules and forget the motion."""
+        self.pause()
 
     def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""

@@ -33,6 +33,7 @@ controller instead its ``model`` and ``gains``, see ``lqi_files``.
 """
 
 import os
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
 from pam_actuation.control.made_for import check_made_for, read_facts
@@ -44,8 +45,15 @@ from pam_actuation.control.sofc.persistence import (
     load_rules, rules_from_mapping, rules_to_mapping)
 from pam_actuation.control.static_inverse import (
     inverse_to_mapping, static_inverse, tabulate_static_inverse)
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.located_yaml import dump_yaml, load_yaml
+from pam_sim.joint.rig import JointRig
+from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+
+if TYPE_CHECKING:
+    from pam_actuation.control.modes.force import ForceMode
+    from pam_actuation.control.modes.joint import JointMode
+    from pam_sim.rig import Rig
 
 _KINDS = ('sofc', 'pid', 'lqi')
 _KEYS = ('controller', 'rig', 'made_for', 'settings', *MODE_KEYS)
@@ -56,12 +64,16 @@ _ALL_KEYS = _KEYS + _OWN_KEYS['sofc'] + _OWN_KEYS['lqi']
 _INDEX_FORMS = ('linear', 'table')
 
 
-def rig_identity(rig):
+def rig_identity(rig: 'JointRig | Rig') -> str:
     """Return the text that ties rules to a rig or a joint: its name and valve."""
-    return f'{rig.name}/{getattr(rig, "flexor", rig).valve}'
+    one = rig.flexor if isinstance(rig, JointRig) else rig
+    return f'{rig.name}/{one.valve}'
 
 
-def load_controller(name_or_path_or_text, rig=None, rules_file=None, accept_other_rig=False):
+def load_controller(name_or_path_or_text: str | os.PathLike[str],
+                    rig: 'JointRig | Rig | None' = None,
+                    rules_file: str | os.PathLike[str] | None = None,
+                    accept_other_rig: bool = False) -> Any:
     """
     Build a controller.
 
@@ -106,7 +118,8 @@ def load_controller(name_or_path_or_text, rig=None, rules_file=None, accept_othe
     return controller
 
 
-def controller_from_tree(tree, rig=None, folder='.', accept_other_rig=False):
+def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, folder: str = '.',
+                         accept_other_rig: bool = False) -> Any:
     """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
     tree.check_keys(_ALL_KEYS)
     if rig is None:
@@ -118,7 +131,7 @@ def controller_from_tree(tree, rig=None, folder='.', accept_other_rig=False):
     return controller
 
 
-def _built(tree, rig, folder):
+def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Any:
     kind = tree.require('controller', str, choices=_KINDS)
     for key in tree:
         if key not in _KEYS + _OWN_KEYS[kind]:
@@ -132,13 +145,15 @@ def _built(tree, rig, folder):
     mode = read_mode(tree, rig)
     identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
     if kind == 'lqi':
+        if isinstance(rig, JointRig):
+            raise InputError(f'{rig.name} is a joint, which has no lqi controller', tree.where())
         return lqi_from_tree(tree, rig, settings, identity, where)
     inverse = _static_inverse(tree, rig, mode)
     if mode is not None:
         identity = mode.identity(identity)
     if kind == 'pid':
-        controller = PidController(inverse, settings, identity, where)
-        return controller if mode is None else mode.wrap(controller)
+        pid = PidController(inverse, settings, identity, where)
+        return pid if mode is None else mode.wrap(pid)
     controller = SelfOrganizingFuzzyController(
         inverse, settings, rig_name=identity, where=where)
     if mode is not None:
@@ -157,7 +172,8 @@ def _built(tree, rig, folder):
     return controller if mode is None else mode.wrap(controller)
 
 
-def _static_inverse(tree, rig, mode):
+def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',
+                    mode: 'ForceMode | JointMode | None') -> FloatArray:
     """Return the table of the file, else that of the mode or the rig."""
     if 'static_inverse' in tree:
         table = tree.require('static_inverse', dict)
@@ -175,10 +191,12 @@ def _static_inverse(tree, rig, mode):
     if rig is None:
         raise InputError(
             'without a rig the controller text must bring its `static_inverse`', tree.where())
+    if isinstance(rig, JointRig):
+        raise InputError(f'{rig.name} is a joint: it has no `static_inverse`', tree.where())
     return tabulate_static_inverse(rig)
 
 
-def controller_to_yaml(controller, rules_file=None):
+def controller_to_yaml(controller: Any, rules_file: str | os.PathLike[str] | None = None) -> str:
     """
     Return YAML text that rebuilds a controller bit for bit, its present rules included.
 

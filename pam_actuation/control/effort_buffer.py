@@ -20,10 +20,14 @@ not usable is ignored, counted, and the reason kept. No ROS inside.
 """
 
 import math
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.loop import fresh, MAX_AGE_NS
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.messages import NamedEfforts
 
 WHERE = 'joint_effort'
 
@@ -39,19 +43,19 @@ class EffortBuffer:
 
     """
 
-    def __init__(self, joint):
+    def __init__(self, joint: str) -> None:
         self._joint = joint
-        self._arrived = []
-        self._taken = None
+        self._arrived: list[NamedEfforts] = []
+        self._taken: NamedEfforts | None = None
         self.torque_n_m = math.nan  # wanted, flexion positive
         self.rejected = 0
         self.refusal = ''           # why the newest effort was not taken
 
-    def take(self, message):
+    def take(self, message: 'NamedEfforts') -> None:
         """Take a ``NamedEfforts``; ``judge`` says whether it counts."""
         self._arrived.append(message)
 
-    def judge(self, now_ns, angle_wanted):
+    def judge(self, now_ns: int, angle_wanted: bool) -> None:
         """Judge what arrived; none counts where ``angle_wanted``, a fresh wish of an angle."""
         for message in self._arrived:
             try:
@@ -63,17 +67,18 @@ class EffortBuffer:
                 self.refusal = str(error)
         self._arrived.clear()
 
-    def fresh(self, now_ns):
+    def fresh(self, now_ns: int) -> bool:
         """Return whether there is a wanted torque that still counts."""
         return fresh(self._taken, now_ns)
 
     @property
-    def stamp_ns(self):
+    def stamp_ns(self) -> int:
         """Stamp of the effort that counts [ns], -1 before the first."""
         return -1 if self._taken is None else self._taken.stamp_ns
 
 
-def _usable_torque_n_m(message, joint, now_ns, angle_wanted):
+def _usable_torque_n_m(message: 'NamedEfforts', joint: str, now_ns: int,
+                       angle_wanted: bool) -> float:
     """Return the torque [N m] that a message wants of a joint, or raise InputError."""
     names, efforts = message.names, message.efforts
     if names and joint not in names:

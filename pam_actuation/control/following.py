@@ -22,9 +22,13 @@ its integral and its rules. No ROS inside.
 
 from collections import deque
 import math
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.messages import Pressure
 
 FOLLOWS, LESS, MORE, UNKNOWN = 0.0, 1.0, -1.0, 2.0      # what the driver does; ``IN_HELD_BACK``
 TOLERANCE_PA = 2_000.0
@@ -45,50 +49,51 @@ class CommandFollowing:
     driver and controller may not have found each other, the measured pressure must come along.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Begin anew, as before the first message."""
-        self._followed = None       # newest message
-        self._sent = deque()        # (time, command), the newest last
-        self._first_ns = None       # when the first command was sent
+        self._followed: Pressure | None = None        # newest message
+        self._sent: deque[tuple[int, float]] = deque()         # (time, command), the newest last
+        self._first_ns: int | None = None        # when the first command was sent
         self._measured = False      # whether a pressure ever was
         self._reading_pa = math.nan
         self._since_ns = 0
         self._expected_pa = math.nan
 
-    def on_followed(self, message):
+    def on_followed(self, message: 'Pressure') -> None:
         """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
         if math.isfinite(message.pressure_pa):
             self._followed = message
 
     @property
-    def told(self):
+    def told(self) -> bool:
         """Tell whether the driver ever told what it follows."""
         return self._followed is not None
 
     @property
-    def followed_pa(self):
+    def followed_pa(self) -> float:
         """Return the pressure [absolute Pa] that the driver told last, NaN before."""
-        return self._followed.pressure_pa if self.told else math.nan
+        return math.nan if self._followed is None else self._followed.pressure_pa
 
-    def silent_ns(self, now_ns):
+    def silent_ns(self, now_ns: int) -> int:
         """Return for how long [ns] a driver that once told has told nothing; 0 before."""
-        return now_ns - self._followed.stamp_ns if self.told else 0
+        return 0 if self._followed is None else now_ns - self._followed.stamp_ns
 
-    def vents(self, now_ns):
+    def vents(self, now_ns: int) -> bool:
         """Return whether the driver tells that it vents although pressure is commanded."""
         # A slow rise is above the atmosphere from its first tick on.
-        if not self.told or self.followed_pa > P_ATM_PA + 1.0 or (
+        if self._followed is None or self.followed_pa > P_ATM_PA + 1.0 or (
                 self.silent_ns(now_ns) > MAX_AGE_NS):
             return False
         sent = self._sent_before(self._followed.stamp_ns)
         return bool(sent) and min(sent) > P_ATM_PA + TOLERANCE_PA
 
-    def _sent_before(self, stamp_ns):
+    def _sent_before(self, stamp_ns: int) -> list[float]:
         """Return the commands [Pa] of which one was followed at a time, the newest first."""
-        oldest_ns, commands_pa = stamp_ns - ON_THE_WAY_NS, []
+        oldest_ns = stamp_ns - ON_THE_WAY_NS
+        commands_pa: list[float] = []
         for time_ns, command_pa in reversed(self._sent):
             if time_ns < oldest_ns:
                 break
@@ -96,7 +101,7 @@ class CommandFollowing:
                 commands_pa.append(command_pa)
         return commands_pa
 
-    def sent(self, now_ns, command_pa):
+    def sent(self, now_ns: int, command_pa: float) -> None:
         """Take note of a command [absolute Pa] sent now."""
         oldest_ns = now_ns - MAX_AGE_NS - ON_THE_WAY_NS
         while self._sent and self._sent[0][0] < oldest_ns:
@@ -112,7 +117,7 @@ class CommandFollowing:
             self._expected_pa = arrives_pa
         self._expected_pa += dt_s / (_FILTER_S + dt_s) * (arrives_pa - self._expected_pa)
 
-    def judge(self, now_ns, pressure_pa):
+    def judge(self, now_ns: int, pressure_pa: float) -> float:
         """
         Return what the driver does with the commands.
 
@@ -132,7 +137,7 @@ class CommandFollowing:
         """
         known = math.isfinite(pressure_pa)
         self._measured = self._measured or known
-        if not self.told:
+        if self._followed is None:
             return self._untold(now_ns, pressure_pa)
         age_ns = now_ns - self._followed.stamp_ns
         if not -MAX_AHEAD_NS <= age_ns <= MAX_AGE_NS:
@@ -145,7 +150,7 @@ class CommandFollowing:
             return LESS
         return MORE if followed_pa > max(max(sent), P_ATM_PA) + TOLERANCE_PA else FOLLOWS
 
-    def _untold(self, now_ns, pressure_pa):
+    def _untold(self, now_ns: int, pressure_pa: float) -> float:
         if not math.isfinite(pressure_pa):
             return UNKNOWN if self._measured else FOLLOWS
         if self._first_ns is None or now_ns - self._first_ns > _INTRODUCED_NS:
@@ -155,7 +160,7 @@ class CommandFollowing:
             return FOLLOWS
         return LESS if gap_pa > 0.0 else MORE
 
-    def expected_pa(self, now_ns, pressure_pa):
+    def expected_pa(self, now_ns: int, pressure_pa: float) -> float:
         """
         Return the pressure to be expected in the muscle [absolute Pa], NaN while it is measured.
 

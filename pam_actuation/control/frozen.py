@@ -59,27 +59,28 @@ class FrozenMeasurement:
 
     """
 
-    def __init__(self, lowest, highest=math.inf, swing_pa=SWING_PA, stop_swing_pa=math.inf):
+    def __init__(self, lowest: float, highest: float = math.inf, swing_pa: float = SWING_PA,
+                 stop_swing_pa: float = math.inf) -> None:
         self._between = lowest, highest
         self._swing_pa, self._stop_swing_pa = swing_pa, stop_swing_pa
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Begin anew."""
         self.frozen = False
         self._value = math.nan
         self._since_ns = 0
         self._noticed_ns = 0
         self._changed = False       # since it was noticed
-        self._lifts_pa = deque(maxlen=LIFTS)
+        self._lifts_pa: deque[float] = deque(maxlen=LIFTS)
         self.pause()
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the pressures, not what was found: what comes now is not compared with them."""
         self._lowest_pa, self._highest_pa = math.inf, -math.inf
         self._highest_on_stop_pa = -math.inf
 
-    def judge(self, now_ns, stamp_ns, value, pressure_pa):
+    def judge(self, now_ns: int, stamp_ns: int, value: float, pressure_pa: float) -> bool:
         """
         Take the newest readings; return whether the value is frozen.
 
@@ -110,7 +111,7 @@ class FrozenMeasurement:
             self.frozen = False
         return self.frozen
 
-    def _take(self, value, pressure_pa):
+    def _take(self, value: float, pressure_pa: float) -> None:
         lowest, highest = self._between
         if lowest < value < highest:
             self._lowest_pa = min(self._lowest_pa, pressure_pa)
@@ -118,7 +119,7 @@ class FrozenMeasurement:
         elif value <= lowest:
             self._highest_on_stop_pa = max(self._highest_on_stop_pa, pressure_pa)
 
-    def _moved_without_it(self):
+    def _moved_without_it(self) -> bool:
         """Return whether the pressure changed by more than leaves a value where it was."""
         if self._highest_pa - self._lowest_pa > self._swing_pa:
             return True

@@ -34,8 +34,10 @@ muscles are vented until there is a torque or an angle again. Every change is bu
 law starts from what the other one commanded last.
 """
 
+from collections.abc import Callable
 from functools import partial
 import math
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
@@ -45,15 +47,20 @@ from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
 from pam_actuation.control.loop import (
     fresh, measurement_reason, reason_text, REFERENCE_REASONS, STALL_NS)
-from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
+from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR, JointController
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.slack_muscle import SlackMuscle
-from pam_actuation.messages import ControllerState, Pressure
+from pam_actuation.messages import (
+    AngleReference, AngleTrajectory, ControllerState, Force, JointAngle, NamedEfforts,
+    NamedTrajectory, Pressure)
 from pam_actuation.slow_rise import SlowRise
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
 
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
@@ -69,6 +76,9 @@ _INPUT_NAMES = (
 _TORQUE_NAMES = (
     'follows_torque', 'joint_effort_stamp_sec', 'joint_effort_stamp_nanosec', 'wanted_torque_n_m',
     *JointTorque.STATE_NAMES)
+
+
+Pair = tuple[float, float]      # of flexor and extensor
 
 
 class JointControllerLoop:
@@ -92,7 +102,8 @@ class JointControllerLoop:
 
     """
 
-    def __init__(self, controller, joint, name='muscle'):
+    def __init__(self, controller: JointController,
+                 joint: 'JointRig', name: str = 'muscle') -> None:
         if tracked_by(controller) != JOINT:
             raise InputError('this controller tracks a single muscle; a joint needs one with '
                              '`mode: joint`', controller.rig_name)
@@ -115,79 +126,82 @@ class JointControllerLoop:
         # Where a pressure reading stands still too, by the pressure that should be there.
         self._frozen_both = FrozenMeasurement(*between, JOINT_SWING_PA)
         self._following = CommandFollowing(), CommandFollowing()        # flexor, extensor
-        self._slack = tuple(SlackMuscle(following) for following in self._following)
+        self._slack = [SlackMuscle(following) for following in self._following]
         self._rises = SlowRise(active=False), SlowRise(active=False)
         self._name = name
-        self._trajectory = None     # that arrived since the last tick
-        self._angle = None
-        self._pressures = [None, None]
-        self._forces = [None, None]
-        self._last_tick_ns = None
-        self._used_ns = None
-        self._commands_pa = None    # of the last tick, while a law runs
+        self._trajectory: NamedTrajectory | None = None      # that arrived since the last tick
+        self._angle: JointAngle | None = None
+        self._pressures: list[Pressure | None] = [None, None]
+        self._forces: list[Force | None] = [None, None]
+        self._last_tick_ns: int | None = None
+        self._used_ns: int | None = None
+        self._commands_pa: Pair | None = None     # of the last tick, while a law runs
 
     @property
-    def rate_hz(self):
+    def rate_hz(self) -> float:
         """Rate [Hz] at which ``tick`` is to be called."""
         return self.controller.rate_hz
 
     @property
-    def rejected_references(self):
+    def rejected_references(self) -> int:
         """Return the number of references and trajectories that were not usable."""
         return self.references.refused + self._refused_trajectories
 
-    def forget(self):
+    def forget(self) -> None:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
-        for monitor in (self._frozen, self._frozen_both, *self._slack, *self._following):
-            monitor.forget()
+        for frozen in (self._frozen, self._frozen_both):
+            frozen.forget()
+        for slack, following in zip(self._slack, self._following):
+            slack.forget()
+            following.forget()
         self.follows_torque = False
         self._trajectory = self._angle = None
         self._pressures, self._forces = [None, None], [None, None]
 
-    def takes(self):
+    def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by name relative to the joint."""
-        takes = {'joint_state': self.on_joint_state, 'joint_reference': self.on_joint_reference,
-                 'joint_trajectory': self.on_joint_trajectory,
-                 'co_contraction': self.on_co_contraction}
+        takes: dict[str, Callable[[Any], None]] = {
+            'joint_state': self.on_joint_state, 'joint_reference': self.on_joint_reference,
+            'joint_trajectory': self.on_joint_trajectory,
+            'co_contraction': self.on_co_contraction}
         for k, side in enumerate(SIDES):
             takes[f'{side}/pressure'] = partial(self.on_pressure, k)
             takes[f'{side}/force'] = partial(self.on_force, k)
             takes[f'{side}/followed_pressure'] = partial(self.on_followed_pressure, k)
         return takes
 
-    def on_joint_state(self, message):
+    def on_joint_state(self, message: JointAngle) -> None:
         """Take a ``JointAngle``."""
         self._angle = message
 
-    def on_pressure(self, side, message):
+    def on_pressure(self, side: int, message: Pressure) -> None:
         """Take a ``Pressure`` measured at a muscle, ``FLEXOR`` or ``EXTENSOR``."""
         self._pressures[side] = message
 
-    def on_followed_pressure(self, side, message):
+    def on_followed_pressure(self, side: int, message: Pressure) -> None:
         """Take the ``Pressure`` that the driver of a muscle follows."""
         self._following[side].on_followed(message)
 
-    def on_force(self, side, message):
+    def on_force(self, side: int, message: Force) -> None:
         """Take a ``Force`` measured at a muscle."""
         self._forces[side] = message
 
-    def on_joint_reference(self, message):
+    def on_joint_reference(self, message: AngleReference) -> None:
         """Take an ``AngleReference``; an unusable one is ignored and counted."""
         self.references.set_reference(message)
 
-    def on_joint_trajectory(self, message):
+    def on_joint_trajectory(self, message: AngleTrajectory) -> None:
         """Take an ``AngleTrajectory``; an unusable one is ignored and counted."""
         self.references.set_trajectory(message)
 
-    def on_named_trajectory(self, message):
+    def on_named_trajectory(self, message: NamedTrajectory) -> None:
         """Take a ``NamedTrajectory``; the next tick counts it or, where unusable, refuses it."""
         self._trajectory = message
 
-    def _take_trajectory(self, now_ns):
+    def _take_trajectory(self, message: NamedTrajectory, now_ns: int) -> None:
         """Let the trajectory that arrived count from now on."""
-        message, self._trajectory = self._trajectory, None
         references = self.references
         present = math.nan if self._angle is None else self._angle.angle_rad
         if not self.follows_torque and references.state(now_ns) in (
@@ -202,16 +216,17 @@ class JointControllerLoop:
             self.refusal = str(error)
             self._refused_trajectories += 1
 
-    def on_named_efforts(self, message):
+    def on_named_efforts(self, message: NamedEfforts) -> None:
         """Take ``NamedEfforts``; the next tick counts them or, where unusable, refuses them."""
         self.efforts.take(message)
 
-    def on_co_contraction(self, message):
+    def on_co_contraction(self, message: Pressure) -> None:
         """Take a wanted mean ``Pressure`` of both muscles, absolute."""
         if math.isfinite(message.pressure_pa):
             self.controller.want_co_contraction(message.pressure_pa - P_ATM_PA)
 
-    def tick(self, now_ns, learning=True):
+    def tick(self, now_ns: int,
+             learning: bool = True) -> tuple[tuple[Pressure, Pressure], ControllerState]:
         """
         Run one tick at a time of the clock the stamps come from.
 
@@ -225,7 +240,8 @@ class JointControllerLoop:
         """
         controller = self.controller
         if self._trajectory is not None:
-            self._take_trajectory(now_ns)
+            self._take_trajectory(self._trajectory, now_ns)
+            self._trajectory = None
         self.references.refuse_ahead(now_ns)
         changed = self._choose_law(now_ns)
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
@@ -240,11 +256,12 @@ class JointControllerLoop:
             self._commands_pa = None
         may_learn = bool(learning and reason == codes.OK and not self.follows_torque
                          and not controller.freeze_learning)
-        inputs, stamp_ns = (math.nan,) * 10, -1
+        inputs: tuple[float, ...] = (math.nan,) * 10
+        stamp_ns = -1
         held_back = self._held_back(now_ns, measured_pa)
-        if running:
+        if running and self._angle is not None:
             stamp_ns = self._angle.stamp_ns
-            inputs = self._inputs(now_ns, stamp_ns, measured_pa, changed)
+            inputs = self._inputs(now_ns, self._angle, measured_pa, changed)
             commands_pa = self._commands_pa = self._risen(
                 self._run(inputs, may_learn, held_back))
         else:
@@ -260,10 +277,11 @@ class JointControllerLoop:
             *codes.split_stamp(self.efforts.stamp_ns), self.efforts.torque_n_m,
             *self.torque.state_values())
         self.ticks += 1
-        return (tuple(Pressure(now_ns, pressure_pa) for pressure_pa in commands_pa),
+        flexor_pa, extensor_pa = commands_pa
+        return ((Pressure(now_ns, flexor_pa), Pressure(now_ns, extensor_pa)),
                 ControllerState(now_ns, self.names, values))
 
-    def _choose_law(self, now_ns):
+    def _choose_law(self, now_ns: int) -> bool:
         """Let a fresh wish of an angle decide, else a fresh torque; return if that changed."""
         before = self.follows_torque
         angle_wanted = self.references.state(now_ns) == reference_buffer.FRESH
@@ -274,18 +292,19 @@ class JointControllerLoop:
             self.follows_torque = True
         return self.follows_torque != before
 
-    def _reason(self, now_ns, pressures_pa):
+    def _reason(self, now_ns: int, pressures_pa: Pair) -> int:
         """Return the code for the inputs of this tick, one of ``codes.RUNNING`` if usable."""
         if self.two_sensors:
             return codes.TWO_SENSORS
         angle = math.nan if self._angle is None else self._angle.angle_rad
         reason = measurement_reason(self._angle, angle, self._plausible, _REASONS, now_ns)
-        if reason != codes.OK:
+        if self._angle is None or reason != codes.OK:
             return reason
         wanted_pa = self._commands_pa or (P_ATM_PA, P_ATM_PA)
         # Into a list first: both are to be asked, also where the first one is slack.
-        slack = [muscle.judge(now_ns, *pair) for muscle, *pair in zip(
-            self._slack, wanted_pa, pressures_pa)]
+        slack = [muscle.judge(now_ns, command_pa, pressure_pa)
+                 for muscle, command_pa, pressure_pa in zip(
+                     self._slack, wanted_pa, pressures_pa)]
         if any(slack):
             return codes.MUSCLE_SLACK
         if self.follows_torque:
@@ -297,7 +316,8 @@ class JointControllerLoop:
             return codes.ANGLE_FROZEN
         return REFERENCE_REASONS[self.references.state(now_ns)]
 
-    def _stands_still(self, now_ns, stamp_ns, angle, pressures_pa):
+    def _stands_still(self, now_ns: int, stamp_ns: int, angle: float,
+                      pressures_pa: Pair) -> bool:
         """Return whether the angle stands still although the pressures changed."""
         expected_pa = [following.expected_pa(now_ns, pressure_pa) for following, pressure_pa in
                        zip(self._following, pressures_pa)]
@@ -314,12 +334,14 @@ class JointControllerLoop:
             now_ns, stamp_ns, angle, pressures_pa[FLEXOR] - pressures_pa[EXTENSOR])
         return self._frozen_both.judge(now_ns, stamp_ns, angle, both_pa) or frozen
 
-    def _fresh_pressures_pa(self, now_ns):
+    def _fresh_pressures_pa(self, now_ns: int) -> Pair:
         """Return both measured pressures [Pa], NaN for one that is not fresh."""
-        return tuple(message.pressure_pa if fresh(message, now_ns) else math.nan
-                     for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
+        flexor_pa, extensor_pa = (
+            message.pressure_pa if fresh(message, now_ns) else math.nan
+            for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
+        return flexor_pa, extensor_pa
 
-    def _held_back(self, now_ns, pressures_pa):
+    def _held_back(self, now_ns: int, pressures_pa: Pair) -> float:
         """Return ``UNKNOWN`` where a driver does not follow: one law moves both muscles."""
         # A list: both are to be asked.
         found = [following.judge(now_ns, pressure_pa) for following, pressure_pa in zip(
@@ -328,47 +350,54 @@ class JointControllerLoop:
             return UNKNOWN
         return FOLLOWS if found == [FOLLOWS, FOLLOWS] else UNKNOWN
 
-    def _risen(self, commands_pa):
+    def _risen(self, commands_pa: Pair) -> Pair:
         """Return the commands [Pa] that both muscles may have now."""
-        return tuple(
+        flexor_pa, extensor_pa = (
             rise.limited(max(command_pa, _LEAST_PA), 1.0 / self.rate_hz)
             for rise, command_pa in zip(self._rises, commands_pa))
+        return flexor_pa, extensor_pa
 
-    def _vented(self, now_ns, reason):
+    def _vented(self, now_ns: int, reason: int) -> Pair:
         """Return the commands [Pa] of a tick in which no law runs."""
         for rise in self._rises:
             rise.begin()
         if reason != codes.MUSCLE_SLACK:
             return P_ATM_PA, P_ATM_PA
-        return tuple(muscle.command_pa(now_ns) for muscle in self._slack)
+        flexor, extensor = self._slack
+        return flexor.command_pa(now_ns), extensor.command_pa(now_ns)
 
-    def _run(self, inputs, may_learn, held_back):
+    def _run(self, inputs: tuple[float, ...], may_learn: bool,
+             held_back: float) -> Pair:
         """Return the commands [Pa] of the law that counts; the other one stands aside."""
-        controller, pressures_pa, forces_n = self.controller, inputs[6:8], inputs[8:]
+        controller = self.controller
+        angle, reference, rate, lead, lead_rate, elapsed_s = inputs[:6]
+        pressures_pa, forces_n = (inputs[6], inputs[7]), (inputs[8], inputs[9])
         if not self.follows_torque:
             self.torque.pause()
             return controller.step(
-                *inputs[:5], may_learn, inputs[5], pressures_pa, forces_n, held_back)
+                angle, reference, rate, lead, lead_rate, may_learn, elapsed_s, pressures_pa,
+                forces_n, held_back)
         if held_back != FOLLOWS:
             forces_n = math.nan, math.nan       # the feedback stands still
         commands_pa = self.torque.step(
-            inputs[0], self.efforts.torque_n_m, controller.wanted_co_contraction_pa, forces_n,
+            angle, self.efforts.torque_n_m, controller.wanted_co_contraction_pa, forces_n,
             pressures_pa)
         controller.stand_aside(commands_pa)
         return commands_pa
 
-    def _inputs(self, now_ns, measured_ns, pressures_pa, changed):
+    def _inputs(self, now_ns: int, measured: JointAngle, pressures_pa: Pair,
+                changed: bool) -> tuple[float, ...]:
         """Return angle, references, time passed, pressures and forces as one tuple of floats."""
         reference = lead = (math.nan, math.nan)
         if not self.follows_torque:
             # The error belongs to the time of the measurement, the preview to now.
-            reference = self.references.at(now_ns, measured_ns)
+            reference = self.references.at(now_ns, measured.stamp_ns)
             lead = self.references.at(now_ns, now_ns + round(self.controller.lead_s * 1e9))
         elapsed_s = math.nan
         if self._used_ns is not None:
-            elapsed_s = (measured_ns - self._used_ns) * 1e-9
+            elapsed_s = (measured.stamp_ns - self._used_ns) * 1e-9
         if changed and self._commands_pa is not None:
             pressures_pa = self._commands_pa    # a law goes on from the commands of the other
-        forces = (self._forces[side].force_n if fresh(self._forces[side], now_ns)
-                  else math.nan for side in (FLEXOR, EXTENSOR))
-        return (self._angle.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)
+        forces = (force.force_n if fresh(force, now_ns) else math.nan
+                  for force in (self._forces[FLEXOR], self._forces[EXTENSOR]))
+        return (measured.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)

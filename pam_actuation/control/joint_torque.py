@@ -22,11 +22,16 @@ friction make wrong is fed back, slowly, where the forces of both tendons are me
 """
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.control.modes.joint import limits_gauge_pa
+from pam_actuation.control.modes.joint import JointController, limits_gauge_pa
 from pam_actuation.control.modes.joint_statics import nominal_force_n
+from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
 
 STOP_ZONE_RAD = 0.1             # before a stop, over which a torque towards it fades to nothing
 GAIN = 0.5                      # of the error of torque
@@ -54,37 +59,39 @@ class JointTorque:
 
     STATE_NAMES = ('given_torque_n_m', 'measured_torque_n_m', 'torque_integral_n_m')
 
-    def __init__(self, joint, controller):
+    def __init__(self, joint: 'JointRig', controller: JointController) -> None:
         settings, value = controller.settings, joint.parameters
         low, high = (P_ATM_PA + gauge_pa for gauge_pa in limits_gauge_pa(settings))
         self._limits = low, high
         self._reach_pa = controller.co_contraction_reach_pa
         self._arms = value['flexor_radius_m'], value['extensor_radius_m']
-        self._angles = np.linspace(*joint.range_rad, _ANGLES)
+        lower, upper = joint.range_rad
+        self._angles = np.linspace(lower, upper, _ANGLES)
         self._pressures = np.linspace(low, high, _PRESSURES)
         self._differences = np.linspace(-0.5, 0.5, _DIFFERENCES) * (high - low)
         self._tables = [
             arm * nominal_force_n(rig, self._pressures, contraction_m[:, None])
             for rig, arm, contraction_m in zip(
-                (joint.flexor, joint.extensor), self._arms, joint.contractions_m(self._angles))]
+                [joint.flexor, joint.extensor], self._arms, joint.contractions_m(self._angles))]
         self._period_s = 1.0 / controller.rate_hz
         self._lag_s = controller.lead_s + settings.get('valve_lag_s', 0.0)
         self._wish = _Ahead(self._lag_s, self._period_s)
         self._angle = _Ahead(self._lag_s, self._period_s)
         self.pause()
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget what was: the next tick starts from the pressures it is given."""
         self._mean = self._given = self._measured = math.nan
         self._integral = 0.0
         self._wish.forget()
         self._angle.forget()
 
-    def state_values(self):
+    def state_values(self) -> tuple[float, float, float]:
         """Return the values of ``STATE_NAMES`` of the last tick."""
         return self._given, self._measured, self._integral
 
-    def step(self, angle_rad, wanted_n_m, co_contraction_pa, forces_n, before_pa):
+    def step(self, angle_rad: float, wanted_n_m: float, co_contraction_pa: float,
+             forces_n: tuple[float, float], before_pa: tuple[float, float]) -> tuple[float, float]:
         """
         Run one tick.
 
@@ -129,13 +136,13 @@ class JointTorque:
         mean = min(max(self._mean, low + abs(difference)), high - abs(difference))
         return mean + difference, mean - difference
 
-    def _room(self, angle_rad, torque_n_m):
+    def _room(self, angle_rad: float, torque_n_m: float) -> float:
         """Return the share of a torque, 0 to 1, that the stop it pushes to leaves."""
         way_rad = (self._angles[-1] - angle_rad if torque_n_m > 0.0
                    else angle_rad - self._angles[0])
         return min(max(way_rad / STOP_ZONE_RAD, 0.0), 1.0)
 
-    def _torques_at(self, angle_rad):
+    def _torques_at(self, angle_rad: float) -> FloatArray:
         """Return the torque [N m] of every difference of pressures, rising, at an angle."""
         place = (angle_rad - self._angles[0]) / (self._angles[1] - self._angles[0])
         place = min(max(place, 0.0), _ANGLES - 1.0)
@@ -151,12 +158,12 @@ class JointTorque:
                 (mean + self._differences, mean - self._differences), self._tables))
         return flexor - extensor + _SLOPE_N_M_PER_PA * self._differences
 
-    def _start(self, torque_n_m):
+    def _start(self, torque_n_m: float) -> None:
         """Begin at the torque of the pressures before; its way to the wish is a fading offset."""
         self._offset = torque_n_m - self._given
         self._expected = self._measured if math.isfinite(self._measured) else torque_n_m
 
-    def _correction(self, wish, torques):
+    def _correction(self, wish: float, torques: FloatArray) -> float:
         """
         Return what feedback adds to the wish [N m]; ``torques`` are those that can be had.
 
@@ -184,18 +191,18 @@ class _Ahead:
     Critically damped g-h filter: no lag at constant rate, little noise in the rate.
     """
 
-    def __init__(self, lag_s, period_s):
+    def __init__(self, lag_s: float, period_s: float) -> None:
         self._lag_s, self._period_s = lag_s, period_s
         fading = math.exp(-period_s / _MEMORY_S)
         self._value_gain = 1.0 - fading * fading
         self._rate_gain = (1.0 - fading) ** 2 / period_s
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Begin anew with the next value, at rest."""
         self._value, self._rate = math.nan, 0.0
 
-    def at(self, value):
+    def at(self, value: float) -> float:
         """Take the value of this tick; return that of one lag ahead."""
         if math.isnan(self._value):
             self._value = value

@@ -20,16 +20,21 @@ The rules are those of a joint trajectory controller: the joint is found by its 
 where it is; a point without a rate lies on straight lines. No ROS inside.
 """
 
+from collections.abc import Sequence
 import math
 
 from pam_actuation.messages import AngleTrajectory
 from pam_sim.errors import InputError
 
 TOLERANCE_RAD = 0.02        # beyond the stops: a wish at the stop may be rounded
+# Time from the start [ns], positions, velocities (perhaps none).
+Point = tuple[int, Sequence[float], Sequence[float]]
 WHERE = 'joint_trajectory'
 
 
-def angle_trajectory(stamp_ns, names, points, joint, range_rad, now_ns, present_rad):
+def angle_trajectory(stamp_ns: int, names: tuple[str, ...], points: Sequence[Point], joint: str,
+                     range_rad: tuple[float, float], now_ns: int,
+                     present_rad: float) -> AngleTrajectory:
     """
     Return the part of a trajectory that is of one joint.
 
@@ -63,7 +68,9 @@ def angle_trajectory(stamp_ns, names, points, joint, range_rad, now_ns, present_
     """
     column = _column(names, joint)
     begin_ns = stamp_ns or now_ns
-    times, angles, rates = [], [], []
+    times: list[int] = []
+    angles: list[float] = []
+    rates: list[float] = []
     for k, (time_ns, positions, velocities) in enumerate(points):
         where = f'{WHERE} points[{k}]'
         if len(positions) != max(len(names), 1) or len(velocities) not in (0, len(positions)):
@@ -92,7 +99,7 @@ def angle_trajectory(stamp_ns, names, points, joint, range_rad, now_ns, present_
     return AngleTrajectory(begin_ns, tuple(times), tuple(angles), tuple(rates))
 
 
-def _column(names, joint):
+def _column(names: tuple[str, ...], joint: str) -> int:
     """Return which entry of a point is that of the joint."""
     if not names:
         return 0

@@ -44,7 +44,9 @@ the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
 """
 
+from collections.abc import Callable
 import math
+from typing import Any, TypeGuard, TypeVar
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.following import CommandFollowing, LESS
@@ -52,7 +54,8 @@ from pam_actuation.control.frozen import FrozenMeasurement, STOP_SWING_PA
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS, ReferenceBuffer
 from pam_actuation.control.tick import TickCore, TickInputs
-from pam_actuation.messages import ControllerState, Pressure
+from pam_actuation.messages import (
+    Contraction, ControllerState, Force, Message, Pressure, Reference, ReferenceTrajectory)
 from pam_sim.errors import InputError
 
 MAX_AGE_NS = 100_000_000
@@ -74,18 +77,22 @@ REFERENCE_REASONS = {
     reference_buffer.HELD: codes.REFERENCE_HELD, reference_buffer.LOST: codes.REFERENCE_LOST}
 
 
-def fresh(message, now_ns):
+Known = TypeVar('Known', bound=Message)
+
+
+def fresh(message: Known | None, now_ns: int) -> TypeGuard[Known]:
     """Return whether a message is neither too old nor too far ahead."""
     return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS
 
 
-def reason_text(code, two_sensors):
+def reason_text(code: int, two_sensors: str) -> str:
     """Return a code as words; of two sensors the sentence that names them."""
     words = codes.REASONS[code]
     return f'{words}: {two_sensors}' if code == codes.TWO_SENSORS else words
 
 
-def measurement_reason(message, value, allowed, reasons, now_ns):
+def measurement_reason(message: Message | None, value: float, allowed: tuple[float, float],
+                       reasons: tuple[int, ...], now_ns: int) -> int:
     """
     Return the code for the newest measurement of what is tracked, ``codes.OK`` if usable.
 
@@ -132,7 +139,8 @@ class ControllerLoop:
 
     """
 
-    def __init__(self, controller, contraction_range_m=(-0.01, 0.1)):
+    def __init__(self, controller: Any,
+                 contraction_range_m: tuple[float, float] = (-0.01, 0.1)) -> None:
         self.controller = controller
         self.tracked = tracked_by(controller)
         if self.tracked == JOINT:
@@ -154,66 +162,66 @@ class ControllerLoop:
             _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
         self._following = CommandFollowing()
         self._core = TickCore(controller)
-        self._contraction = None
-        self._pressure = None
-        self._force = None
-        self._last_tick_ns = None
-        self._used_ns = None
+        self._contraction: Contraction | None = None
+        self._pressure: Pressure | None = None
+        self._force: Force | None = None
+        self._last_tick_ns: int | None = None
+        self._used_ns: int | None = None
 
     @property
-    def rate_hz(self):
+    def rate_hz(self) -> float:
         """Rate [Hz] at which ``tick`` is to be called."""
         return self.controller.rate_hz
 
     @property
-    def rejected_references(self):
+    def rejected_references(self) -> int:
         """Return the number of references and trajectories that were not usable."""
         return self.references.refused
 
     @property
-    def ticks(self):
+    def ticks(self) -> int:
         """Return the number of ticks run."""
         return self._core.ticks
 
-    def takes(self):
+    def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by short name."""
         return {'contraction': self.on_contraction, 'pressure': self.on_pressure,
                 'followed_pressure': self.on_followed_pressure, 'force': self.on_force,
                 'reference': self.on_reference,
                 'reference_trajectory': self.on_reference_trajectory}
 
-    def on_contraction(self, message):
+    def on_contraction(self, message: Contraction) -> None:
         """Take a ``Contraction``."""
         self._contraction = message
 
-    def on_pressure(self, message):
+    def on_pressure(self, message: Pressure) -> None:
         """Take a measured ``Pressure``."""
         self._pressure = message
 
-    def on_followed_pressure(self, message):
+    def on_followed_pressure(self, message: Pressure) -> None:
         """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
         self._following.on_followed(message)
 
-    def on_force(self, message):
+    def on_force(self, message: Force) -> None:
         """Take a ``Force``."""
         self._force = message
 
-    def forget(self):
+    def forget(self) -> None:
         """Forget all inputs, as before the first ones; what was learned stays."""
         self.references.clear()
         for part in (self._frozen, self._frozen_both, self._following):
             part.forget()
         self._contraction = self._pressure = self._force = None
 
-    def on_reference(self, message):
+    def on_reference(self, message: Reference) -> None:
         """Take a ``Reference``; an unusable one is ignored and counted."""
         self.references.set_reference(message)
 
-    def on_reference_trajectory(self, message):
+    def on_reference_trajectory(self, message: ReferenceTrajectory) -> None:
         """Take a ``ReferenceTrajectory``; an unusable one is ignored and counted."""
         self.references.set_trajectory(message)
 
-    def tick(self, now_ns, learning=True):
+    def tick(self, now_ns: int, learning: bool = True) -> tuple[Pressure, ControllerState]:
         """
         Run one tick at a time of the clock the stamps come from.
 
@@ -240,24 +248,25 @@ class ControllerLoop:
         return (Pressure(now_ns, command_pa),
                 ControllerState(now_ns, self._core.names, values))
 
-    def _measured(self):
+    def _measured(self) -> tuple[Contraction | Force | None, float]:
         """Return the newest message of what is tracked and its value; None, NaN before."""
         if self.tracked == FORCE:
             return self._force, math.nan if self._force is None else self._force.force_n
         message = self._contraction
         return message, math.nan if message is None else message.contraction_m
 
-    def _measured_reason(self, now_ns):
+    def _measured_reason(self, now_ns: int) -> int:
         """Return the code for the newest measurement of what is tracked, OK if usable."""
         if self.two_sensors:
             return codes.TWO_SENSORS
         message, value = self._measured()
         reason = measurement_reason(message, value, self._range, self._reasons, now_ns)
-        if reason == codes.OK and self._stands_still(now_ns, message.stamp_ns, value):
+        if message is not None and reason == codes.OK and self._stands_still(
+                now_ns, message.stamp_ns, value):
             return _FROZEN[self.tracked]
         return reason
 
-    def _stands_still(self, now_ns, stamp_ns, value):
+    def _stands_still(self, now_ns: int, stamp_ns: int, value: float) -> bool:
         """Return whether what is tracked stands still although the pressure changed."""
         pressure_pa = self._fresh_pressure_pa(now_ns)
         expected_pa = self._following.expected_pa(now_ns, pressure_pa)
@@ -267,11 +276,11 @@ class ControllerLoop:
         return any([self._frozen.judge(now_ns, stamp_ns, value, pressure_pa),
                     self._frozen_both.judge(now_ns, stamp_ns, value, expected_pa)])
 
-    def _fresh_pressure_pa(self, now_ns):
+    def _fresh_pressure_pa(self, now_ns: int) -> float:
         """Return the measured pressure [Pa], NaN where none is fresh."""
         return self._pressure.pressure_pa if fresh(self._pressure, now_ns) else math.nan
 
-    def _gather(self, now_ns, learning):
+    def _gather(self, now_ns: int, learning: bool) -> TickInputs:
         """Return the ``TickInputs`` of now."""
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
@@ -284,11 +293,12 @@ class ControllerLoop:
             learning and reason == codes.OK and not self.controller.freeze_learning)
         inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
         held_back = self._following.judge(now_ns, self._fresh_pressure_pa(now_ns))
-        if reason not in codes.RUNNING:
+        message, _ = self._measured()
+        if message is None or reason not in codes.RUNNING:
             self._used_ns = None
             return inputs
         inputs.held_back = LESS if self._core.rise.limiting else held_back
-        measured_ns = self._measured()[0].stamp_ns
+        measured_ns = message.stamp_ns
         # The error belongs to the time of the measurement, the preview to now.
         inputs.reference, inputs.reference_rate = references.at(now_ns, measured_ns)
         inputs.lead_reference, inputs.lead_reference_rate = references.at(
@@ -301,16 +311,16 @@ class ControllerLoop:
                 self._contraction.contraction_m):
             inputs.contraction_m = self._contraction.contraction_m
             contraction_ns = self._contraction.stamp_ns
-        pressure_pa = self._fresh_pressure_pa(now_ns)
-        if math.isfinite(pressure_pa):
-            inputs.pressure_pa = pressure_pa
+        if fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
+            inputs.pressure_pa = self._pressure.pressure_pa
             pressure_ns = self._pressure.stamp_ns
         if fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
             inputs.force_n = self._force.force_n
             force_ns = self._force.stamp_ns
-        if references.uses_trajectory(now_ns) or references.reference is None:
-            trajectory_ns = references.trajectory.stamp_ns
-        else:
-            reference_ns = references.reference.stamp_ns
+        reference, trajectory = references.reference, references.trajectory
+        if trajectory is not None and (reference is None or references.uses_trajectory(now_ns)):
+            trajectory_ns = trajectory.stamp_ns
+        elif reference is not None:
+            reference_ns = reference.stamp_ns
         inputs.stamps_ns = (contraction_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
         return inputs

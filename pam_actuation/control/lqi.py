@@ -34,7 +34,7 @@ from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, p
 from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.settings import checked_settings, parameter_record, Setting
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.errors import InputError
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
@@ -199,7 +199,7 @@ def _step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
                  part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
-def _entry(key: int) -> Callable[..., float]:
+def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
     def lqi_step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
@@ -244,7 +244,7 @@ class LqiController(FixedLawController):
     """
 
     kind = 'lqi'
-    state_names = OUTPUT.names
+    state_names = OUTPUT.names or ()
 
     def __init__(self, model: LinearModel, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:

@@ -159,7 +159,7 @@ def used_numbers(gains: FloatArray) -> BoolArray:
     model, used = fields(gains, MODEL), zeros(MODEL)
     marked = fields(used, MODEL)
     lengths = {(MAX_ORDER,): int(model.order), (MAX_DELAY_TICKS,): int(model.delay_ticks)}
-    for name in MODEL.names:
+    for name in MODEL.names or ():
         shape = MODEL[name].shape
         if shape:
             marked[name][:lengths[shape]] = 1.0

@@ -29,7 +29,7 @@ model of low order explains, and the integral of the controller makes up for.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
@@ -44,6 +44,9 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.rig import Rig
 from pam_sim.units import gauge_kpa, P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
 # scipy.linalg and scipy.signal are imported where a model is identified or simulated: they take
 # half of the time that a verb needs to start, and a controller of another law needs neither.
@@ -81,18 +84,18 @@ class LinearModel:
 
     rate_hz: float
     delay_ticks: int
-    denominator: tuple
-    numerator: tuple
+    denominator: tuple[float, ...]
+    numerator: tuple[float, ...]
     contraction_m: float
     pressure_pa: float
     fit: float = 1.0
 
     @property
-    def gain_m_per_pa(self):
+    def gain_m_per_pa(self) -> float:
         """Contraction per pressure at rest."""
         return sum(self.numerator) / (1.0 + sum(self.denominator))
 
-    def simulate(self, command_pa):
+    def simulate(self, command_pa: FloatArray) -> FloatArray:
         """Return the contraction [m] for commands [absolute Pa], from rest at the first one."""
         from scipy.signal import lfilter
         u = np.asarray(command_pa, dtype=float) - self.pressure_pa
@@ -102,7 +105,8 @@ class LinearModel:
             self.numerator, np.r_[1.0, self.denominator], delayed - u[0])
 
 
-def identify(command_pa, contraction_m, rate_hz, order=3, max_delay_s=MAX_DELAY_S):
+def identify(command_pa: FloatArray, contraction_m: FloatArray | list[float], rate_hz: float,
+             order: int = 3, max_delay_s: float = MAX_DELAY_S) -> LinearModel:
     """
     Return the linear model that explains a record best.
 
@@ -149,7 +153,9 @@ def identify(command_pa, contraction_m, rate_hz, order=3, max_delay_s=MAX_DELAY_
     return best
 
 
-def _steiglitz_mcbride(u, y, order, delay):
+def _steiglitz_mcbride(
+        u: FloatArray, y: FloatArray, order: int,
+        delay: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
     """Return (a, b) as tuples for one delay, None where the rounds run away."""
     from scipy.linalg import lstsq
     from scipy.signal import lfilter
@@ -230,7 +236,8 @@ def _ticks_of_driver(rig: Rig, driver: DriverLoop, rate_hz: float) -> int:
     return max(1, round(driver.period_s * rate_hz)) if rig.valve == 'hsv' else 1
 
 
-def identify_on_rig(rig, rate_hz, contraction_m=0.014, seed=0):
+def identify_on_rig(rig: Rig, rate_hz: float, contraction_m: float = 0.014,
+                    seed: int = 0) -> LinearModel:
     """Return the linear model of a rig with a hanging mass, see ``identification_record``."""
     if rig.load != 'hanging_mass':
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
@@ -238,12 +245,12 @@ def identify_on_rig(rig, rate_hz, contraction_m=0.014, seed=0):
 
 
 @lru_cache(maxsize=16)      # more than a second each; the same rig is asked for again and again
-def _identified(rig_text, rate_hz, contraction_m, seed):
+def _identified(rig_text: str, rate_hz: float, contraction_m: float, seed: int) -> LinearModel:
     rig = load_rig(rig_text)
     return identify(*identification_record(rig, rate_hz, contraction_m, seed), rate_hz)
 
 
-def identify_on_run(run, rate_hz):
+def identify_on_run(run: 'Run', rate_hz: float) -> LinearModel:
     """
     Return the linear model of a recording with ``pressure_command`` and ``contraction``.
 

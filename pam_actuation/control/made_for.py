@@ -24,9 +24,16 @@ What matters is compared: size of the muscle, valve, kind and size of the load. 
 and names do not matter: a model that the gap workflow improved is still the same rig.
 """
 
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.control.sofc.persistence import identity_parts
 from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
+
+if TYPE_CHECKING:
+    from pam_sim.located_yaml import Located
+    from pam_sim.rig import Rig
 
 SIZE_TOLERANCE = 0.05         # of length and bore: a muscle is cut and measured to that
 LOAD_FACTOR = 2.0             # of mass or inertia
@@ -42,15 +49,14 @@ _WORDS = {
     'mass_kg': ('a load of', 1.0, 'kg'), 'inertia_kg_m2': ('a limb of', 1.0, 'kg m^2')}
 
 
-def facts_of(rig):
+def facts_of(rig: 'JointRig | Rig') -> dict[str, Any]:
     """Return what a controller of a rig or joint is made for, as plain data; {} if unknown."""
-    flexor = getattr(rig, 'flexor', None)
-    one = rig if flexor is None else flexor
+    one = rig.flexor if isinstance(rig, JointRig) else rig
     if not hasattr(one, 'muscle'):      # all a controller needs is a static inverse
         return {}
     facts = {'muscle_length_m': float(one.muscle.length_m),
              'muscle_bore_m': float(one.muscle.bore_m), 'valve': one.valve}
-    if flexor is not None:
+    if isinstance(rig, JointRig):
         return {**facts, 'load': 'joint',
                 'inertia_kg_m2': float(rig.parameters['inertia_kg_m2'])}
     if LOADS[rig.load].MOVES_FREELY:
@@ -58,7 +64,7 @@ def facts_of(rig):
     return {**facts, 'load': 'prescribed'}
 
 
-def read_facts(tree):
+def read_facts(tree: 'Located') -> dict[str, Any] | None:
     """
     Return the facts a controller file states, None where it states none.
 
@@ -79,7 +85,7 @@ def read_facts(tree):
     return _shipped(name, valve)
 
 
-def _shipped(name, valve):
+def _shipped(name: str, valve: str) -> dict[str, Any] | None:
     """Return the facts of a rig or joint that ships, else what the identity says, else None."""
     from pam_sim.joint import load_joint
     from pam_sim.joint.model_file import joint_preset_names
@@ -92,7 +98,7 @@ def _shipped(name, valve):
     return {'valve': valve} if valve else None
 
 
-def differences(facts, rig):
+def differences(facts: dict[str, Any], rig: 'JointRig | Rig') -> list[str]:
     """Return in words what a rig has otherwise than a controller's facts; empty if it fits."""
     here = facts_of(rig)
     found = []
@@ -110,13 +116,14 @@ def differences(facts, rig):
     return found
 
 
-def _other_name(tree, rig):
+def _other_name(tree: 'Located', rig: 'JointRig | Rig') -> list[str]:
     """Return in words that a file without facts names another rig; empty if it does not."""
     name = identity_parts(tree.require('rig', str))[0]
     return [] if name == rig.name else [f'`{name}`, of unknown size (here {rig.name})']
 
 
-def check_made_for(tree, rig, accept):
+def check_made_for(tree: 'Located', rig: 'JointRig | Rig',
+                   accept: bool) -> tuple[dict[str, Any], str]:
     """
     Return (facts, sentence): what a controller file was made for, and how this rig differs.
 

@@ -30,7 +30,7 @@ from pam_actuation.control.law_parts import (
 from pam_actuation.control.settings import checked_settings, parameter_record, Setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
@@ -137,7 +137,7 @@ def _step(par: FloatArray, inverse: FloatArray, st: FloatArray, inp: FloatArray,
                  part(out, 0, OUTPUT))
 
 
-def _entry(key: int) -> Callable[..., float]:
+def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
     def pid_step(par: FloatArray, inverse: FloatArray, st: FloatArray, inp: FloatArray,
@@ -182,7 +182,7 @@ class PidController(FixedLawController):
     """
 
     kind = 'pid'
-    state_names = OUTPUT.names
+    state_names = OUTPUT.names or ()
 
     def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:

@@ -35,8 +35,16 @@ is interpolated (cubic through positions and rates). Rules:
 
 from bisect import bisect_right
 import math
+from typing import TYPE_CHECKING
 
-from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
+
+if TYPE_CHECKING:
+    from pam_actuation.messages import (
+        AngleReference, AngleTrajectory, Reference, ReferenceTrajectory)
+
+    Wish = Reference | AngleReference
+    Trajectory = ReferenceTrajectory | AngleTrajectory
 
 TRAJECTORY_LIFE_S = 1.0
 TRUST_S = 0.2
@@ -75,7 +83,8 @@ class ReferenceBuffer:
 
     """
 
-    def __init__(self, tracked=CONTRACTION, allowed=(-math.inf, math.inf)):
+    def __init__(self, tracked: Tracked = CONTRACTION,
+                 allowed: tuple[float, float] = (-math.inf, math.inf)) -> None:
         self._lower, self._upper = allowed
         self._unit = {'n': 'N'}.get(tracked.unit, tracked.unit)
         self.refused = 0
@@ -84,39 +93,42 @@ class ReferenceBuffer:
         self._jump_per_s = JUMP_PER_S[tracked]
         self.clear()
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget everything."""
-        self.reference = self._accepted = None
-        self.trajectory = None
-        self._times_ns = self._values = self._rates = ()
+        self.reference: Wish | None = None
+        self._accepted: Wish | None = None
+        self.trajectory: Trajectory | None = None
+        self._times_ns: tuple[int, ...] = ()
+        self._values: tuple[float, ...] = ()
+        self._rates: tuple[float, ...] = ()
 
-    def set_reference(self, message):
+    def set_reference(self, message: 'Wish') -> bool:
         """Take a ``Reference``; one that is not usable is ignored and False returned."""
         if not self._allowed(self._value(message)):
             return self._refuse(f'a reference {self._outside}')
         self.reference = message
         return True
 
-    def _allowed(self, value):
+    def _allowed(self, value: float) -> bool:
         return math.isfinite(value) and self._lower <= value <= self._upper
 
     @property
-    def _outside(self):
+    def _outside(self) -> str:
         return f'is not finite or not within {self._lower:g} to {self._upper:g} {self._unit}'
 
-    def _refuse(self, why):
+    def _refuse(self, why: str) -> bool:
         self.refused += 1
         self.refusal = why
         return False
 
-    def set_trajectory(self, message):
+    def set_trajectory(self, message: 'Trajectory') -> bool:
         """
         Take a ``ReferenceTrajectory``; an unusable one is ignored and False returned.
 
         Usable: at least one point, equal lengths, allowed values, times strictly rising.
         """
         times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
-        values = self._value(message)
+        values: tuple[float, ...] = getattr(message, self._field)
         usable = (
             len(times) > 0 and len(times) == len(values)
             and all(a < b for a, b in zip(times, times[1:]))
@@ -129,7 +141,7 @@ class ReferenceBuffer:
         self._rates = getattr(message, self._rate_field) if self._rate_field else ()
         return True
 
-    def refuse_ahead(self, now_ns):
+    def refuse_ahead(self, now_ns: int) -> None:
         """Forget what is stamped too far ahead of a time."""
         limit_ns = now_ns + MAX_AHEAD_NS
         if self.reference is not None and self.reference.stamp_ns > limit_ns:
@@ -144,23 +156,24 @@ class ReferenceBuffer:
             self.trajectory = None
             self._times_ns = self._values = self._rates = ()
 
-    def _value(self, message):
+    def _value(self, message: 'Wish') -> float:
         """Return what a message asks for, of the quantity that counts here."""
-        return getattr(message, self._field)
+        value: float = getattr(message, self._field)
+        return value
 
-    def uses_trajectory(self, now_ns):
+    def uses_trajectory(self, now_ns: int) -> bool:
         """Return whether the trajectory is the one that counts now."""
         if self.trajectory is None or now_ns > self._times_ns[-1]:
             return False
         age_s = (now_ns - self.trajectory.stamp_ns) * 1e-9
         return age_s <= TRAJECTORY_LIFE_S or self._is_whole_movement()
 
-    def _is_whole_movement(self):
+    def _is_whole_movement(self) -> bool:
         """Tell whether the trajectory was sent after the last reference."""
         return self.trajectory is not None and (
             self.reference is None or self.reference.stamp_ns < self.trajectory.stamp_ns)
 
-    def state(self, now_ns):
+    def state(self, now_ns: int) -> int:
         """Return ``NONE``, ``FRESH``, ``HELD`` or ``LOST`` for a time."""
         if self.uses_trajectory(now_ns):
             return FRESH
@@ -171,16 +184,16 @@ class ReferenceBuffer:
             return FRESH
         return HELD if age_s <= HOLD_S else LOST
 
-    def _last_ns(self):
+    def _last_ns(self) -> int:
         """Return the latest time anything was known for [ns]."""
-        times = []
+        times: list[int] = []
         if self.reference is not None:
             times.append(self.reference.stamp_ns)
         if self.trajectory is not None:
             times.append(self._times_ns[-1])
         return max(times)
 
-    def at(self, now_ns, time_ns):
+    def at(self, now_ns: int, time_ns: int) -> tuple[float, float]:
         """
         Return (position, rate per second) wanted at ``time_ns``, judged at ``now_ns``.
 
@@ -188,9 +201,9 @@ class ReferenceBuffer:
         """
         if self.uses_trajectory(now_ns):
             return self._interpolate(time_ns)
-        if self._is_whole_movement():
-            return self._values[-1], 0.0
         reference = self.reference
+        if reference is None or self._is_whole_movement():
+            return self._values[-1], 0.0
         rate = getattr(reference, self._rate_field) if self._rate_field else 0.0
         if not math.isfinite(rate):
             rate = 0.0
@@ -201,7 +214,7 @@ class ReferenceBuffer:
         position = self._value(reference) + rate * (trusted_s + ahead_s * fade)
         return position, rate * fade
 
-    def _interpolate(self, time_ns):
+    def _interpolate(self, time_ns: int) -> tuple[float, float]:
         """Return position and rate of the trajectory, straight beyond its ends."""
         times, values = self._times_ns, self._values
         after = bisect_right(times, time_ns)
@@ -213,8 +226,8 @@ class ReferenceBuffer:
         span_s = (times[after] - times[i]) * 1e-9
         part = (time_ns - times[i]) * 1e-9 / span_s
         x0, x1 = values[i], values[after]
-        v0, v1 = self._rate(i, None), self._rate(after, None)
-        if v0 is None or v1 is None:
+        v0, v1 = self._rate(i, math.nan), self._rate(after, math.nan)
+        if math.isnan(v0) or math.isnan(v1):
             return x0 + (x1 - x0) * part, (x1 - x0) / span_s
         if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > self._jump_per_s:
             return x0 + v0 * part * span_s, v0
@@ -224,7 +237,7 @@ class ReferenceBuffer:
                  + part * (1.0 - part) * (b - a))
         return x0 + (x1 - x0) * part + bend, ((x1 - x0) + slope) / span_s
 
-    def _rate(self, index, missing=0.0):
+    def _rate(self, index: int, missing: float = 0.0) -> float:
         """Return the rate of a point, ``missing`` where there is none."""
         rates = self._rates
         if index < len(rates) and math.isfinite(rates[index]):

@@ -21,6 +21,8 @@ or its supply is gone. The other muscle alone would then pull the limb to its st
 
 import math
 
+from pam_actuation.control.following import CommandFollowing
+
 from pam_actuation.control.frozen import RESUME_NS
 from pam_sim.units import P_ATM_PA
 
@@ -47,20 +49,20 @@ class SlackMuscle:
 
     """
 
-    def __init__(self, following):
+    def __init__(self, following: CommandFollowing) -> None:
         self._following = following
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """Begin anew, as before the first reading."""
         self.slack = False
-        self._measured_ns = None    # newest fresh reading
-        self._judged_ns = None
+        self._measured_ns: int | None = None     # newest fresh reading
+        self._judged_ns: int | None = None
         self._empty_ns = 0          # how long it was wanted under air and was not
-        self._obeyed_ns = None      # when its driver did not vent against a command
+        self._obeyed_ns: int | None = None       # when its driver did not vent against a command
         self._noticed_ns = 0
 
-    def judge(self, now_ns, command_pa, pressure_pa):
+    def judge(self, now_ns: int, command_pa: float, pressure_pa: float) -> bool:
         """
         Take the newest reading; return whether the muscle is slack.
 
@@ -94,7 +96,7 @@ class SlackMuscle:
             self._noticed_ns = now_ns
         return self.slack
 
-    def _count(self, now_ns, command_pa, pressure_pa):
+    def _count(self, now_ns: int, command_pa: float, pressure_pa: float) -> None:
         """Add up how long the muscle was empty; commands that come and go count in part."""
         passed_ns = 0 if self._judged_ns is None else max(now_ns - self._judged_ns, 0)
         self._judged_ns = now_ns
@@ -105,13 +107,13 @@ class SlackMuscle:
         else:
             self._empty_ns = max(self._empty_ns - passed_ns, 0)
 
-    def _proven(self, pressure_pa):
+    def _proven(self, pressure_pa: float) -> bool:
         """Return whether the muscle gets the air it is asked for."""
         if self._measured_ns is not None and not pressure_pa > SLACK_PA:
             return False
         return not self._following.told or self._following.followed_pa > SLACK_PA
 
-    def command_pa(self, now_ns):
+    def command_pa(self, now_ns: int) -> float:
         """Return what to ask of it [absolute Pa] while a muscle of the joint is slack."""
         proves = self.slack and now_ns - self._noticed_ns >= RESUME_NS
         return PROOF_PA if proves else P_ATM_PA

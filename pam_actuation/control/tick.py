@@ -22,6 +22,7 @@ state. ``TickCore`` turns it into a command and the numbers of
 
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from pam_actuation.control.modes.tracked import tracked_by
 from pam_actuation.slow_rise import SlowRise
@@ -65,7 +66,7 @@ HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
 
 
-def input_names(unit):
+def input_names(unit: str) -> tuple[str, ...]:
     """
     Return the names of the inputs of a tick in ``controller_state``, in order.
 
@@ -78,7 +79,7 @@ def input_names(unit):
         HELD_BACK)
 
 
-def reference_names(unit):
+def reference_names(unit: str) -> tuple[str, str, str, str]:
     """Return the names of reference, its rate, and both one preview ahead."""
     return (f'reference_{unit}', f'reference_{unit}_per_s', f'lead_reference_{unit}',
             f'lead_reference_{unit}_per_s')
@@ -98,7 +99,7 @@ class TickInputs:
     reason: int = OK
     learning: bool = True
     restarted: bool = False
-    stamps_ns: tuple = (-1,) * len(STAMPED)
+    stamps_ns: tuple[int, ...] = (-1,) * len(STAMPED)
     contraction_m: float = math.nan
     reference: float = math.nan
     reference_rate: float = math.nan
@@ -110,7 +111,7 @@ class TickInputs:
     held_back: float = 0.0
 
 
-def split_stamp(stamp_ns):
+def split_stamp(stamp_ns: int) -> tuple[float, float]:
     """Return a stamp as two numbers that a float holds exactly: seconds, nanoseconds."""
     if stamp_ns < 0:
         return -1.0, 0.0
@@ -118,7 +119,7 @@ def split_stamp(stamp_ns):
     return float(seconds), float(nanoseconds)
 
 
-def join_stamp(seconds, nanoseconds):
+def join_stamp(seconds: float, nanoseconds: float) -> int:
     """Return the stamp [ns] of ``split_stamp``, -1 for none."""
     return -1 if seconds < 0 else int(seconds) * 1_000_000_000 + int(nanoseconds)
 
@@ -136,14 +137,14 @@ class TickCore:
 
     """
 
-    def __init__(self, controller, rises_slowly=True):
+    def __init__(self, controller: Any, rises_slowly: bool = True) -> None:
         self.controller = controller
         self.rise = SlowRise(active=False)
         self._rises_slowly = rises_slowly
         self.ticks = 0
         self.names = input_names(tracked_by(controller).unit) + tuple(controller.state_names)
 
-    def run(self, inputs):
+    def run(self, inputs: TickInputs) -> tuple[float, tuple[float, ...]]:
         """
         Run one tick.
 

@@ -14,6 +14,11 @@
 
 """All back ends by name, and how one is opened."""
 
+from collections.abc import Callable, Mapping
+from typing import Any, TYPE_CHECKING, TypeVar
+
+from pam_actuation.drivers.parameter import DriverParameter
+
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.dummy import DummySensors, DummyValve
 from pam_actuation.hardware.iio_adc import IioAdc
@@ -21,21 +26,30 @@ from pam_actuation.hardware.iio_dac import IioDac
 from pam_actuation.hardware.pwm_sysfs import PwmPair
 from pam_actuation.hardware.sim import SimulatedValve
 from pam_actuation.hardware.sysfs import DeviceError
-from pam_actuation.hardware.valve_output import GuardedOutput
+from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
 from pam_sim.errors import InputError
 
-VALVE_OUTPUTS = {
+if TYPE_CHECKING:
+    from pam_actuation.drivers.config import DriverConfig
+
+VALVE_OUTPUTS: dict[str, type[ValveOutput]] = {
     'sim': SimulatedValve, 'dummy': DummyValve, 'iio_dac': IioDac, 'pwm_sysfs': PwmPair}
-SENSOR_INPUTS = {'dummy': DummySensors, 'iio_adc': IioAdc}
+SENSOR_INPUTS: dict[str, type[DummySensors] | type[IioAdc]] = {
+    'dummy': DummySensors, 'iio_adc': IioAdc}
 
 
-def parameters_of(back_ends):
+BackEnd = type[ValveOutput] | type[DummySensors] | type[IioAdc]
+Told = TypeVar('Told')
+
+
+def parameters_of(back_ends: Mapping[str, BackEnd]) -> tuple[DriverParameter, ...]:
     """Return the parameters of several back ends, each once."""
     return tuple({parameter.name: parameter for back_end in back_ends.values()
                   for parameter in back_end.PARAMETERS}.values())
 
 
-def open_valve(name, valve_type, values, config, safe_efforts, watchdog_s=0.0):
+def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'DriverConfig',
+               safe_efforts: tuple[float, ...], watchdog_s: float = 0.0) -> GuardedOutput:
     """
     Open the output a valve hangs on; it vents from then on.
 
@@ -74,7 +88,7 @@ def open_valve(name, valve_type, values, config, safe_efforts, watchdog_s=0.0):
     return GuardedOutput(device, safe_efforts, watchdog)
 
 
-def open_sensors(name, values):
+def open_sensors(name: str, values: dict[str, Any]) -> DummySensors | IioAdc:
     """
     Return the sensors of a back end, a key of ``SENSOR_INPUTS``.
 
@@ -87,7 +101,7 @@ def open_sensors(name, values):
     return _tell(lambda: SENSOR_INPUTS[name](values))
 
 
-def _tell(action):
+def _tell(action: Callable[[], Told]) -> Told:
     """Return what an action returns; a device that is not usable is a mistake of the user."""
     try:
         return action()

@@ -24,13 +24,16 @@ What it can not cover is a computer that stands still or loses its power: see
 docs/explanation/safety.md.
 """
 
+from collections.abc import Sequence
 import json
 import os
+from pathlib import Path
 import select
 import signal
 import subprocess
 import sys
 import time
+from typing import IO
 
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
@@ -63,31 +66,32 @@ class DeviceWatchdog:
 
     """
 
-    def __init__(self, writes, timeout_s):
+    def __init__(self, writes: Sequence[tuple[Path, int]], timeout_s: float) -> None:
         self._order = json.dumps({
             'timeout_s': timeout_s, 'writes': [(str(path), value) for path, value in writes]})
         self._vents = 0
         self._start()
         self._wait_until_ready()
 
-    def _start(self):
+    def _start(self) -> None:
         try:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 bufsize=0, start_new_session=True)
-            self._process.stdin.write(self._order.encode() + b'\n')
+            _pipes(self._process)[0].write(self._order.encode() + b'\n')
         except OSError as error:
             raise DeviceError(f'cannot be started ({error.strerror})', WHERE) from None
-        for pipe in (self._process.stdin, self._process.stdout):
+        for pipe in _pipes(self._process):
             os.set_blocking(pipe.fileno(), False)       # the driver never waits for it
 
-    def _wait_until_ready(self):
-        readable, _, _ = select.select([self._process.stdout], [], [], START_TIMEOUT_S)
-        if not readable or self._process.stdout.read(1) != READY:
+    def _wait_until_ready(self) -> None:
+        _, output = _pipes(self._process)
+        readable, _, _ = select.select([output], [], [], START_TIMEOUT_S)
+        if not readable or output.read(1) != READY:
             _end(self._process)
             raise DeviceError('did not start', WHERE)
 
-    def tell(self, in_use):
+    def tell(self, in_use: bool) -> None:
         """
         Tell that the driver is alive, and whether the muscle may be under pressure from now on.
 
@@ -98,7 +102,7 @@ class DeviceWatchdog:
 
         """
         try:
-            taken = self._process.stdin.write(IN_USE if in_use else AT_REST)
+            taken = _pipes(self._process)[0].write(IN_USE if in_use else AT_REST)
         except BrokenPipeError:
             ended = self._process       # kept where no other starts: it is tried again
             self._start()
@@ -108,20 +112,20 @@ class DeviceWatchdog:
             raise DeviceError('does not read what it is told', WHERE)
 
     @property
-    def pid(self):
+    def pid(self) -> int:
         """Return the id of the process."""
         return self._process.pid
 
     @property
-    def vents(self):
+    def vents(self) -> int:
         """Return how often the process has vented while the driver was silent."""
-        said = self._process.stdout.read(4096) or b''
+        said = _pipes(self._process)[1].read(4096) or b''
         self._vents += said.count(VENTED)
         return self._vents
 
-    def close(self):
+    def close(self) -> None:
         """End the process; it vents first if the muscle may be under pressure."""
-        self._process.stdin.close()
+        _pipes(self._process)[0].close()
         try:
             self._process.wait(END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
@@ -129,23 +133,30 @@ class DeviceWatchdog:
         _end(self._process)
 
 
-def _end(process):
+def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    """Return input and output of the process, which is started with both."""
+    assert process.stdin is not None and process.stdout is not None
+    return process.stdin, process.stdout
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
     process.kill()
-    process.stdin.close()
-    process.stdout.close()
+    for pipe in _pipes(process):
+        pipe.close()
     process.wait()
 
 
 class _LastWord:
     """The process: listens to the driver and vents when that falls silent or is gone."""
 
-    def __init__(self, inlet, outlet, timeout_s, writes):
+    def __init__(self, inlet: int, outlet: int, timeout_s: float,
+                 writes: Sequence[tuple[Path, int]]) -> None:
         self._inlet, self._outlet = inlet, outlet
         self._timeout_s = timeout_s
         self._writes = writes
         self._in_use = False
 
-    def run(self):
+    def run(self) -> None:
         """Listen until the driver is gone."""
         gone = told = False
         while not gone:
@@ -159,12 +170,12 @@ class _LastWord:
                 self._vent(gone, told)
                 told = not gone
 
-    def _listen(self, patience_s):
+    def _listen(self, patience_s: float | None) -> bytes | None:
         """Return what the driver said, b'' if it is gone, None if it was silent for so long."""
         readable, _, _ = select.select([self._inlet], [], [], patience_s)
         return os.read(self._inlet, 4096) if readable else None
 
-    def _vent(self, gone, told):
+    def _vent(self, gone: bool, told: bool) -> None:
         """Vent; if the device refuses try again, until the driver speaks or for a minute."""
         give_up_s = time.monotonic() + LONGEST_TRY_S
         why = 'is gone' if gone else 'is silent'
@@ -179,7 +190,7 @@ class _LastWord:
             _report(f'the valve driver {why}: vented')
             self._say(VENTED)
 
-    def _write_all(self):
+    def _write_all(self) -> str:
         """Write everything that vents; return what is wrong, '' if nothing."""
         try:
             sysfs.write_all(self._writes)
@@ -187,21 +198,21 @@ class _LastWord:
             return str(error)
         return ''
 
-    def _say(self, what):
+    def _say(self, what: bytes) -> None:
         try:
             os.write(self._outlet, what)
         except OSError:
             pass                # nobody is left to hear it
 
 
-def _report(what):
+def _report(what: str) -> None:
     try:
         print(f'{WHERE}: {what}', file=sys.stderr, flush=True)
     except OSError:
         pass                    # the terminal is gone as well
 
 
-def main():
+def main() -> None:
     """Be the process: the order on the first line of standard input, then a byte per signal."""
     for number in OUTLIVED:
         signal.signal(number, signal.SIG_IGN)

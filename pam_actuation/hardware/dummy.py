@@ -14,6 +14,10 @@
 
 """Devices that are not there: to run the whole graph on a computer without any wiring."""
 
+from typing import Any
+
+from pam_actuation.drivers.parameter import DriverParameter
+
 from pam_actuation.hardware.valve_output import check_pair, ValveOutput
 from pam_sim.units import P_ATM_PA
 
@@ -21,15 +25,16 @@ from pam_sim.units import P_ATM_PA
 class DummyValve(ValveOutput):
     """Take every signal a device would take and keep the last one, ``efforts``."""
 
-    efforts = None
+    efforts: tuple[float, ...] | None = None
 
-    def write(self, efforts):
+    def write(self, efforts: tuple[float, ...]) -> None:
         """Keep the signal."""
         if len(efforts) == 2:
-            check_pair(*efforts)
+            fill_duty, vent_duty = efforts
+            check_pair(fill_duty, vent_duty)
         self.efforts = tuple(efforts)
 
-    def vent(self):
+    def vent(self) -> None:
         """Forget the signal: nothing is under pressure."""
         self.efforts = None
 
@@ -37,12 +42,12 @@ class DummyValve(ValveOutput):
 class DummySensors:
     """A muscle at rest: atmospheric pressure, no contraction, no force."""
 
-    PARAMETERS = ()
+    PARAMETERS: tuple[DriverParameter, ...] = ()
     READINGS = {'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
 
-    def __init__(self, values):
+    def __init__(self, values: dict[str, Any]) -> None:
         self.topics = tuple(self.READINGS)
 
-    def read(self, topic):
+    def read(self, topic: str) -> float:
         """Return the reading of a topic at rest, in its SI unit."""
         return self.READINGS[topic]

@@ -26,7 +26,7 @@ _OTHERS = (
     ('joint', 'a model of a joint', '--model'))
 
 
-def hardware_file(name):
+def hardware_file(name: str) -> str:
     """
     Return the path of a parameter file of hardware, as a text.
 
@@ -53,7 +53,7 @@ def hardware_file(name):
     return str(path)
 
 
-def _holds_parameters(tree, depth):
+def _holds_parameters(tree: Located, depth: int) -> bool:
     """Return whether every branch of a tree leads to parameters of a node."""
     return bool(tree) and depth > 0 and all(
         isinstance(value, Located) and (key == PARAMETERS or _holds_parameters(value, depth - 1))

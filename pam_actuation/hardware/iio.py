@@ -56,7 +56,8 @@ class IioVoltage:
 
     """
 
-    def __init__(self, root, device, direction, channel, parameter):
+    def __init__(self, root: str, device: str, direction: str, channel: int,
+                 parameter: str) -> None:
         self.folder = sysfs.find_device(Path(root) / 'bus/iio/devices', device, parameter)
         self._kind = f'{direction}_voltage'
         self._channel = channel
@@ -72,17 +73,17 @@ class IioVoltage:
         offset_path = self.attribute('offset')
         self.offset = 0.0 if offset_path is None else sysfs.read_number(offset_path)
 
-    def attribute(self, what):
+    def attribute(self, what: str) -> Path | None:
         """Return the path of an attribute, the channel's own or the shared one, else None."""
         for name in (f'{self._kind}{self._channel}_{what}', f'{self._kind}_{what}'):
             if (self.folder / name).exists():
                 return self.folder / name
         return None
 
-    def raw(self, volts):
+    def raw(self, volts: float) -> int:
         """Return the raw value next to a voltage [V]."""
         return round(volts * MV_PER_V / self.scale_mv - self.offset)
 
-    def read_v(self):
+    def read_v(self) -> float:
         """Return the measured voltage [V]; DeviceError if the converter does not answer."""
         return (sysfs.read_number(self.raw_path) + self.offset) * self.scale_mv / MV_PER_V

@@ -14,6 +14,8 @@
 
 """Sensors on analog inputs of Linux (IIO): volts to pressure, contraction and force."""
 
+from typing import Any
+
 from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
@@ -27,7 +29,8 @@ QUANTITIES = {
 }
 
 
-def _parameters(topic, unit, what, at_0_v, per_v):
+def _parameters(topic: str, unit: str, what: str, at_0_v: float,
+                per_v: float) -> tuple[DriverParameter, DriverParameter, DriverParameter]:
     return (
         DriverParameter(f'{topic}.channel', -1, -1, 255,
                         f'analog input of the {what}; -1: not connected'),
@@ -64,7 +67,7 @@ class IioAdc:
           for parameter in _parameters(topic, *quantity)),
     )
 
-    def __init__(self, values):
+    def __init__(self, values: dict[str, Any]) -> None:
         self._lines = {}
         for topic, (unit, *_) in QUANTITIES.items():
             channel = values[f'{topic}.channel']
@@ -84,7 +87,7 @@ class IioAdc:
         for topic in self.topics:
             self.read(topic)            # one that does not answer is told at the start
 
-    def read(self, topic):
+    def read(self, topic: str) -> float:
         """Return the reading of a topic in its SI unit; DeviceError if there is none."""
         voltage, at_0_v, per_v = self._lines[topic]
         return at_0_v + per_v * voltage.read_v()

@@ -14,6 +14,8 @@
 
 """A proportional regulator on an analog output of Linux (IIO): volts to raw values."""
 
+from pathlib import Path
+
 from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
@@ -24,8 +26,8 @@ from pam_actuation.hardware.valve_output import ValveOutput
 class IioDac(ValveOutput):
     """Drive the set-point input of a regulator; 0 V vents."""
 
-    VALVE_TYPES = ('ppr',)
-    PARAMETERS = (
+    VALVE_TYPES: tuple[str, ...] = ('ppr',)
+    PARAMETERS: tuple[DriverParameter, ...] = (
         SYSFS_ROOT,
         DriverParameter('dac.device', '', None, None,
                         'analog output: its folder, such as iio:device0, or its name'),
@@ -34,7 +36,7 @@ class IioDac(ValveOutput):
                         'volts at the regulator per volt of the analog output'),
     )
 
-    def open(self):  # noqa: A003
+    def open(self) -> None:  # noqa: A003
         """Find the channel, check that it reaches the regulator's range, vent."""
         self._voltage = IioVoltage(
             self.values['sysfs_root'], self.values['dac.device'], 'out',
@@ -45,7 +47,7 @@ class IioDac(ValveOutput):
         if power_down is not None:
             sysfs.write(power_down, 0)       # many converters start without power
 
-    def _check_range(self):
+    def _check_range(self) -> None:
         available = self._voltage.attribute('raw_available')
         if available is None:
             return
@@ -62,13 +64,13 @@ class IioDac(ValveOutput):
                     f'{volts:g} V at the regulator are the raw value {raw}, the converter has '
                     f'{lowest:.0f} to {highest:.0f}', self._voltage.raw_path)
 
-    def _raw(self, volts):
+    def _raw(self, volts: float) -> int:
         return self._voltage.raw(volts / self.values['dac.amplification'])
 
-    def write(self, efforts):
+    def write(self, efforts: tuple[float, ...]) -> None:
         """Send the volts."""
         sysfs.write(self._voltage.raw_path, self._raw(efforts[0]))
 
-    def safe_writes(self):
+    def safe_writes(self) -> tuple[tuple[Path, int], ...]:
         """Send 0 V."""
         return ((self._voltage.raw_path, self._raw(0.0)),)

@@ -42,14 +42,14 @@ class PwmChannel:
 
     """
 
-    def __init__(self, chip, number, inverted=False):
+    def __init__(self, chip: Path, number: int, inverted: bool = False) -> None:
         self._chip = chip
         self._number = number
         self._inverted = inverted
         self.folder = chip / f'pwm{number}'
         self._period_ns = 0
 
-    def export(self):
+    def export(self) -> None:
         """Ask the kernel for the channel; DeviceError if it does not come."""
         channels = round(sysfs.read_number(self._chip / 'npwm'))
         if self._number >= channels:
@@ -63,7 +63,7 @@ class PwmChannel:
                 raise DeviceError(f'channel {self._number} did not appear', self.folder)
             time.sleep(0.01)
 
-    def start(self, period_ns, opening):
+    def start(self, period_ns: int, opening: float) -> None:
         """Run with a period [ns] and a mean opening of the valve of 0..1."""
         polarity = self.folder / 'polarity'
         if polarity.exists() and sysfs.read_text(polarity) != 'normal':
@@ -76,11 +76,11 @@ class PwmChannel:
         self.set(opening)
         sysfs.write(self.folder / 'enable', 1)
 
-    def set(self, opening):  # noqa: A003
+    def set(self, opening: float) -> None:  # noqa: A003
         """Set the mean opening of the valve, 0..1, from the next period on."""
         sysfs.write(*self.write_of(opening))
 
-    def write_of(self, opening):
+    def write_of(self, opening: float) -> tuple[Path, int]:
         """Return the attribute and the value that give a mean opening of the valve of 0..1."""
         share = min(max(opening, 0.0), 1.0)
         share = 1.0 - share if self._inverted else share
@@ -90,8 +90,8 @@ class PwmChannel:
 class PwmPair(ValveOutput):
     """Drive filling and venting valve; what shuts is written before what opens."""
 
-    VALVE_TYPES = ('hsv',)
-    PARAMETERS = (
+    VALVE_TYPES: tuple[str, ...] = ('hsv',)
+    PARAMETERS: tuple[DriverParameter, ...] = (
         SYSFS_ROOT,
         DriverParameter('pwm.chip', 'pwmchip0', None, None, 'PWM chip of both valves'),
         DriverParameter('pwm.fill_channel', 0, 0, 255, 'channel of the filling valve'),
@@ -100,7 +100,7 @@ class PwmPair(ValveOutput):
                         'whether the venting valve is open without current'),
     )
 
-    def open(self):  # noqa: A003
+    def open(self) -> None:  # noqa: A003
         """Find and start both channels, venting."""
         values = self.values
         if values['pwm.fill_channel'] == values['pwm.vent_channel']:
@@ -118,7 +118,7 @@ class PwmPair(ValveOutput):
         self._fill.start(period_ns, 0.0)
         self._vent.start(period_ns, 1.0)
 
-    def write(self, efforts):
+    def write(self, efforts: tuple[float, ...]) -> None:
         """Send both duties, the one that shuts first."""
         fill, vent = efforts
         check_pair(fill, vent)
@@ -126,6 +126,6 @@ class PwmPair(ValveOutput):
         for channel, opening in order if vent > 0.0 else reversed(order):
             channel.set(opening)
 
-    def safe_writes(self):
+    def safe_writes(self) -> tuple[tuple[Path, int], ...]:
         """Shut the filling valve and open the venting one."""
         return self._fill.write_of(0.0), self._vent.write_of(1.0)

@@ -14,6 +14,7 @@
 
 """Attributes of devices as Linux offers them below /sys: small files that hold one value."""
 
+from collections.abc import Iterable
 import os
 from pathlib import Path
 
@@ -33,13 +34,13 @@ class DeviceError(RuntimeError):
 
     """
 
-    def __init__(self, problem, where):
+    def __init__(self, problem: str, where: Path | str) -> None:
         self.problem = problem
         self.where = str(where)
         super().__init__(f'{self.where}: {problem}')
 
 
-def write(path, value):
+def write(path: Path, value: int | str) -> None:
     """
     Write one value to an attribute that exists.
 
@@ -63,7 +64,7 @@ def write(path, value):
         raise DeviceError(f'only {written} of {len(text)} bytes of {value} were taken', path)
 
 
-def write_all(writes):
+def write_all(writes: Iterable[tuple[Path, int]]) -> None:
     """
     Write several attributes in order, the others also where one refuses.
 
@@ -88,7 +89,7 @@ def write_all(writes):
         raise failures[0]
 
 
-def read_text(path):
+def read_text(path: Path) -> str:
     """Return the text of an attribute without the white space around it; DeviceError."""
     try:
         attribute = os.open(path, os.O_RDONLY)
@@ -100,7 +101,7 @@ def read_text(path):
         raise DeviceError(f'cannot be read ({error.strerror})', path) from None
 
 
-def read_number(path):
+def read_number(path: Path) -> float:
     """Return the number an attribute holds; DeviceError also where it holds something else."""
     text = read_text(path)
     try:
@@ -109,7 +110,7 @@ def read_number(path):
         raise DeviceError(f'{text[:40]!r} is not a number', path) from None
 
 
-def find_device(folder, name, parameter):
+def find_device(folder: Path, name: str, parameter: str) -> Path:
     """
     Return the folder of a device.
 

@@ -19,12 +19,20 @@ A back end is a class made from ``ValveOutput``. The valve driver speaks to it
 through ``GuardedOutput`` only.
 """
 
+from collections.abc import Callable
+from pathlib import Path
 import time
+from typing import Any, TYPE_CHECKING
 import weakref
 
 from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
+from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
+
+if TYPE_CHECKING:
+    from pam_actuation.drivers.config import DriverConfig
+    from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 
 TRIES = 3              # to vent, on the way out
 BETWEEN_TRIES_S = 0.01
@@ -46,17 +54,17 @@ class ValveOutput:
 
     """
 
-    VALVE_TYPES = ('ppr', 'hsv')
-    PARAMETERS = ()
+    VALVE_TYPES: tuple[str, ...] = ('ppr', 'hsv')
+    PARAMETERS: tuple[DriverParameter, ...] = ()
 
-    def __init__(self, values, config):
+    def __init__(self, values: dict[str, Any], config: 'DriverConfig') -> None:
         self.values = values
         self.config = config
 
-    def open(self):  # noqa: A003
+    def open(self) -> None:  # noqa: A003
         """Find the device, check it and vent; raise DeviceError if it is not usable."""
 
-    def write(self, efforts):
+    def write(self, efforts: tuple[float, ...]) -> None:
         """
         Send a valve signal; raise DeviceError if the device does not take it.
 
@@ -67,16 +75,16 @@ class ValveOutput:
 
         """
 
-    def safe_writes(self):
+    def safe_writes(self) -> tuple[tuple[Path, int], ...]:
         """Return (attribute, value) of all that is written to vent, in order; () for nothing."""
         return ()
 
-    def vent(self):
+    def vent(self) -> None:
         """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
         sysfs.write_all(self.safe_writes())
 
 
-def check_pair(fill_duty, vent_duty):
+def check_pair(fill_duty: float, vent_duty: float) -> None:
     """
     Raise DeviceError if both valves are to be open, one of them for long.
 
@@ -107,14 +115,15 @@ class GuardedOutput:
 
     """
 
-    def __init__(self, device, safe_efforts, watchdog=None):
+    def __init__(self, device: ValveOutput, safe_efforts: tuple[float, ...],
+                 watchdog: 'DeviceWatchdog | None' = None) -> None:
         self._device = device
         self._watchdog = watchdog
         self._safe_efforts = tuple(safe_efforts)
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
         self.failures = 0
 
-    def send(self, efforts):
+    def send(self, efforts: tuple[float, ...]) -> str:
         """
         Send a signal; if that fails, send the safe one at once.
 
@@ -131,12 +140,12 @@ class GuardedOutput:
             self.vent()
         return problem
 
-    def _write(self, efforts):
+    def _write(self, efforts: tuple[float, ...]) -> None:
         if self._watchdog is not None:
             self._watchdog.tell(True)       # first: killed in between, the device is vented
         self._device.write(efforts)
 
-    def vent(self, tries=1):
+    def vent(self, tries: int = 1) -> str:
         """Send the safe signal, up to ``tries`` times; return what is wrong, '' if nothing."""
         problem = self._try(self._vent)
         for _ in range(tries - 1):
@@ -146,17 +155,17 @@ class GuardedOutput:
             problem = self._try(self._vent)
         return problem
 
-    def _vent(self):
+    def _vent(self) -> None:
         self._device.vent()
         if self._watchdog is not None:
             self._watchdog.tell(False)
 
     @property
-    def watchdog_vents(self):
+    def watchdog_vents(self) -> int | None:
         """Return how often the watchdog of the device has vented, None without one."""
         return None if self._watchdog is None else self._watchdog.vents
 
-    def close(self):
+    def close(self) -> str:
         """Vent and let go of the device; return what is wrong, '' if nothing."""
         problem = self.vent(TRIES)
         if not problem:
@@ -166,7 +175,7 @@ class GuardedOutput:
             self._watchdog = None
         return problem
 
-    def _try(self, action):
+    def _try(self, action: Callable[..., Any]) -> str:
         try:
             action()
         except DeviceError as error:
@@ -175,7 +184,7 @@ class GuardedOutput:
         return ''
 
 
-def _vent_quietly(device):
+def _vent_quietly(device: ValveOutput) -> None:
     """Vent at the very end, where nobody is left to be told of a failure."""
     try:
         device.vent()

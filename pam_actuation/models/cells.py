@@ -14,6 +14,9 @@
 
 """What the presentations of the catalogue share: facts, tables and groups, as plain text cells."""
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 from pam_sim.catalogue import KINDS
 
 PARAMETER_HEAD = ('parameter', 'unit', 'nominal', 'bounds', 'what')
@@ -21,7 +24,7 @@ REPORTED_HEAD = ('reported as', 'unit', 'at the nominal values')
 SET_HEAD = ('set', 'pressure, kPa', 'contraction, %', 'rests on')
 
 
-def groups(entries):
+def groups(entries: list[dict[str, Any]]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """
     Yield (heading, entries) in reading order; effects are split by subsystem.
 
@@ -42,7 +45,7 @@ def groups(entries):
                    [entry for entry in chosen if entry['subsystem'] == subsystem])
 
 
-def facts(entry):
+def facts(entry: dict[str, Any]) -> list[tuple[str, str]]:
     """Return (what, text) pairs of an entry, without what is empty."""
     return [(what, value) for what, value in (
         ('equation', entry['equation']),
@@ -63,7 +66,7 @@ def facts(entry):
         ('source', entry['source'])) if value]
 
 
-def parameter_rows(entry):
+def parameter_rows(entry: dict[str, Any]) -> list[tuple[str, ...]]:
     """Return the rows under :data:`PARAMETER_HEAD`."""
     return [(item['name'], item['unit'], f'{item["nominal"]:g}',
              f'{item["lower"]:g} to {item["upper"]:g}',
@@ -71,30 +74,31 @@ def parameter_rows(entry):
             for item in entry['parameters']]
 
 
-def reported_rows(entry):
+def reported_rows(entry: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Return the rows under :data:`REPORTED_HEAD`; none for what is not an effect."""
     return [(item['name'], item['unit'], f'{item["nominal"]:.4g}')
             for item in entry.get('reported', ())]
 
 
-def set_rows(entry):
+def set_rows(entry: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Return the rows under :data:`SET_HEAD`; none for what is not a law."""
     return [(item['name'], _range(item['pressure_gauge_pa'], 1e-3), _range(item['strain'], 100.0),
              item['rests_on']) for item in entry.get('sets', ())]
 
 
-def tables(entry):
+def tables(entry: dict[str, Any]) -> list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]]:
     """Return the (head, rows) of an entry that have rows."""
-    return [(head, rows) for head, rows in (
+    every: tuple[tuple[tuple[str, ...], Sequence[tuple[str, ...]]], ...] = (
         (PARAMETER_HEAD, parameter_rows(entry)), (REPORTED_HEAD, reported_rows(entry)),
-        (SET_HEAD, set_rows(entry))) if rows]
+        (SET_HEAD, set_rows(entry)))
+    return [(head, rows) for head, rows in every if rows]
 
 
-def _what(item, source):
+def _what(item: dict[str, Any], source: str) -> str:
     """Return description and source of a parameter, the source only where it is its own."""
     own = f'[{item["source"]}]' if item['source'] not in ('', source) else ''
     return ' '.join(filter(None, (item['description'], own)))
 
 
-def _range(ends, scale):
+def _range(ends: Sequence[float], scale: float) -> str:
     return f'{ends[0] * scale:g} to {ends[1] * scale:g}'

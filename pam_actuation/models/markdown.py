@@ -14,6 +14,8 @@
 
 """The catalogue of models as a Markdown page for the documentation."""
 
+from typing import Any
+
 from pam_actuation.models.cells import facts, groups, tables
 
 _INTRODUCTION = """# Models
@@ -30,7 +32,7 @@ puts in the place of a term of the nominal rig. All numbers are SI.
 """
 
 
-def page(entries):
+def page(entries: list[dict[str, Any]]) -> str:
     """Return the whole page."""
     parts = [_INTRODUCTION]
     for heading, chosen in groups(entries):
@@ -39,7 +41,7 @@ def page(entries):
     return '\n'.join(parts)
 
 
-def _entry(entry):
+def _entry(entry: dict[str, Any]) -> str:
     lines = [f'### {entry["name"]}', '', escaped(entry['sentence']), '']
     for what, value in facts(entry):
         lines.append(f'- {what}: `{value}`' if what == 'equation'
@@ -51,12 +53,12 @@ def _entry(entry):
     return '\n'.join(lines).rstrip() + '\n'
 
 
-def row(cells):
+def row(cells: tuple[str, ...]) -> str:
     """Return a row of a table."""
     return '| ' + ' | '.join(cells) + ' |'
 
 
-def escaped(value):
+def escaped(value: str) -> str:
     """Return a text in which nothing is markup."""
     for character in ('\\', '|', '*', '_', '<', '`'):
         value = value.replace(character, '\\' + character)

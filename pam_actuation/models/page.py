@@ -14,6 +14,8 @@
 
 """The catalogue of models as one self-contained HTML page."""
 
+from typing import Any
+
 from pam_actuation.models.cells import facts, groups, tables
 from pam_actuation.report.page import paragraph, render, Section, table, text
 
@@ -21,7 +23,7 @@ _LEAD = ('Muscle laws, valves, loads, effects, sensors and rigs of the simulator
          'equations, parameters and sources. All numbers are SI.')
 
 
-def page(entries):
+def page(entries: list[dict[str, Any]]) -> str:
     """Return the page as text."""
     sections = []
     for heading, chosen in groups(entries):
@@ -33,7 +35,7 @@ def page(entries):
                   'describes. This page needs no network.')
 
 
-def _body(entry):
+def _body(entry: dict[str, Any]) -> str:
     body = paragraph(entry['sentence'])
     if facts(entry):
         body += table((), facts(entry), 'facts')

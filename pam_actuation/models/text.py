@@ -14,13 +14,15 @@
 
 """The catalogue of models in the terminal."""
 
+from collections.abc import Sequence
 import shutil
 import textwrap
+from typing import Any
 
 from pam_actuation.models.cells import facts, groups, tables
 
 
-def overview(entries):
+def overview(entries: list[dict[str, Any]]) -> str:
     """Return all entries by group, name and one sentence each."""
     width = _width()
     widest = max(len(entry['name']) for entry in entries)
@@ -35,12 +37,13 @@ def overview(entries):
     return '\n'.join(lines[1:])
 
 
-def in_full(entries):
+def in_full(entries: list[dict[str, Any]]) -> str:
     """Return everything about the given entries."""
     return '\n\n'.join(_entry(entry) for entry in entries)
 
 
-def text_table(head, rows, width=None):
+def text_table(head: Sequence[object], rows: Sequence[Sequence[object]],
+               width: int | None = None) -> str:
     """Return aligned columns; the last one is wrapped to the width of the terminal."""
     sizes = [max(len(str(row[k])) for row in (head, *rows)) for k in range(len(head) - 1)]
     indent = sum(sizes) + 2 * len(sizes) + 2
@@ -54,7 +57,7 @@ def text_table(head, rows, width=None):
     return '\n'.join(lines)
 
 
-def _entry(entry):
+def _entry(entry: dict[str, Any]) -> str:
     lines = [f'{entry["name"]} ({entry["kind"]})', *_wrapped(entry['sentence'], ''), '']
     for what, value in facts(entry):
         lines += _wrapped(f'{what}: {value}', '  ')
@@ -65,9 +68,9 @@ def _entry(entry):
     return '\n'.join(lines)
 
 
-def _wrapped(value, indent):
+def _wrapped(value: str, indent: str) -> list[str]:
     return textwrap.wrap(value, _width(), initial_indent=indent, subsequent_indent=indent + '  ')
 
 
-def _width():
+def _width() -> int:
     return min(max(shutil.get_terminal_size((99, 24)).columns, 60), 140)

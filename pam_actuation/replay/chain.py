@@ -26,6 +26,7 @@ from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+import os
 from typing import Any
 
 import numpy as np
@@ -237,6 +238,9 @@ def _controller(run: Run, rig: Rig, controller: object) -> object:
         return None
     run.require('controller_state')
     run.require('reference')
-    if controller is None:      # what ran is repeated, whatever it was made for
-        return load_controller(own, rig, accept_other_rig=True)
-    return controller if hasattr(controller, 'step') else load_controller(controller, rig)
+    if isinstance(controller, (str, os.PathLike)):
+        return load_controller(controller, rig)
+    if controller is not None:
+        return controller
+    assert own is not None      # what ran is repeated, whatever it was made for
+    return load_controller(own, rig, accept_other_rig=True)

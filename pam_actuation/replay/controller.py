@@ -20,8 +20,10 @@ used; the replay fetches exactly these measurements from their topics, steps a
 fresh controller and compares commands and internals bit for bit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import os
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.config import load_controller
@@ -30,8 +32,13 @@ from pam_actuation.control.tick import (
     HELD_BACK, input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_sim.run import Run, Series
 
 # Input of a tick -> (topic it came from, field of that topic).
 _MEASURED = {
@@ -79,10 +86,10 @@ class ReplayResult:
     ticks: int
     commands_missing: int = 0
     differing_states: dict = field(default_factory=dict)
-    controller: object = None
+    controller: Any = None
     states: dict = field(default_factory=dict)
 
-    def sentence(self):
+    def sentence(self) -> str:
         """Return the outcome in one sentence."""
         if self.identical:
             return f'{self.ticks} controller ticks replayed, commands and internals bit-identical'
@@ -91,7 +98,9 @@ class ReplayResult:
                 f'{self.max_abs_difference_pa:g} Pa; differing: {where or "commands"}')
 
 
-def replay_controller(run, controller=None, keep_states=False, progress=None):
+def replay_controller(run: 'Run', controller: 'CompiledController | None' = None,
+                      keep_states: bool = False,
+                      progress: Callable[..., Any] | None = None) -> ReplayResult:
     """
     Replay the controller of a recording.
 
@@ -178,12 +187,12 @@ def replay_controller(run, controller=None, keep_states=False, progress=None):
         differing, controller, dict(zip(core.names, kept.T)) if keep_states else {})
 
 
-def _same(a, b):
+def _same(a: float, b: float) -> bool:
     """Return whether two floats are the same bits, all NaN being one."""
     return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
 
 
-def _columns(states, unit, path):
+def _columns(states: 'Series', unit: str, path: str) -> dict[str, FloatArray]:
     """Return the columns of ``controller_state``, refusing foreign ones."""
     if f'reference_{unit}' not in states.values and any(
             f'reference_{one.unit}' in states.values for one in TRACKED.values()):
@@ -199,7 +208,7 @@ def _columns(states, unit, path):
     return columns
 
 
-def _check_complete(columns, order, path):
+def _check_complete(columns: dict[str, FloatArray], order: IntArray, path: str) -> None:
     """Raise InputError unless the ticks run from 0 without a hole and with the same rules."""
     ticks = columns['tick'][order]
     if len(ticks) == 0 or ticks[0] != 0:
@@ -218,7 +227,7 @@ def _check_complete(columns, order, path):
             'it', path)
 
 
-def _lookup(run, topic):
+def _lookup(run: 'Run', topic: str) -> dict[int, float]:
     """Return {stamp: value} of a measured topic; empty if it was not recorded."""
     if topic not in run:
         return {}
@@ -226,7 +235,8 @@ def _lookup(run, topic):
     return dict(zip(series.stamp_ns.tolist(), series.values[_MEASURED[topic][1]].tolist()))
 
 
-def _inputs(columns, row, lookups, unit, path):
+def _inputs(columns: dict[str, FloatArray], row: int, lookups: dict[str, dict[int, float]],
+            unit: str, path: str) -> TickInputs:
     """Return the ``TickInputs`` of one recorded tick, measurements taken from their topics."""
     stamps = tuple(
         join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])

@@ -14,10 +14,12 @@
 
 """The page: sections in order, written as one self-contained HTML file."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import html
 from itertools import zip_longest
 import json
+from typing import Any
 
 from pam_actuation.report.assets import CSS, SCRIPT
 from pam_sim.errors import InputError
@@ -38,17 +40,17 @@ class Section:
     group: bool = False
 
 
-def text(value):
+def text(value: object) -> str:
     """Return a value as escaped HTML text."""
     return html.escape(str(value), quote=True)
 
 
-def paragraph(value, kind=''):
+def paragraph(value: str, kind: str = '') -> str:
     """Return an escaped paragraph, ``kind`` being a CSS class such as ``note``."""
     return f'<p class="{kind}">{text(value)}</p>' if kind else f'<p>{text(value)}</p>'
 
 
-def plot(figure, caption=''):
+def plot(figure: dict[str, Any], caption: str = '') -> str:
     """Return the HTML of one figure; its data are JSON beside it, drawn when scrolled to."""
     # '<' may not stand in a script element: '</script>' in a name would end it.
     data = json.dumps(figure, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
@@ -58,14 +60,14 @@ def plot(figure, caption=''):
             f'<script type="application/json">{data}</script></div>{note}</figure>')
 
 
-def table(head, rows, kind=''):
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], kind: str = '') -> str:
     """
     Return an HTML table; cells are escaped, None becomes a dash.
 
     On a phone each row becomes a card in which every cell has its heading beside it. A table
     of the kind ``grid``, whose columns say nothing alone, scrolls instead.
     """
-    def cell(value):
+    def cell(value: object) -> str:
         return '–' if value is None else text(value)
     top = ''.join(f'<th>{cell(v)}</th>' for v in head)
     top = f'<thead><tr>{top}</tr></thead>' if head else ''
@@ -80,13 +82,13 @@ def table(head, rows, kind=''):
     return f'<div class="scroll"><table class="{kind}">{top}<tbody>{body}</tbody></table></div>'
 
 
-def signed(value, digits=0):
+def signed(value: float, digits: int = 0) -> str:
     """Return a number with its sign as text; what rounds to zero has none."""
     shown = f'{value:+.{digits}f}'
     return shown[1:] if float(shown) == 0.0 else shown
 
 
-def key_numbers(numbers):
+def key_numbers(numbers: list[tuple[str, str, str, str]]) -> str:
     """
     Return the HTML of the numbers a reader should see first.
 
@@ -103,7 +105,9 @@ def key_numbers(numbers):
     return f'<div class="numbers">{cells}</div>'
 
 
-def render(title, lead, sections, numbers=(), footer='', of=''):
+def render(title: str, lead: str, sections: list[Section],
+           numbers: list[tuple[str, str, str, str]] | tuple[()] = (), footer: str = '',
+           of: str = '') -> str:
     """
     Return the whole page as text.
 
@@ -139,14 +143,14 @@ def render(title, lead, sections, numbers=(), footer='', of=''):
             f'{_drawing(sections)}</body></html>\n')
 
 
-def _drawing(sections):
+def _drawing(sections: list[Section]) -> str:
     """Return the scripts that draw the plots; a page without plots carries none."""
     if not any('class="plot"' in section.body for section in sections):
         return ''
     return f'<script>{plotly_script()}</script><script>{SCRIPT}</script>'
 
 
-def plotly_script():
+def plotly_script() -> str:
     """Return plotly's bundled JavaScript, licence comment included."""
     try:
         from plotly.offline import get_plotlyjs

@@ -20,13 +20,19 @@ direction and two more axes is a grid per direction. Nothing here knows a table
 by its name.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.sofc.membership import SET_NAMES, SET_WORDS
 from pam_actuation.control.sofc.words import DIRECTION, number, shown
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import Antecedent, RuleBase, RuleTable
 
 SHOWN_KPA = 0.005          # what two digits of a number show
 _SHORT = dict(zip(SET_WORDS, SET_NAMES))
@@ -44,16 +50,16 @@ class Axis:
 
     name: str
     unit: str
-    values: np.ndarray
-    names: tuple = ()
+    values: FloatArray
+    names: tuple[str, ...] = ()
 
     @property
-    def title(self):
+    def title(self) -> str:
         """Name with unit."""
         return f'{self.name} [{self.unit}]' if self.unit else self.name
 
     @property
-    def labels(self):
+    def labels(self) -> tuple[str, ...]:
         """One text per knot."""
         if not self.unit:
             return self.names
@@ -75,21 +81,21 @@ class Grid:
     title: str
     rows: Axis
     columns: Axis
-    values: np.ndarray
-    before: np.ndarray
-    fired_s: np.ndarray
+    values: FloatArray
+    before: FloatArray
+    fired_s: FloatArray
 
     @property
-    def change(self):
+    def change(self) -> FloatArray:
         """Return what was changed [kPa]."""
         return self.values - self.before
 
     @property
-    def never(self):
+    def never(self) -> BoolArray:
         """Which rules never fired."""
         return self.fired_s <= 0.0
 
-    def firing(self, mark=''):
+    def firing(self, mark: str = '') -> str:
         """
         Return in words how many rules never fired, ``mark`` being how these are marked.
 
@@ -104,7 +110,7 @@ class Grid:
             'another file, not from running')
 
 
-def grids(rules, before=None):
+def grids(rules: 'RuleBase', before: 'RuleBase | None' = None) -> list[Grid]:
     """
     Return all rules of a rule base as grids.
 
@@ -121,7 +127,7 @@ def grids(rules, before=None):
         The two have not the same antecedents.
 
     """
-    earlier = [None] * len(rules.tables())
+    earlier: Sequence[RuleTable | None] = [None] * len(rules.tables())
     if before is not None:
         check_comparable(rules, before)
         earlier = before.tables()
@@ -130,7 +136,7 @@ def grids(rules, before=None):
             for grid in _of_table(table, other, rate_hz)]
 
 
-def check_comparable(rules, other, where=''):
+def check_comparable(rules: 'RuleBase', other: 'RuleBase', where: str = '') -> None:
     """Raise InputError unless the rules of two bases stand for the same places."""
     mine, theirs = (one.tables() for one in (rules, other))
     for table, second in zip(mine, theirs):
@@ -145,30 +151,35 @@ def check_comparable(rules, other, where=''):
                     f'{_span(b)} there and from {_span(a)} here', where)
 
 
-def _span(antecedent):
+def _span(antecedent: 'Antecedent') -> str:
     ends = [shown(float(antecedent.knots[k]), antecedent.unit) for k in (0, -1)]
     return f'{number(ends[0][0])} to {number(ends[1][0])} {ends[1][1]}'.rstrip()
 
 
-def _of_table(table, other, rate_hz):
+def _of_table(table: 'RuleTable', other: 'RuleTable | None', rate_hz: float) -> list[Grid]:
     """Return the grids of one table."""
     now = table.values * table.scale * 1e-3
     then = (table.initial * table.scale if other is None else other.values * other.scale) * 1e-3
-    arrays = (now, then, table.fired / rate_hz)
+    arrays = [now, then, table.fired / rate_hz]
     axes = [_axis(antecedent) for antecedent in table.antecedents]
     if len(axes) == 1:
         axes.append(Axis('', '', np.zeros(1), ('',)))
-        arrays = tuple(array[:, None] for array in arrays)
+        arrays = [array[:, None] for array in arrays]
     if len(axes) == 2:
         # Directions side by side, knots below each other.
         if axes[0].name == DIRECTION:
-            axes, arrays = axes[::-1], tuple(array.T for array in arrays)
-        return [Grid(f'{table.name} rules', *axes, *arrays)]
-    return [Grid(f'{table.name} rules, {name}', *axes[1:], *(array[d] for array in arrays))
+            axes, arrays = axes[::-1], [array.T for array in arrays]
+        return [_grid(f'{table.name} rules', axes, arrays)]
+    return [_grid(f'{table.name} rules, {name}', axes[1:], [array[d] for array in arrays])
             for d, name in enumerate(axes[0].names)]
 
 
-def _axis(antecedent):
+def _grid(title: str, axes: list[Axis], arrays: list[FloatArray]) -> Grid:
+    (rows, columns), (values, before, fired_s) = axes, arrays
+    return Grid(title, rows, columns, values, before, fired_s)
+
+
+def _axis(antecedent: 'Antecedent') -> Axis:
     values, unit = shown(np.asarray(antecedent.knots, dtype=float), antecedent.unit)
     return Axis(antecedent.name, unit, values,
                 tuple(_SHORT.get(word, word) for word in antecedent.words))

@@ -14,15 +14,22 @@
 
 """Rules as one self-contained HTML page: heat maps, changes, firing, sentences."""
 
+from typing import TYPE_CHECKING
+
 from pam_actuation.control.sofc.words import number
 from pam_actuation.report import svg
 from pam_actuation.report.page import paragraph, render, Section, table
+
+if TYPE_CHECKING:
+    from pam_actuation.rules.grids import Grid
+    from pam_actuation.rules.source import FoundRules
+    from pam_actuation.rules.view import View
 
 _LEAD = ('What each rule adds to the pressure command, what was changed, and how long each rule '
          'acted. Pressures are in kPa.')
 
 
-def page(found, view, top):
+def page(found: 'FoundRules', view: 'View', top: int) -> str:
     """
     Return the page as text.
 
@@ -47,7 +54,7 @@ def page(found, view, top):
                   'This page needs no network.')
 
 
-def chart(grid, since):
+def chart(grid: 'Grid', since: str) -> str:
     """Return the figure of one grid as SVG text: lines over few columns, else heat maps."""
     if len(grid.columns.values) <= 2:
         versions = [('before', grid.before), ('now', grid.values)][not grid.before.any():]
@@ -64,7 +71,7 @@ def chart(grid, since):
         (grid.columns.title, grid.rows.title, 'kPa'), grid.title)
 
 
-def _grid(grid, since):
+def _grid(grid: 'Grid', since: str) -> str:
     """Return figure and firing of one grid as HTML."""
     if grid.never.all() and not grid.values.any() and not grid.change.any():
         return paragraph('All zero, never fired.')
@@ -80,7 +87,7 @@ def _grid(grid, since):
     return body
 
 
-def _words(view, top):
+def _words(view: 'View', top: int) -> str:
     """Return the most important rules as a table."""
     if not view.spoken:
         return paragraph('No rule acts: all that fired are zero.')

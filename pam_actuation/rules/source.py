@@ -14,13 +14,21 @@
 
 """Rules from what a user names: a rule file, a controller, a preset, or a recording."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc.persistence import load_rules
+from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 SAVED_NAME = 'rules.json'
 _BAG_ENDINGS = ('.mcap', '.db3')
@@ -39,14 +47,17 @@ class FoundRules:
 
     title: str
     kind: str
-    rules: object
-    before: object = None
+    rules: RuleBase
+    before: RuleBase | None = None
     since: str = 'the initial rules'
-    remarks: tuple = ()
-    implausible: tuple = ()
+    remarks: tuple[str, ...] = ()
+    implausible: tuple[str, ...] = ()
 
 
-def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
+def find_rules(name: Path | str, rig: 'Callable[[], Rig | JointRig] | None' = None,
+               namespace: str | None = None,
+               recover: bool = False,
+               progress: Callable[[float], object] | None = None) -> FoundRules:
     """
     Return the rules a user names.
 
@@ -78,11 +89,11 @@ def find_rules(name, rig=None, namespace=None, recover=False, progress=None):
     controller = load_controller(
         name, None if rig is None else rig(), accept_other_rig=True)     # it is read, not run
     if controller.rules is None:
-        raise InputError(f'a {controller.kind} controller has no rules', name)
+        raise InputError(f'a {controller.kind} controller has no rules', str(name))
     return FoundRules(path.stem, 'controller', controller.rules)
 
 
-def saved_beside(path):
+def saved_beside(path: Path) -> Path:
     """Return where rules learned in a recording are kept: in its folder, or beside its file."""
     path = Path(path)
     if path.name == 'metadata.yaml':
@@ -90,7 +101,8 @@ def saved_beside(path):
     return path / SAVED_NAME if path.is_dir() else path.with_suffix(f'.{SAVED_NAME}')
 
 
-def _of_recording(path, namespace, recover, progress):
+def _of_recording(path: Path, namespace: str | None, recover: bool,
+                  progress: Callable[[float], object] | None) -> FoundRules:
     """Return the rules of a recording, with what cannot be right in its values."""
     from pam_actuation.bags.load import load_run
     run = load_run(path, namespace=namespace, recover=recover)
@@ -99,7 +111,8 @@ def _of_recording(path, namespace, recover, progress):
                    implausible=run.implausible)
 
 
-def _of_run(run, path, progress):
+def _of_run(run: 'RecordedRun', path: Path,
+            progress: Callable[[float], object] | None) -> FoundRules:
     """Return the rules at the end of a recording, and those at its start."""
     from pam_actuation.replay.controller import replay_controller
     text = run.metadata.get('controller')
@@ -111,7 +124,8 @@ def _of_run(run, path, progress):
             f'the recording was made with a {controller.kind} controller, which has no rules',
             os.fspath(path))
     before = controller.rules
-    since, title, remarks = 'the rules at its start', path.resolve().name, []
+    since, title = 'the rules at its start', path.resolve().name
+    remarks: list[str] = []
     saved = saved_beside(path)
     if saved.is_file():
         return FoundRules(title, 'recording', load_rules(saved, before), before, since,

@@ -14,9 +14,17 @@
 
 """Rules in the terminal: aligned grids, coloured where there are colours, and sentences."""
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.control.sofc.words import number
-from pam_actuation.rules.grids import SHOWN_KPA as _LEAST_KPA
+from pam_actuation.rules.grids import Grid, SHOWN_KPA as _LEAST_KPA
+from pam_sim.annotations import BoolArray
+
+if TYPE_CHECKING:
+    from pam_actuation.rules.source import FoundRules
+    from pam_actuation.rules.view import View
 
 NEVER = '·'
 _GAP = 2
@@ -26,7 +34,8 @@ _ADD, _TAKE = (223, 215, 208, 202), (153, 111, 69, 33)
 _DIM, _PLAIN = '\x1b[2m', '\x1b[0m'
 
 
-def as_text(found, view, top, width=99, colour=False):
+def as_text(found: 'FoundRules', view: 'View', top: int, width: int = 99,
+            colour: bool = False) -> str:
     """
     Return rules as text for a terminal.
 
@@ -51,7 +60,7 @@ def as_text(found, view, top, width=99, colour=False):
     return '\n'.join(lines)
 
 
-def _grid(grid, since, width, colour):
+def _grid(grid: Grid, since: str, width: int, colour: bool) -> list[str]:
     """Return the lines of one grid: values, then changes and firing where there are any."""
     shown, rows, columns = _trimmed(grid)
     if not shown.any():
@@ -69,11 +78,12 @@ def _grid(grid, since, width, colour):
         legend.append(f'{left_out} rules at the borders are zero and never fired')
     lines += [f'  ({"; ".join(legend)})'] if legend else []
     values = _part(rows, columns, lambda r, c: _value(
-        grid.values[r, c], grid.never[r, c], limit, colour))
+        float(grid.values[r, c]), bool(grid.never[r, c]), limit, colour))
     largest = float(np.max(np.abs(grid.change)))
     changes = _part(rows, columns, lambda r, c: _value(
-        grid.change[r, c], abs(grid.change[r, c]) < _LEAST_KPA, largest, colour, ''))
-    fired = _part(rows, columns, lambda r, c: _seconds(grid.fired_s[r, c], colour))
+        float(grid.change[r, c]), abs(float(grid.change[r, c])) < _LEAST_KPA, largest, colour,
+        ''))
+    fired = _part(rows, columns, lambda r, c: _seconds(float(grid.fired_s[r, c]), colour))
     names = [grid.columns.labels[c] for c in columns]
     labels = [grid.rows.labels[r] for r in rows]
     parts = [('', values), ('changed by', changes), ('fired, s', fired)]
@@ -97,22 +107,25 @@ def _grid(grid, since, width, colour):
     return lines
 
 
-def _part(rows, columns, cell):
+def _part(rows: range, columns: range,
+          cell: Callable[[int, int], tuple[str, str]]) -> list[list[tuple[str, str]]]:
     """Return one cell, (plain, painted), per rule that is shown."""
     return [[cell(r, c) for c in columns] for r in rows]
 
 
-def _trimmed(grid):
+def _trimmed(grid: Grid) -> tuple[BoolArray, range, range]:
     """Return what is worth showing, and the rows and columns between whose ends it lies."""
     shown = ~grid.never | (grid.values != 0.0) | (grid.change != 0.0)
     ends = []
     for axis in (1, 0):
         places = np.flatnonzero(shown.any(axis=axis))
         ends.append(range(places[0], places[-1] + 1) if len(places) else range(0))
-    return shown, *ends
+    rows, columns = ends
+    return shown, rows, columns
 
 
-def _block(labels, names, cells, width):
+def _block(labels: list[str], names: list[str], cells: list[list[tuple[str, str]]],
+           width: int) -> list[str]:
     """Return the lines of a table, broken into blocks of columns that fit the width."""
     head = max(map(len, labels))
     size = max([len(plain) for row in cells for plain, _ in row] + [*map(len, names)])
@@ -129,21 +142,22 @@ def _block(labels, names, cells, width):
     return lines
 
 
-def _value(value, dim, limit, colour, mark=NEVER):
+def _value(value: float, dim: bool, limit: float, colour: bool,
+           mark: str = NEVER) -> tuple[str, str]:
     """Return a number as (plain, painted) text; what never fired is marked."""
     plain = f'{value:+.2f}' if abs(value) >= _LEAST_KPA else '0'
     plain += mark if dim else ' ' * len(mark)
     return plain, _painted(plain, value / limit if limit else 0.0, dim) if colour else plain
 
 
-def _seconds(value, colour):
+def _seconds(value: float, colour: bool) -> tuple[str, str]:
     if value <= 0.0:
         return NEVER, f'{_DIM}{NEVER}{_PLAIN}' if colour else NEVER
     plain = '<0.01' if value < 0.01 else f'{value:.2f}' if value < 10.0 else number(value)
     return plain, plain
 
 
-def _painted(plain, share, dim):
+def _painted(plain: str, share: float, dim: bool) -> str:
     """Return a text in the colour of a share -1 to 1 of the largest size."""
     if dim:
         return f'{_DIM}{plain}{_PLAIN}'
@@ -152,7 +166,7 @@ def _painted(plain, share, dim):
     return plain if share == 0.0 else f'\x1b[38;5;{scale[step]}m{plain}{_PLAIN}'
 
 
-def _sentences(view, top):
+def _sentences(view: 'View', top: int) -> list[str]:
     """Return the most important rules in words."""
     spoken = view.spoken[:top]
     if not view.spoken:

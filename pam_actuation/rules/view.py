@@ -15,12 +15,19 @@
 """What there is to show of rules: grids, changes, firing, sentences."""
 
 from dataclasses import dataclass
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.sofc.persistence import identity_parts
 from pam_actuation.control.sofc.words import ranked
 from pam_actuation.rules.grids import check_comparable, grids
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase, RuleTable
+    from pam_actuation.control.sofc.words import SpokenRule
+    from pam_actuation.rules.grids import Grid
+    from pam_actuation.rules.source import FoundRules
 
 SCHEMA = 1
 
@@ -34,19 +41,19 @@ class View:
     what changes are counted against, in words.
     """
 
-    rules: object
-    before: object
-    grids: tuple
-    spoken: tuple
+    rules: 'RuleBase'
+    before: 'RuleBase | None'
+    grids: 'tuple[Grid, ...]'
+    spoken: 'tuple[SpokenRule, ...]'
     since: str
-    remarks: tuple = ()
+    remarks: tuple[str, ...] = ()
 
     @property
-    def fired(self):
+    def fired(self) -> bool:
         """Whether any rule has fired."""
         return any(not grid.never.all() for grid in self.grids)
 
-    def summary(self):
+    def summary(self) -> str:
         """Return in words how many rules there are, fired and changed."""
         count = sum(grid.values.size for grid in self.grids)
         never = sum(int(grid.never.sum()) for grid in self.grids)
@@ -57,7 +64,7 @@ class View:
             return f'{text}none differs from {self.since}'
         return f'{text}{changed} differ from {self.since} (by up to {largest:.2f} kPa)'
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``, SI."""
         earlier = (self.rules if self.before is None else self.before).tables()
         return {
@@ -72,7 +79,7 @@ class View:
                 for one in self.spoken]}
 
 
-def view_of(found, against=None):
+def view_of(found: 'FoundRules', against: 'FoundRules | None' = None) -> View:
     """
     Return the View of FoundRules.
 
@@ -89,7 +96,8 @@ def view_of(found, against=None):
         The two stand for other places.
 
     """
-    before, since, remarks = found.before, found.since, []
+    before, since = found.before, found.since
+    remarks: list[str] = []
     mode = identity_parts(found.rules.scaling.get('rig'))[2]
     if mode not in ('', 'contraction'):
         remarks.append(f'What is tracked is not a contraction ({mode}): places, rates and errors '
@@ -108,12 +116,12 @@ def view_of(found, against=None):
                 tuple(ranked(found.rules)), since, tuple(remarks))
 
 
-def _other_scaling(mine, theirs):
+def _other_scaling(mine: dict[str, float], theirs: dict[str, float]) -> list[str]:
     return [f'{name} ({mine.get(name)} and {theirs.get(name)})'
             for name in sorted(set(mine) | set(theirs)) if mine.get(name) != theirs.get(name)]
 
 
-def _table(table, other, from_initial):
+def _table(table: 'RuleTable', other: 'RuleTable', from_initial: bool) -> dict[str, Any]:
     """Return one table as plain data, outputs in Pa."""
     now = table.values * table.scale
     then = (other.initial if from_initial else other.values) * other.scale

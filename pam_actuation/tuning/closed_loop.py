@@ -20,11 +20,15 @@ controller on it. The same compiled steps as in the live nodes are used
 (controller, driver law, plant), only the clock differs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import functools
 import math
+from types import ModuleType
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
@@ -32,16 +36,25 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.loop_module import load_loops
 from pam_actuation.tuning.loop_parts import DISTURBANCE
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
-from pam_actuation.tuning.tracking_errors import TrackingErrors
+    DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.short_repr import short_repr
 
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.drivers.config import DriverConfig
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
+
+Course = Callable[[float], float]        # of the time [s]
+
 
 @functools.cache
-def compiled_rollouts():
+def compiled_rollouts() -> ModuleType:
     """Return the module with a rollout per kind of controller, compiled for this kernel."""
     return load_loops(
         'pam_closed_loop', 'rollout_template.py',
@@ -58,33 +71,36 @@ class LoopResult(TrackingErrors):
     are those of the muscle. ``cycle_s`` is (start, period, count) of the periodic part or None.
     """
 
-    time_s: np.ndarray
-    reference_m: np.ndarray
-    contraction_m: np.ndarray
-    pressure_pa: np.ndarray
-    command_pa: np.ndarray
-    force_n: np.ndarray
-    signal: np.ndarray
-    cycle_s: tuple = None
-    controller: object = field(default=None, repr=False)
+    time_s: FloatArray
+    reference_m: FloatArray
+    contraction_m: FloatArray
+    pressure_pa: FloatArray
+    command_pa: FloatArray
+    force_n: FloatArray
+    signal: FloatArray
+    cycle_s: Cycles | None = None
+    controller: 'CompiledController | None' = field(default=None, repr=False)
 
     @property
-    def error_m(self):
+    def error_m(self) -> FloatArray:
         """Return reference minus contraction [m]."""
         return self.reference_m - self.contraction_m
 
-    error = error_m
+    @property
+    def error(self) -> FloatArray:
+        """Return reference minus contraction [m]."""
+        return self.error_m
 
-    def rmse_m(self, start_s=0.0, end_s=math.inf):
+    def rmse_m(self, start_s: float = 0.0, end_s: float = math.inf) -> float:
         """Return the root mean square error [m] within a span of time."""
         return self.rmse(start_s, end_s)
 
-    def cycle_rmse_m(self):
+    def cycle_rmse_m(self) -> FloatArray:
         """Return the root mean square error [m] of every cycle, shape (cycles,)."""
         return self.cycle_rmse()
 
 
-class ClosedLoop:
+class MuscleLoop:
     """
     A rig, an experiment and one realisation of the sensor noise.
 
@@ -116,10 +132,11 @@ class ClosedLoop:
 
     """
 
-    DOMAIN = 'contraction'
+    DOMAIN: str
 
-    def __init__(self, rig, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
-                 external_force_n=None, driver=None, supply_pa=None):
+    def __init__(self, rig: 'Rig', experiment: 'Experiment', seed: int = 0, rate_hz: float = 200.0,
+                 latency_s: float = 0.003, external_force_n: Course | None = None,
+                 driver: 'DriverConfig | None' = None, supply_pa: Course | None = None) -> None:
         self._arguments = (
             rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa)
         if experiment.domain != self.DOMAIN:
@@ -147,22 +164,39 @@ class ClosedLoop:
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, self._driver.every, latency)
 
-    def __reduce__(self):
-        """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
-        return ClosedLoop, self._arguments
-
     @property
-    def reference_m(self):
+    def reference_m(self) -> FloatArray:
         """Wanted contraction [m] at every tick."""
         return self._position[:self.ticks]
 
     @property
-    def start_tick(self):
+    def start_tick(self) -> int:
         """First tick of the periodic part, of the whole where there is none."""
         cycles = self.experiment.cycles
         return 0 if cycles is None else int(cycles[0] * self.rate_hz)
 
-    def run(self, controller, learn=True):
+    def _fresh_plant(
+            self,
+            contraction_m: float = 0.0) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return new state, par, inp, out of the plant at its start."""
+        from pam_sim.rollout.kernel import look
+        inputs = zeros(layout.INPUT)
+        fields(inputs, layout.INPUT).contraction_m = contraction_m
+        plant = (self._state.copy(), self._par.copy(), inputs, zeros(layout.OUTPUT))
+        look(*plant)
+        return plant
+
+
+class ClosedLoop(MuscleLoop):
+    """A muscle with its load, tracking a wanted contraction; see ``MuscleLoop``."""
+
+    DOMAIN = 'contraction'
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
+        return ClosedLoop, self._arguments
+
+    def run(self, controller: 'CompiledController', learn: Learns = True) -> LoopResult:
         """
         Track the experiment; the controller's rules change in place.
 
@@ -195,7 +229,8 @@ class ClosedLoop:
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)
 
-    def run_raw(self, controller, learn=True):
+    def run_raw(self, controller: 'CompiledController',
+                learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollout_template`` for every tick, shape (ticks,)."""
         module = compiled_rollouts()
         controller.pause()
@@ -208,12 +243,3 @@ class ClosedLoop:
             learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.compiled_arguments(), controller.input_array, log)
         return log.view(module.LOG)
-
-    def _fresh_plant(self, contraction_m=0.0):
-        """Return new state, par, inp, out of the plant at its start."""
-        from pam_sim.rollout.kernel import look
-        inputs = zeros(layout.INPUT)
-        fields(inputs, layout.INPUT).contraction_m = contraction_m
-        plant = (self._state.copy(), self._par.copy(), inputs, zeros(layout.OUTPUT))
-        look(*plant)
-        return plant

@@ -15,6 +15,7 @@
 """What tuning minimises: tracking error in mm, late errors more than early ones."""
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 
 LATE_SHARE = 0.3          # of the experiment, counted from its end
 _EARLY_WEIGHT = 0.25
@@ -22,7 +23,7 @@ _WORST_WEIGHT = 0.1
 LOST_MM = 1e3             # cost of a run that is not finite
 
 
-def tracking_cost_mm(error_m, start_tick=0):
+def tracking_cost_mm(error_m: FloatArray, start_tick: int = 0) -> float:
     """
     Return the cost [mm] of one run.
 

@@ -18,18 +18,27 @@ Closed-loop rollouts in force mode: the force of an isometric or driven muscle i
 The same compiled steps as in the live nodes, as in ``closed_loop``.
 """
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
-from pam_actuation.control.modes.tracked import FORCE, tracked_by
-from pam_actuation.tuning.closed_loop import ClosedLoop
-from pam_actuation.tuning.loop_setup import learning_mask
+import numpy.typing as npt
+from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
+from pam_actuation.tuning.closed_loop import Course, MuscleLoop
+from pam_actuation.tuning.loop_setup import learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.records import size_of
 
+if TYPE_CHECKING:
+    from pam_actuation.control.modes.force import ForceController
+    from pam_actuation.control.modes.wrapped import WrappedLaw
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
 
-class ForceLoop(ClosedLoop):
+
+class ForceLoop(MuscleLoop):
     """
     A rig with prescribed contraction, an experiment in force and one realisation of noise.
 
@@ -55,7 +64,8 @@ class ForceLoop(ClosedLoop):
 
     DOMAIN = FORCE.topic
 
-    def __init__(self, rig, experiment, contraction_m=None, **others):
+    def __init__(self, rig: 'Rig', experiment: 'Experiment',
+                 contraction_m: Course | float | None = None, **others: Any) -> None:
         if LOADS[rig.load].MOVES_FREELY:
             raise InputError(
                 f'load `{rig.load}` of {rig.name} moves freely; a force can be tracked on a load '
@@ -77,11 +87,11 @@ class ForceLoop(ClosedLoop):
         self._start_m = float(self._way_m[0])
         self._state, self._par = rig.pack(initial_contraction_m=self._start_m)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of."""
         return _made_of, self._made_of
 
-    def run(self, controller, learn=True):
+    def run(self, controller: 'ForceController', learn: Learns = True) -> ModeResult:
         """
         Track the experiment; the controller's rules change in place.
 
@@ -110,7 +120,7 @@ class ForceLoop(ClosedLoop):
             {name: log[name] for name in ('contraction_m', 'pressure_pa', 'command_pa')},
             self.experiment.cycles)
 
-    def run_raw(self, controller, learn=True):
+    def run_raw(self, controller: 'ForceController', learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``FORCE_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
         check_controller(controller, FORCE, self.rate_hz)
         module = compiled_modes()
@@ -126,11 +136,12 @@ class ForceLoop(ClosedLoop):
         return log.view(module.FORCE_LOG)
 
 
-def _made_of(rig, experiment, contraction_m, others):
+def _made_of(rig: 'Rig', experiment: 'Experiment', contraction_m: Course | float | None,
+             others: dict[str, Any]) -> 'ForceLoop':
     return ForceLoop(rig, experiment, contraction_m, **others)
 
 
-def check_controller(controller, tracked, rate_hz):
+def check_controller(controller: 'WrappedLaw', tracked: Tracked, rate_hz: float) -> None:
     """Raise InputError unless a controller has a mode, a self-organizing law and a rate."""
     if tracked_by(controller) != tracked:
         raise InputError(

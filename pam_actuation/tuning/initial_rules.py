@@ -22,13 +22,20 @@ when they start from them: the one from before, the one of the first (nominal)
 rig, and the mean over all rigs.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.tuning.problem import Problem, rebuild
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
+    from pam_actuation.tuning.workers import Workers
 
 _PASSES = 3                     # times a rig's experiments are tracked
 
 
-def initial_rules(workers, problem, settings):
+def initial_rules(workers: 'Workers', problem: Problem,
+                  settings: dict[str, float]) -> 'tuple[tuple[str, RuleBase, float], int]':
     """
     Return (name, rules, cost [mm]) of the best table for a start, and the rollouts it took.
 
@@ -47,6 +54,7 @@ def initial_rules(workers, problem, settings):
               for rig in rigs]
     learned = workers.map(_learn, problem, [(group, settings) for group in groups])
     before = rebuild(problem.controller, settings).rules
+    assert before is not None
     tables = [('as before', before), ('learned on the nominal rig', as_initial(learned[0]))]
     if len(learned) > 1:
         tables.append((f'mean of {len(learned)} rigs', as_initial(mean_rules(learned))))
@@ -56,10 +64,11 @@ def initial_rules(workers, problem, settings):
     means = np.mean(np.reshape(costs, (len(tables), -1)), axis=1)
     best = int(np.argmin(means))
     count = _PASSES * len(problem.loops) + len(costs)
-    return (*tables[best], float(means[best])), count
+    name, rules = tables[best]
+    return (name, rules, float(means[best])), count
 
 
-def mean_rules(several):
+def mean_rules(several: 'list[RuleBase]') -> 'RuleBase':
     """Return a rule base whose every rule is the mean of those of several."""
     mean = several[0].copy()
     for name in mean.NAMES:
@@ -67,7 +76,7 @@ def mean_rules(several):
     return mean
 
 
-def as_initial(rules):
+def as_initial(rules: 'RuleBase') -> 'RuleBase':
     """Return a copy whose present rules are its initial ones and which never fired."""
     fresh = rules.copy()
     for name in fresh.NAMES:
@@ -76,17 +85,18 @@ def as_initial(rules):
     return fresh
 
 
-def _learn(problem, task):
+def _learn(problem: Problem, task: tuple[list[int], dict[str, float]]) -> 'RuleBase':
     """Return the rules after tracking the experiments of one rig; run by workers."""
     group, settings = task
     controller = rebuild(problem.controller, settings)
     for _ in range(_PASSES):
         for i in reversed(group):
             problem.loops[i].run_raw(controller)
+    assert controller.rules is not None
     return controller.rules
 
 
-def _cost_from(problem, task):
+def _cost_from(problem: Problem, task: 'tuple[RuleBase, dict[str, float], int]') -> float:
     """Return the cost [mm] on one loop of settings that start from given rules."""
     rules, settings, i = task
     controller = rebuild(problem.controller, settings, rules)

@@ -18,18 +18,29 @@ Closed-loop rollouts in joint mode: two muscles turn a limb, the angle is tracke
 The same compiled steps as in the controller, drivers and joint, as in ``closed_loop``.
 """
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
+import numpy.typing as npt
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.joint_plant_loop import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
+from pam_actuation.tuning.closed_loop import Course
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, learning_mask, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
+
+if TYPE_CHECKING:
+    from pam_actuation.control.modes.joint import JointController
+    from pam_actuation.drivers.config import DriverConfig
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.joint.rig import JointRig
 
 
 class JointLoop:
@@ -64,9 +75,11 @@ class JointLoop:
 
     """
 
-    def __init__(self, joint, experiment, seed=0, rate_hz=200.0, latency_s=0.003,
-                 external_torque_n_m=None, angle_noise_rad=ANGLE_NOISE_RAD,
-                 angle_step_rad=ANGLE_STEP_RAD, drivers=None):
+    def __init__(self, joint: 'JointRig', experiment: 'Experiment', seed: int = 0,
+                 rate_hz: float = 200.0, latency_s: float = 0.003,
+                 external_torque_n_m: Course | None = None,
+                 angle_noise_rad: float = ANGLE_NOISE_RAD, angle_step_rad: float = ANGLE_STEP_RAD,
+                 drivers: 'Sequence[DriverConfig] | None' = None) -> None:
         if experiment.domain != JOINT.topic:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -100,7 +113,7 @@ class JointLoop:
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, every, latency)
 
-    def run(self, controller, learn=True):
+    def run(self, controller: 'JointController', learn: Learns = True) -> ModeResult:
         """
         Track the experiment; the controller's rules change in place.
 
@@ -126,10 +139,11 @@ class JointLoop:
         log = self.run_raw(controller, learn)
         return ModeResult(
             'rad', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
-            log['angle_rad'], {name: log[name] for name in log.dtype.names if name != 'angle_rad'},
+            log['angle_rad'],
+            {name: log[name] for name in log.dtype.names or () if name != 'angle_rad'},
             self.experiment.cycles)
 
-    def run_raw(self, controller, learn=True):
+    def run_raw(self, controller: 'JointController', learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``JOINT_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
         check_controller(controller, JOINT, self.rate_hz)
         module = compiled_modes()

@@ -14,15 +14,18 @@
 
 """Closed loops compiled as modules of their own, made anew whenever a part of them changes."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
 from pam_actuation.tuning import loop_parts
-from pam_sim.compiled import source_key
+from pam_sim.compiled import Compiled, source_key
 from pam_sim.generated import generated_module
 from pam_sim.rollout import kernel
 
 
-def load_loops(name, template, controllers, also=''):
+def load_loops(name: str, template: str, controllers: Sequence[Compiled[..., float] | ModuleType],
+               also: str = '') -> ModuleType:
     """
     Return a template of this folder as a module, compiled for the present code.
 

@@ -14,15 +14,25 @@
 
 """What a closed loop gets: timing, reference, sensor noise, where rules learn, driver laws."""
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.hsv import initial_state
 from pam_actuation.tuning.loop_parts import READINGS
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.modes.wrapped import WrappedLaw
+    from pam_actuation.drivers.config import DriverConfig
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
 
 PHYSICS_S = 0.001
 _MAX_LEAD_S = 0.5
@@ -31,8 +41,10 @@ _SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
             'contraction_m': ('contraction_noise_m', 'contraction_step_m'),
             'force_n': ('force_noise_n', 'force_step_n')}
 
+Learns = bool | Callable[[float], bool]       # whether, or a function of the time [s]
 
-def steps_per_tick(rate_hz):
+
+def steps_per_tick(rate_hz: float) -> int:
     """
     Return the number of physics steps in a controller period.
 
@@ -49,7 +61,8 @@ def steps_per_tick(rate_hz):
     return steps
 
 
-def sampled_reference(experiment, rate_hz):
+def sampled_reference(experiment: 'Experiment',
+                      rate_hz: float) -> tuple[int, FloatArray, FloatArray]:
     """Return (ticks, values, rates) of an experiment; the arrays reach beyond by a preview."""
     ticks = int(round(experiment.duration_s * rate_hz))
     ahead = int(math.ceil(_MAX_LEAD_S * rate_hz)) + 2
@@ -58,21 +71,23 @@ def sampled_reference(experiment, rate_hz):
             np.array([rate for _, rate in wanted], dtype=float))
 
 
-def sensor_noise(rig, ticks, seed):
+def sensor_noise(rig: 'Rig', ticks: int,
+                 seed: int | tuple[int, int]) -> tuple[FloatArray, FloatArray]:
     """
     Return the noise and the steps of a rig's sensors as arrays of ``READINGS``.
 
     One for every tick, one behind the other, and one.
     """
     sensors = dict(rig.sensors)
-    names = [_SENSORS[reading] for reading in READINGS.names]
+    names = [_SENSORS[reading] for reading in READINGS.names or ()]
     sigma = np.array([sensors.get(noise, 0.0) for noise, _ in names])
     steps = np.array([float(sensors.get(step, 0.0)) for _, step in names])
     noise = np.random.default_rng(seed).standard_normal((ticks, len(names))) * sigma
     return noise.ravel(), steps
 
 
-def learning_mask(controller, learn, ticks, rate_hz):
+def learning_mask(controller: 'CompiledController | WrappedLaw', learn: Learns, ticks: int,
+                  rate_hz: float) -> FloatArray:
     """
     Return 1.0 at every tick in which the rules may change, else 0.0.
 
@@ -91,7 +106,7 @@ class DriverLaw:
     Attributes: ``hsv`` tells which law it is, ``every`` the ticks per step of it.
     """
 
-    def __init__(self, rig, config, rate_hz):
+    def __init__(self, rig: 'Rig', config: 'DriverConfig', rate_hz: float) -> None:
         """Take the valve of ``rig`` and what the driver knows, a ``DriverConfig``."""
         self.hsv = rig.valve == 'hsv'
         self._hsv_config = config.hsv
@@ -99,7 +114,7 @@ class DriverLaw:
         period_s = config.hsv.period_s if self.hsv else 1.0 / rate_hz
         self.every = max(1, round(period_s * rate_hz))
 
-    def fresh(self):
+    def fresh(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return new state, par, out."""
         if self.hsv:
             return initial_state(), self._hsv_config.par(), zeros(hsv_kernel.OUTPUT)

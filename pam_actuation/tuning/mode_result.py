@@ -16,8 +16,8 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from pam_actuation.tuning.tracking_errors import TrackingErrors
+from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
+from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 
 
@@ -33,13 +33,13 @@ class ModeResult(TrackingErrors):
     """
 
     unit: str
-    time_s: np.ndarray
-    reference: np.ndarray
-    value: np.ndarray
-    signals: dict = field(default_factory=dict)
-    cycle_s: tuple = None
+    time_s: FloatArray
+    reference: FloatArray
+    value: FloatArray
+    signals: dict[str, FloatArray] = field(default_factory=dict)
+    cycle_s: Cycles | None = None
 
     @property
-    def error(self):
+    def error(self) -> FloatArray:
         """Return reference minus what was reached, in ``unit``."""
         return self.reference - self.value

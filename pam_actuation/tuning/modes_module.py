@@ -15,6 +15,7 @@
 """The compiled closed loops of ``modes_template``, made anew whenever a part of them changes."""
 
 import functools
+from types import ModuleType
 
 from pam_actuation.control.modes import force, joint
 from pam_actuation.control.sofc.step import sofc_step
@@ -23,7 +24,7 @@ from pam_sim.joint import kernel as joint_kernel
 
 
 @functools.cache
-def compiled_modes():
+def compiled_modes() -> ModuleType:
     """Return the module with ``force_rollout`` and ``joint_rollout``."""
     return load_loops(
         'pam_modes_loop', 'modes_template.py',

@@ -14,13 +14,21 @@
 
 """What a set of controller settings costs on a set of closed loops."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.control.lqi import LqiController
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.settings import SCALING
 from pam_actuation.tuning.cost import LOST_MM, tracking_cost_mm
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.sofc.rule_table import RuleBase
+    from pam_actuation.tuning.closed_loop import ClosedLoop
 
 
 class Problem:
@@ -35,11 +43,11 @@ class Problem:
 
     """
 
-    def __init__(self, loops, controller):
+    def __init__(self, loops: 'list[ClosedLoop]', controller: 'CompiledController') -> None:
         self.loops = list(loops)
         self.controller = controller
 
-    def costs_mm(self, settings):
+    def costs_mm(self, settings: dict[str, float]) -> FloatArray:
         """
         Return the cost [mm] of settings on every loop, shape (loops,).
 
@@ -57,17 +65,18 @@ class Problem:
             costs[i] = tracking_cost_mm(loop.reference_m - log['contraction_m'], loop.start_tick)
         return costs
 
-    def cost_mm(self, settings):
+    def cost_mm(self, settings: dict[str, float]) -> float:
         """Return the mean cost [mm] of settings over the loops."""
         return float(np.mean(self.costs_mm(settings)))
 
 
-def cost_of(problem, settings):
+def cost_of(problem: Problem, settings: dict[str, float]) -> float:
     """Return ``problem.cost_mm(settings)``: the function workers are given."""
     return problem.cost_mm(settings)
 
 
-def rebuild(controller, settings, rules=None):
+def rebuild(controller: 'CompiledController', settings: dict[str, float],
+            rules: 'RuleBase | None' = None) -> 'CompiledController':
     """
     Return a fresh controller of the same kind and rig with other settings.
 
@@ -79,10 +88,11 @@ def rebuild(controller, settings, rules=None):
     return fresh
 
 
-def _rebuilt(controller, merged, rules):
-    if controller.kind == 'pid':
+def _rebuilt(controller: 'CompiledController', merged: dict[str, float],
+             rules: 'RuleBase | None') -> 'CompiledController':
+    if isinstance(controller, PidController):
         return PidController(controller.static_inverse, merged, controller.rig_name)
-    if controller.kind == 'lqi':
+    if isinstance(controller, LqiController):
         return LqiController(controller.model, merged, controller.rig_name)
     if rules is None and all(merged[name] == controller.settings[name] for name in SCALING):
         rules = controller.rules

@@ -30,9 +30,15 @@ force map         gain times 0.85 to 1.15                     both
 The ranges are design values. Each is drawn evenly, independently of the others.
 """
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.rig import EffectSetting, Rig
 
 FRICTION_FACTOR = (0.5, 2.0)
 VALVE_FACTOR = (0.7, 1.3)
@@ -42,7 +48,7 @@ MASS_KG = (4.0, 5.5)
 FORCE_MAP_FACTOR = (0.85, 1.15)
 
 
-def random_rigs(rig, count, seed=0):
+def random_rigs(rig: 'Rig', count: int, seed: int = 0) -> 'list[Rig]':
     """
     Return rigs drawn about a given one.
 
@@ -65,7 +71,7 @@ def random_rigs(rig, count, seed=0):
     return [_drawn(rig, random.uniform(size=6)) for _ in range(count)]
 
 
-def _drawn(rig, part):
+def _drawn(rig: 'Rig', part: FloatArray) -> 'Rig':
     """Return the rig at a point of the unit cube."""
     friction = FRICTION_FACTOR[0] * (FRICTION_FACTOR[1] / FRICTION_FACTOR[0]) ** part[0]
     valve = _between(VALVE_FACTOR, part[1])
@@ -86,11 +92,11 @@ def _drawn(rig, part):
     return rig.with_(parameters=changed, effects=effects)
 
 
-def _between(ends, part):
+def _between(ends: tuple[float, float], part: float) -> float:
     return float(ends[0] + (ends[1] - ends[0]) * part)
 
 
-def _with_friction(setting, factor):
+def _with_friction(setting: 'EffectSetting', factor: float) -> 'EffectSetting | dict[str, Any]':
     """Return an effect of dry friction with its level scaled, any other as it is."""
     effect = get_effect(setting.name)
     if effect.family != 'friction':

@@ -22,6 +22,7 @@ commands, so the comparison shows how differently it acts, not how well.
 """
 
 from dataclasses import asdict, dataclass, field, replace
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.ending import ending_of
@@ -29,8 +30,15 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.replay.plant import replay_plant
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_sim.rig import Rig
+    from pam_sim.run import Run
 
 # Error of the free run as a share of the recorded range; design values.
 TRUSTED_SHARE = 0.03
@@ -51,13 +59,13 @@ class ModelCheck:
     rms: float
 
     @property
-    def verdict(self):
+    def verdict(self) -> str:
         """Return ``trusted``, ``doubtful`` or ``wrong``."""
         if self.share <= TRUSTED_SHARE:
             return 'trusted'
         return 'doubtful' if self.share <= DOUBTFUL_SHARE else 'wrong'
 
-    def sentence(self):
+    def sentence(self) -> str:
         """Return the outcome as one sentence."""
         size = f'{self.rms * 1e-3:.3g} kPa' if self.signal == 'pressure' \
             else f'{self.rms * 1e3:.3g} mm'
@@ -69,7 +77,7 @@ class ModelCheck:
         return (f'The model misses the recorded {self.signal} by {size} rms, '
                 f'{100 * self.share:.1f} % of its range: {says}.')
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {**asdict(self), 'verdict': self.verdict, 'sentence': self.sentence()}
 
@@ -90,11 +98,11 @@ class Counterfactual:
     at_s: float
     saturated: float
     recorded_saturated: float
-    time_s: np.ndarray = field(repr=False)
-    recorded_pa: np.ndarray = field(repr=False)
-    tuned_pa: np.ndarray = field(repr=False)
+    time_s: FloatArray = field(repr=False)
+    recorded_pa: FloatArray = field(repr=False)
+    tuned_pa: FloatArray = field(repr=False)
 
-    def sentence(self):
+    def sentence(self) -> str:
         """Return the outcome as one sentence."""
         return (
             f'On the recorded inputs the tuned controller, rules frozen, would have commanded '
@@ -103,7 +111,7 @@ class Counterfactual:
             f'{100 * self.saturated:.1f} % of {self.ticks} ticks (recorded: '
             f'{100 * self.recorded_saturated:.1f} %).')
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, float]:
         """Return plain data, without the arrays."""
         plain = {name: value for name, value in vars(self).items() if np.ndim(value) == 0}
         return {**plain, 'sentence': self.sentence()}
@@ -114,38 +122,42 @@ class RecordingCheck:
     """Both checks of one bag; one that was not possible is None and ``notes`` says why."""
 
     bag: str
-    model: ModelCheck = None
-    counterfactual: Counterfactual = None
-    notes: tuple = ()
+    model: ModelCheck | None = None
+    counterfactual: Counterfactual | None = None
+    notes: tuple[str, ...] = ()
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the outcome as sentences."""
         done = [one.sentence() for one in (self.model, self.counterfactual) if one is not None]
         return [f'{self.bag}: {text}' for text in (*done, *self.notes)]
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {'bag': self.bag, 'notes': list(self.notes), **{
             name: None if one is None else one.to_dict() for name, one in (
                 ('model', self.model), ('counterfactual', self.counterfactual))}}
 
 
-def check_recordings(runs, rig, controller):
+def check_recordings(runs: 'list[RecordedRun | Run]', rig: 'Rig',
+                     controller: 'CompiledController') -> list[RecordingCheck]:
     """Return a RecordingCheck of every run for a model and a tuned controller."""
     checks = []
     for run in runs:
-        found, notes = {}, [ending_of(run.metadata).sentence] * ending_of(run.metadata).early
-        for name, check, thing in (('model', check_model, rig),
-                                   ('counterfactual', counterfactual, controller)):
-            try:
-                found[name] = check(run, thing)
-            except InputError as error:
-                notes.append(f'No {name} check: {error.problem}.')
-        checks.append(RecordingCheck(str(run.path), notes=tuple(notes), **found))
+        notes = [ending_of(run.metadata).sentence] * ending_of(run.metadata).early
+        model, tuned = None, None
+        try:
+            model = check_model(run, rig)
+        except InputError as error:
+            notes.append(f'No model check: {error.problem}.')
+        try:
+            tuned = counterfactual(run, controller)
+        except InputError as error:
+            notes.append(f'No counterfactual check: {error.problem}.')
+        checks.append(RecordingCheck(str(run.path), model, tuned, tuple(notes)))
     return checks
 
 
-def check_model(run, rig):
+def check_model(run: 'Run', rig: 'Rig') -> ModelCheck:
     """
     Compare a model with a recording.
 
@@ -166,7 +178,7 @@ def check_model(run, rig):
     return worst
 
 
-def counterfactual(run, controller):
+def counterfactual(run: 'Run', controller: 'CompiledController') -> Counterfactual:
     """
     Step a controller over the inputs of a recording, its rules frozen.
 

@@ -20,11 +20,17 @@ has it. A cost of learning closed loops is rugged and cheap; a population that
 samples the whole box does not get stuck in the first valley.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 from scipy.optimize import differential_evolution
+
+if TYPE_CHECKING:
+    from scipy._lib._util import _FunctionWrapper
 
 SMALLEST = 5                    # members differential evolution needs
 MEMBERS = 24                    # fewer settle too early, also with few settings
@@ -41,12 +47,13 @@ class Found:
     reason: str
 
 
-def default_members(evaluations):
+def default_members(evaluations: int) -> int:
     """Return the size of a generation: 24, less where that leaves no ten generations."""
     return int(min(max(evaluations // 10, SMALLEST), MEMBERS))
 
 
-def minimise(costs_of, start, members, generations, seed, patience=0):
+def minimise(costs_of: Callable[..., Any], start: FloatArray, members: int, generations: int,
+             seed: int, patience: int = 0) -> Found:
     """
     Search the unit cube for the smallest cost.
 
@@ -72,7 +79,7 @@ def minimise(costs_of, start, members, generations, seed, patience=0):
     """
     best = {'cost': np.inf, 'since': 0}
 
-    def mapped(_, points):
+    def mapped(_: '_FunctionWrapper', points: FloatArray) -> list[float]:
         """Evaluate a whole generation; ``differential_evolution`` calls it as ``map``."""
         costs = costs_of([np.array(point) for point in points])
         best['since'] = 0 if min(costs) < best['cost'] else best['since'] + 1
@@ -90,7 +97,7 @@ def minimise(costs_of, start, members, generations, seed, patience=0):
                  f'no progress in {patience} generations' if stopped else 'budget used up')
 
 
-def _first_generation(start, members, seed):
+def _first_generation(start: FloatArray, members: int, seed: int) -> FloatArray:
     """Return the start, a cloud around it, and as many points anywhere in the unit cube."""
     random = np.random.default_rng(seed)
     near = start + random.normal(0.0, _NEAR, (members, len(start)))

@@ -16,9 +16,14 @@
 
 from dataclasses import dataclass
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ LQI_AXES = (
 )
 
 
-def default_axes(controller):
+def default_axes(controller: 'CompiledController') -> tuple[Axis, ...]:
     """
     Return the axes for a controller.
 
@@ -82,12 +87,13 @@ def default_axes(controller):
         return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
     from pam_actuation.control.sofc.settings import SCALING
     rules = controller.rules
-    learned = rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any()
+    learned = rules is not None and (
+        rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any())
     return tuple(axis for axis in SOFC_AXES if axis.name in controller.settings
                  and not (learned and axis.name in SCALING))
 
 
-def to_unit(axes, settings):
+def to_unit(axes: tuple[Axis, ...], settings: dict[str, float]) -> FloatArray:
     """Return settings as a point of the unit cube, clipped into it."""
     point = []
     for axis in axes:
@@ -99,7 +105,7 @@ def to_unit(axes, settings):
     return np.array(point)
 
 
-def from_unit(axes, point):
+def from_unit(axes: tuple[Axis, ...], point: FloatArray) -> dict[str, float]:
     """Return the settings of a point of the unit cube, four significant digits."""
     settings = {}
     for axis, part in zip(axes, point):
@@ -112,7 +118,7 @@ def from_unit(axes, point):
     return settings
 
 
-def check_axes(axes, settings):
+def check_axes(axes: tuple[Axis, ...], settings: dict[str, float]) -> None:
     """Raise InputError for an axis that is no setting of the controller or is empty."""
     for axis in axes:
         if axis.name not in settings:

@@ -17,7 +17,11 @@
 import math
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+
+
+Cycles = tuple[float, float, int]       # start [s], period [s], count
 
 
 class TrackingErrors:
@@ -28,14 +32,22 @@ class TrackingErrors:
     ``cycle_s``: (start, period, count) of the periodic part or None.
     """
 
-    def rmse(self, start_s=0.0, end_s=math.inf):
+    time_s: FloatArray
+    cycle_s: Cycles | None
+
+    @property
+    def error(self) -> FloatArray:
+        """Return reference minus what was reached."""
+        raise NotImplementedError
+
+    def rmse(self, start_s: float = 0.0, end_s: float = math.inf) -> float:
         """Return the root mean square error within a span of time."""
         chosen = (self.time_s >= start_s) & (self.time_s < end_s)
         if not chosen.any():
             raise InputError(f'no samples between {start_s} and {end_s} s')
         return float(np.sqrt(np.mean(self.error[chosen] ** 2)))
 
-    def cycle_rmse(self):
+    def cycle_rmse(self) -> FloatArray:
         """Return the root mean square error of every cycle, shape (cycles,)."""
         if self.cycle_s is None:
             raise InputError('the experiment has no periodic part')

@@ -21,8 +21,11 @@ judged on runs that were never searched. The same seed gives the same result
 with any number of ``workers``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 import time
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from pam_actuation.control.config import controller_to_yaml
 from pam_actuation.control.made_for import facts_of
@@ -31,11 +34,18 @@ from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.initial_rules import initial_rules
 from pam_actuation.tuning.problem import cost_of, Problem, rebuild
 from pam_actuation.tuning.search import default_members, minimise, SMALLEST
-from pam_actuation.tuning.space import check_axes, default_axes, from_unit, to_unit
+from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
 from pam_actuation.tuning.workers import Workers
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.drivers.config import DriverConfig
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
 
 HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
 _MARGIN_PA = 30e3         # of pressure above the static one: dry friction and acceleration
@@ -81,9 +91,9 @@ class TuneResult:
 
     """
 
-    controller: object
-    changed: dict
-    history: list
+    controller: 'CompiledController'
+    changed: dict[str, tuple[float, float]]
+    history: list[tuple[int, float]]
     cost_before: float
     cost_after: float
     held_out_before: float
@@ -95,16 +105,16 @@ class TuneResult:
     ended: str = ''
     rules: str = ''
     left_out: int = 0
-    axes: tuple = field(default=(), repr=False)
-    start: object = field(default=None, repr=False)
-    problem: object = field(default=None, repr=False)
-    check: object = field(default=None, repr=False)
+    axes: tuple[Axis, ...] = field(default=(), repr=False)
+    start: 'CompiledController | None' = field(default=None, repr=False)
+    problem: Problem | None = field(default=None, repr=False)
+    check: Problem | None = field(default=None, repr=False)
 
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return the tuned controller as YAML text for ``load_controller``."""
         return controller_to_yaml(self.controller)
 
-    def save(self, path, rules_path=None):
+    def save(self, path: Path, rules_path: Path | None = None) -> None:
         """
         Write the tuned controller to a file, whole or not at all.
 
@@ -124,7 +134,7 @@ class TuneResult:
         write_text(path, controller_to_yaml(self.controller, rules_file=rules_path),
                    parents=False)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the outcome as plain data."""
         return {
             'improved': self.improved,
@@ -135,7 +145,7 @@ class TuneResult:
             'changed': {name: {'before': before, 'after': after}
                         for name, (before, after) in self.changed.items()}}
 
-    def text(self):
+    def text(self) -> str:
         """Return the outcome for people."""
         verdict = 'better' if self.improved else 'not better: settings left as they were'
         lines = [
@@ -153,7 +163,7 @@ class TuneResult:
         return '\n'.join(lines)
 
 
-def reachable(rig, experiment, controller):
+def reachable(rig: 'Rig', experiment: 'Experiment', controller: 'CompiledController') -> bool:
     """Return whether a rig can hold an experiment's largest contraction with some to spare."""
     highest_m = experiment.chain.extremes()[1]
     limit_pa = P_ATM_PA + controller.settings['max_pressure_gauge_pa']
@@ -162,11 +172,16 @@ def reachable(rig, experiment, controller):
     return float(rig.static_pressure_pa(highest_m)) + _MARGIN_PA <= limit_pa
 
 
-def _as_list(thing):
+Thing = TypeVar('Thing')
+
+
+def _as_list(thing: Thing | list[Thing]) -> list[Thing]:
     return list(thing) if isinstance(thing, (list, tuple)) else [thing]
 
 
-def _loops(rigs, experiments, seed, controller, driver):
+def _loops(rigs: 'list[Rig]', experiments: 'list[Experiment]', seed: int,
+           controller: 'CompiledController',
+           driver: 'DriverConfig') -> tuple[list[ClosedLoop], int]:
     """Return the closed loops of all pairs that can be reached, and how many cannot."""
     for experiment in experiments:
         if experiment.domain != 'contraction':
@@ -174,16 +189,21 @@ def _loops(rigs, experiments, seed, controller, driver):
                 f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
                 'be tracked')
     pairs = [(rig, experiment) for rig in rigs for experiment in experiments]
-    kept = [pair for pair in pairs if reachable(*pair, controller)]
+    kept = [(rig, experiment) for rig, experiment in pairs
+            if reachable(rig, experiment, controller)]
     if not kept:
         raise InputError('no rig can reach any of the experiments', experiments[0].name)
     return [ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=driver)
             for rig, experiment in kept], len(pairs) - len(kept)
 
 
-def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None, axes=None,
-         held_out=None, population=None, patience=0, cluster=None, held_out_rigs=None,
-         learn_rules=True):
+def tune(rig: 'Rig | list[Rig]', controller: 'CompiledController',
+         experiment: 'Experiment | list[Experiment]', budget: int = 400, seed: int = 0,
+         jobs: int = 1, progress: Callable[[int], object] | None = None,
+         axes: tuple[Axis, ...] | None = None,
+         held_out: 'Experiment | list[Experiment] | None' = None,
+         population: int | None = None, patience: int = 0, cluster: str | None = None,
+         held_out_rigs: 'list[Rig] | None' = None, learn_rules: bool = True) -> TuneResult:
     """
     Tune settings and initial rules of a controller on a model.
 
@@ -247,10 +267,10 @@ def tune(rig, controller, experiment, budget=400, seed=0, jobs=1, progress=None,
     before = {axis.name: controller.settings[axis.name] for axis in axes}
     problem, check = Problem(train, controller), Problem(test, controller)
     done = [0]
-    history = []
+    history: list[tuple[int, float]] = []
 
     with Workers(jobs, cluster) as workers:
-        def costs_of(points):
+        def costs_of(points: list[FloatArray]) -> list[float]:
             costs = workers.map(cost_of, problem, [from_unit(axes, p) for p in points])
             done[0] += len(points) * len(train)
             history.append((done[0], min(costs + [cost for _, cost in history[-1:]])))

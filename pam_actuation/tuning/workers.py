@@ -21,14 +21,19 @@ a Ray cluster likewise (``ray://host:10001``); both libraries are optional. The
 order of results does not depend on who computes them.
 """
 
+from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import functools
 import pickle
+from typing import Any, Self, TypeVar
 
 import joblib
 from pam_sim.errors import InputError
 
 _WAIT_S = 15
+Given = TypeVar('Given')
+Item = TypeVar('Item')
+Result = TypeVar('Result')
 
 
 class Workers:
@@ -49,16 +54,16 @@ class Workers:
 
     """
 
-    def __init__(self, jobs=1, cluster=None):
+    def __init__(self, jobs: int = 1, cluster: str | None = None) -> None:
         self.jobs, self.cluster = jobs, cluster
-        self._parallel = None
+        self._parallel: joblib.Parallel | None = None
         self._stack = contextlib.ExitStack()
         if cluster is not None and not str(cluster).startswith(('tcp://', 'tls://', 'ray://')):
             raise InputError(
                 f'`{cluster}` is no address of a cluster; give tcp://HOST:PORT of a Dask '
                 'scheduler or ray://HOST:PORT', 'cluster')
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         """Connect, and start the threads."""
         try:
             if self.cluster is None:
@@ -73,22 +78,26 @@ class Workers:
             raise
         return self
 
-    def __exit__(self, *details):
+    def __exit__(self, *details: object) -> None:
         """Let go of threads and cluster."""
         self._stack.close()
         self._parallel = None
 
-    def map(self, function, problem, items):  # noqa: A003
+    def map(self, function: Callable[[Given, Item], Result], problem: Given,  # noqa: A003
+            items: Iterable[Item]) -> list[Result]:
         """
         Return ``[function(problem, item) for item in items]``, computed in parallel.
 
         ``function`` stands at the top of a module, ``problem`` can be pickled; each process of
         a cluster unpacks it once.
         """
+        assert self._parallel is not None, 'used within a with block'
+        call = joblib.delayed(functools.partial(function, problem))
         if self.cluster is not None:
-            function, problem = functools.partial(_unpacked_call, function), pickle.dumps(problem)
-        return self._parallel(
-            joblib.delayed(function)(problem, item) for item in items)
+            call = joblib.delayed(
+                functools.partial(_unpacked_call, function, pickle.dumps(problem)))
+        done: list[Result] = self._parallel(call(item) for item in items)
+        return done
 
 
 _NO_RAY_CLIENT = ('needs the client of Ray, which `ray` alone does not bring: '
@@ -96,17 +105,17 @@ _NO_RAY_CLIENT = ('needs the client of Ray, which `ray` alone does not bring: '
 
 
 @functools.lru_cache(maxsize=4)
-def _unpacked(blob):
+def _unpacked(blob: bytes) -> Any:
     return pickle.loads(blob)
 
 
-def _unpacked_call(function, blob, item):
+def _unpacked_call(function: Callable[[Any, Item], Result], blob: bytes, item: Item) -> Result:
     """Call in a process of a cluster."""
     return function(_unpacked(blob), item)
 
 
 @contextlib.contextmanager
-def _dask(address):
+def _dask(address: str) -> Iterator[None]:
     """Make an existing Dask scheduler the backend of joblib."""
     try:
         from dask.distributed import Client
@@ -123,7 +132,7 @@ def _dask(address):
 
 
 @contextlib.contextmanager
-def _ray(address):
+def _ray(address: str) -> Iterator[None]:
     """Make an existing Ray cluster the backend of joblib."""
     try:
         import ray

@@ -14,12 +14,18 @@
 
 """All measurements for the regulator and the on/off pair, averaged and switching."""
 
+from collections.abc import Callable
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.valves import measure
 from pam_actuation.valves.chain import Bench
 from pam_actuation.valves.energy import power_values
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 CHAINS = {'ppr': ('ppr', 'averaged'), 'hsv averaged': ('hsv', 'averaged'),
           'hsv switching': ('hsv', 'switching')}
@@ -28,7 +34,9 @@ HOLD_S, LEAST_HOLD_S, MOST_HOLD_S = 60.0, 2.0, 3600.0
 STAGES = 7 * len(CHAINS)
 
 
-def compare(rig, seed=0, power=None, hold_s=HOLD_S, progress=None):
+def compare(rig: 'Rig', seed: int = 0, power: dict[str, float] | None = None,
+            hold_s: float = HOLD_S,
+            progress: Callable[..., Any] | None = None) -> dict[str, Any] | None:
     """
     Measure every chain on one rig.
 
@@ -75,7 +83,8 @@ def compare(rig, seed=0, power=None, hold_s=HOLD_S, progress=None):
             'power': power, 'valves': valves}
 
 
-def _measure(rig, seed, power, hold_s, done):
+def _measure(rig: 'Rig', seed: int, power: dict[str, float], hold_s: float,
+             done: Callable[..., Any]) -> dict[str, Any]:
     bench = Bench(rig, seed)
     steps = measure.measure_steps(bench)
     done()
@@ -100,9 +109,9 @@ def _measure(rig, seed, power, hold_s, done):
             'power_loss': loss, 'flow': flow}
 
 
-def _response(steps):
+def _response(steps: list[dict[str, Any]]) -> dict[str, float | None]:
     """Return means over the steps that fill and that vent, and the worst of all."""
-    result = {}
+    result: dict[str, float | None] = {}
     for kind in ('fill', 'vent'):
         chosen = [s for s in steps if (s['to_pa'] > s['from_pa']) == (kind == 'fill')]
         for name in ('dead_time_s', 'rise_s', 'settling_s'):

@@ -14,7 +14,10 @@
 
 """Air and electrical energy a valve takes."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.effects.leakage import CRITICAL_RATIO
 from pam_sim.effects.leakage_slit import slit_share
@@ -22,6 +25,10 @@ from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.units import P_ATM_PA, RHO_REFERENCE
 from pam_sim.valve.flow import mass_flow_kg_per_s
+
+if TYPE_CHECKING:
+    from pam_actuation.valves.chain import Record
+    from pam_sim.rig import Rig
 
 _DESIGN = 'design value'
 POWER_PARAMETERS = (
@@ -36,12 +43,12 @@ POWER_PARAMETERS = (
 )
 
 
-def power_values(given=()):
+def power_values(given: dict[str, float] | tuple[()] = ()) -> dict[str, float]:
     """Return all power numbers, checked, design values where none is given."""
     return check_parameters(POWER_PARAMETERS, dict(given), 'power')
 
 
-def pulse_energy_j(lengths_s, power):
+def pulse_energy_j(lengths_s: list[float] | tuple[float, ...], power: dict[str, float]) -> float:
     """Return the electrical energy [J] of pulses: peak first, then hold."""
     lengths = np.asarray(lengths_s, dtype=float)
     peak = np.minimum(lengths, power['hsv_peak_time_s'])
@@ -49,12 +56,12 @@ def pulse_energy_j(lengths_s, power):
                  + np.sum(lengths - peak) * power['hsv_hold_power_w'])
 
 
-def normal_litres(mass_kg):
+def normal_litres(mass_kg: float) -> float:
     """Return litres of air at the reference atmosphere of ISO 8778."""
     return mass_kg / RHO_REFERENCE * 1e3
 
 
-def supplied_kg(record, rig):
+def supplied_kg(record: 'Record', rig: 'Rig') -> FloatArray:
     """
     Return the air [kg] taken from the supply since the start of a record, per sample.
 
@@ -72,20 +79,22 @@ def supplied_kg(record, rig):
     return np.concatenate([[0.0], np.cumsum(np.maximum(change, 0.0))])
 
 
-def _lost_kg_per_s(pressure_pa, conductance_m3_per_s_pa, slit_flow_at_400kpa_kg_per_s=0.0):
+def _lost_kg_per_s(pressure_pa: FloatArray, conductance_m3_per_s_pa: float,
+                   slit_flow_at_400kpa_kg_per_s: float = 0.0) -> FloatArray:
     lost = np.empty(len(pressure_pa))
     _leak_flow(pressure_pa, conductance_m3_per_s_pa * RHO_REFERENCE, lost)
     return lost + slit_flow_at_400kpa_kg_per_s * slit_share(pressure_pa)
 
 
 @compiled
-def _leak_flow(pressure_pa, conductance_kg_per_s_pa, flow_kg_per_s):
+def _leak_flow(pressure_pa: FloatArray, conductance_kg_per_s_pa: float,
+               flow_kg_per_s: FloatArray) -> None:
     for k in range(len(pressure_pa)):
         flow_kg_per_s[k] = mass_flow_kg_per_s(
             pressure_pa[k], P_ATM_PA, conductance_kg_per_s_pa, CRITICAL_RATIO)
 
 
-def power_arguments(texts):
+def power_arguments(texts: list[str]) -> dict[str, float] | None:
     """
     Return the numbers of ``NAME=VALUE`` texts.
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 
 MOVED = 0.02            # of a step: the pressure has begun to move
 SETTLED = 0.02          # of a step, but not less than
@@ -36,19 +37,19 @@ class StepFigures:
 
     from_pa: float
     to_pa: float
-    dead_time_s: float
-    rise_s: float
-    settling_s: float
+    dead_time_s: float | None
+    rise_s: float | None
+    settling_s: float | None
     overshoot: float
     error_pa: float
 
     @property
-    def fills(self):
+    def fills(self) -> bool:
         """Return whether the step asks for more pressure."""
         return self.to_pa > self.from_pa
 
 
-def step_figures(gauge_pa, from_pa, to_pa, dt_s):
+def step_figures(gauge_pa: FloatArray, from_pa: float, to_pa: float, dt_s: float) -> StepFigures:
     """
     Return the StepFigures of a response.
 
@@ -71,13 +72,13 @@ def step_figures(gauge_pa, from_pa, to_pa, dt_s):
     rest = gauge_pa[-max(len(gauge_pa) // 5, 1):]
     return StepFigures(
         from_pa, to_pa, _first(share, MOVED, dt_s),
-        None if ninety is None else ninety - ten,
+        None if ten is None or ninety is None else ninety - ten,
         (settled + 1) * dt_s if settled < 0.95 * len(gauge_pa) else None,
         max(float(np.max((gauge_pa - to_pa) * np.sign(size))) / abs(size), 0.0),
         float(np.mean(rest)) - to_pa)
 
 
-def _first(share, level, dt_s):
+def _first(share: FloatArray, level: float, dt_s: float) -> float | None:
     """Return when a level is first reached, linear between samples; None if never."""
     above = np.flatnonzero(share >= level)
     if not above.size:
@@ -88,7 +89,7 @@ def _first(share, level, dt_s):
     return float(dt_s * (k + (level - share[k - 1]) / (share[k] - share[k - 1])))
 
 
-def straight_line(command_pa, reached_pa):
+def straight_line(command_pa: FloatArray, reached_pa: FloatArray) -> tuple[float, float, float]:
     """
     Return (gain, offset [Pa], largest distance from the line as a share of the span).
 
@@ -99,7 +100,7 @@ def straight_line(command_pa, reached_pa):
     return float(gain), float(offset), float(away / np.ptp(command_pa))
 
 
-def sine_gain(signal, frequency_hz, dt_s):
+def sine_gain(signal: FloatArray, frequency_hz: float, dt_s: float) -> float:
     """Return the amplitude of a sine of known frequency in a signal, by least squares."""
     time = np.arange(len(signal)) * dt_s
     turn = 2.0 * math.pi * frequency_hz * time
@@ -108,7 +109,7 @@ def sine_gain(signal, frequency_hz, dt_s):
     return math.hypot(sine, cosine)
 
 
-def bandwidth(frequencies_hz, gains):
+def bandwidth(frequencies_hz: tuple[float, ...], gains: list[float]) -> float | None:
     """
     Return the frequency [Hz] where the gain first falls below -3 dB.
 
@@ -123,7 +124,7 @@ def bandwidth(frequencies_hz, gains):
     return None
 
 
-def ripple(signal, window):
+def ripple(signal: FloatArray, window: int) -> tuple[float, float]:
     """
     Return (rms, peak to peak) of what is faster than a moving mean over ``window`` samples.
 
@@ -142,11 +143,11 @@ class Pulses:
 
     count: int
     on_s: float
-    lengths_s: tuple
+    lengths_s: tuple[float, ...]
     shut_share: float
 
 
-def pulses(duties, period_steps, dt_s):
+def pulses(duties: FloatArray, period_steps: int, dt_s: float) -> Pulses:
     """
     Return the Pulses in duties held over whole PWM periods.
 

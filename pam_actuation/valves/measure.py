@@ -19,12 +19,17 @@ Each ``measure_*`` takes a Bench, gives its chain a command and returns plain nu
 """
 
 from dataclasses import asdict
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.valves import figures
-from pam_actuation.valves.chain import STEP_S
+from pam_actuation.valves.chain import Bench, STEP_S
 from pam_actuation.valves.energy import normal_litres, pulse_energy_j, supplied_kg
+from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 STEPS_PA = (100e3, 300e3, 500e3, 450e3, 150e3, 350e3, 400e3, 200e3, 100e3)
 STEP_TIME_S = 2.0
@@ -42,11 +47,11 @@ OPEN_LOOP_DUTY, OPEN_LOOP_TIME_S = 0.5, 0.04
 OFF_TIME_S = 5.0
 
 
-def _steps(seconds):
+def _steps(seconds: float) -> int:
     return round(seconds / STEP_S)
 
 
-def measure_steps(bench):
+def measure_steps(bench: Bench) -> list[dict[str, float]]:
     """Return the StepFigures of all steps as dicts."""
     count = _steps(STEP_TIME_S)
     command = np.repeat(STEPS_PA, count)
@@ -56,7 +61,7 @@ def measure_steps(bench):
         for k in range(1, len(STEPS_PA))]
 
 
-def measure_accuracy(bench):
+def measure_accuracy(bench: Bench) -> tuple[dict[str, float], FloatArray]:
     """
     Return the accuracy of a staircase and of a sine.
 
@@ -91,7 +96,7 @@ def measure_accuracy(bench):
     return result, sine.signal[late]
 
 
-def measure_bandwidth(bench):
+def measure_bandwidth(bench: Bench) -> dict[str, Any]:
     """Return the gains of small sines and where they fall by 3 dB [Hz] (None: above all)."""
     gains = []
     for frequency in SMALL_SINES_HZ:
@@ -105,7 +110,7 @@ def measure_bandwidth(bench):
             'bandwidth_hz': figures.bandwidth(SMALL_SINES_HZ, gains)}
 
 
-def measure_cycle(bench):
+def measure_cycle(bench: Bench) -> dict[str, float]:
     """Return the air of one cycle, up and down again."""
     low, high = CYCLE_PA
     count = _steps(STEP_TIME_S)
@@ -115,7 +120,7 @@ def measure_cycle(bench):
             'needed_kg': float(record.air_mass_kg[count] - record.air_mass_kg[0])}
 
 
-def measure_hold(bench, seconds, power):
+def measure_hold(bench: Bench, seconds: float, power: dict[str, float]) -> dict[str, float]:
     """
     Return air, ripple, pulses and energy of holding a pressure.
 
@@ -137,7 +142,7 @@ def measure_hold(bench, seconds, power):
     }
 
 
-def signal_use(rig, signal, power):
+def signal_use(rig: 'Rig', signal: FloatArray, power: dict[str, float]) -> dict[str, float]:
     """Return switchings, shut time, mean signal and electrical power of a valve signal."""
     seconds = len(signal) * STEP_S
     if rig.valve == 'ppr':
@@ -149,14 +154,15 @@ def signal_use(rig, signal, power):
             'power_w': pulse_energy_j(found.lengths_s, power) / seconds}
 
 
-def measure_flow(rig):
+def measure_flow(rig: 'Rig') -> dict[str, Any]:
     """
     Return how the effect of a signal depends on the pressure, without any feedback.
 
     PPR: pressure per volt at rest. HSV: pressure rate per duty, filling and venting.
     ``ratio`` is the largest over the smallest.
     """
-    fill, vent = [], []
+    fill: list[float] = []
+    vent: list[float] = []
     for start in OPEN_LOOP_PA:
         if rig.valve == 'ppr':
             voltage = start / rig.parameters['K_m']
@@ -172,7 +178,7 @@ def measure_flow(rig):
             'ratio': float(sizes.max() / sizes.min())}
 
 
-def _rate(rig, start_pa, duties):
+def _rate(rig: 'Rig', start_pa: float, duties: tuple[float, float]) -> float:
     """Return the pressure rate [Pa/s] over a few periods, after the dead time of the valve."""
     delay = rig.effect('valve_dead_time')
     wait = _steps(0.0 if delay is None else delay.parameters['delay_s'])
@@ -181,14 +187,14 @@ def _rate(rig, start_pa, duties):
     return float(pressure[-1] - pressure[wait]) / OPEN_LOOP_TIME_S
 
 
-def measure_power_loss(bench):
+def measure_power_loss(bench: Bench) -> dict[str, Any]:
     """
     Return what the pressure does when the valve has lost its power.
 
     PPR: 0 V. HSV: both valves shut by their springs; beside that, with a vent valve
     that opens without power (``vented``).
     """
-    cases = {'off': (0.0,)}
+    cases: dict[str, tuple[float, ...]] = {'off': (0.0,)}
     if bench.rig.valve == 'hsv':
         cases = {'off': (0.0, 0.0), 'vented': (0.0, 1.0)}
     result = {}

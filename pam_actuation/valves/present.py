@@ -15,6 +15,7 @@
 """The comparison of the valves in the terminal and as an HTML page."""
 
 import textwrap
+from typing import Any
 
 from pam_actuation.models.text import text_table
 from pam_actuation.report.figures import line, stack
@@ -26,7 +27,7 @@ from pam_actuation.valves.table42 import (
 _ROLES = {'ppr': 'measured', 'hsv averaged': 'green', 'hsv switching': 'second'}
 
 
-def as_text(result):
+def as_text(result: dict[str, Any]) -> str:
     """Return both tables and the notes for the terminal."""
     lines = ['Table 4.2, statement by statement', '',
              text_table(STATEMENT_HEAD, statement_rows(result)), '', 'Numbers', '',
@@ -36,7 +37,7 @@ def as_text(result):
     return '\n'.join(lines)
 
 
-def as_page(result):
+def as_page(result: dict[str, Any]) -> str:
     """Return the HTML page."""
     sections = [
         Section('statements', 'Table 4.2, statement by statement',
@@ -55,8 +56,8 @@ def as_page(result):
                   'This page needs no network.')
 
 
-def _step_rows(result):
-    rows = []
+def _step_rows(result: dict[str, Any]) -> list[tuple[str | None, ...]]:
+    rows: list[tuple[str | None, ...]] = []
     for name, title in TITLES.items():
         for step in result['valves'][name]['steps']:
             times = [None if step[key] is None else f'{step[key] * 1e3:.0f}'
@@ -67,7 +68,7 @@ def _step_rows(result):
     return rows
 
 
-def _gain_plot(result):
+def _gain_plot(result: dict[str, Any]) -> str:
     traces = []
     for name, title in TITLES.items():
         found = result['valves'][name]['small_sines']

@@ -14,6 +14,8 @@
 
 """Each statement of the chapter's Table 4.2 beside what was measured."""
 
+from typing import Any
+
 from pam_actuation.valves.compare import TITLES
 
 SUPPORTED, NOT_SUPPORTED = 'supported', 'not supported'
@@ -23,7 +25,7 @@ GIVEN = 'as given'              # a property of the goods, quoted from the chapt
 STATEMENT_HEAD = ('valve', 'Table 4.2 says', 'simulation', 'measured')
 
 
-def statements(result):
+def statements(result: dict[str, Any]) -> list[dict[str, str]]:
     """
     Return the statements of Table 4.2 in its order.
 
@@ -70,17 +72,17 @@ def statements(result):
                     'while moving; fields are not simulated')))]
 
 
-def statement_rows(result):
+def statement_rows(result: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Return the rows under :data:`STATEMENT_HEAD`."""
     return [(item['valve'], item['statement'], item['verdict'], item['measured'])
             for item in statements(result)]
 
 
-def _verdict(holds, word=SUPPORTED):
+def _verdict(holds: bool, word: str = SUPPORTED) -> str:
     return word if holds else NOT_SUPPORTED
 
 
-def _linear(ppr, hsv):
+def _linear(ppr: dict[str, Any], hsv: dict[str, Any]) -> tuple[str, str]:
     ours, theirs = ppr['flow']['ratio'], hsv['flow']['ratio']
     return _verdict(ours < 1.05 < theirs), (
         f'the effect of the same signal varies by a factor {ours:.2f} between 100 and 500 kPa '
@@ -88,7 +90,7 @@ def _linear(ppr, hsv):
         'straight line')
 
 
-def _easy(ppr, hsv):
+def _easy(ppr: dict[str, Any], hsv: dict[str, Any]) -> tuple[str, str]:
     ours, theirs = ppr['accuracy'], hsv['accuracy']
     holds = (ours['steady_error_max_pa'] <= theirs['steady_error_max_pa']
              and ppr['response']['overshoot_worst'] <= hsv['response']['overshoot_worst'])
@@ -99,7 +101,7 @@ def _easy(ppr, hsv):
         f'{100.0 * hsv["response"]["overshoot_worst"]:.1f} %)')
 
 
-def _quiet(ppr, hsv):
+def _quiet(ppr: dict[str, Any], hsv: dict[str, Any]) -> tuple[str, str]:
     quieter = (ppr['accuracy']['ripple_moving_rms_pa'] < hsv['accuracy']['ripple_moving_rms_pa']
                and ppr['moving']['pulses_per_s'] < hsv['moving']['pulses_per_s'])
     return _verdict(quieter, INDIRECT), (
@@ -108,7 +110,7 @@ def _quiet(ppr, hsv):
         f'(HSV: {_kpa(hsv["accuracy"]["ripple_moving_rms_pa"])}); sound is not simulated')
 
 
-def _falls(ppr, hsv):
+def _falls(ppr: dict[str, Any], hsv: dict[str, Any]) -> tuple[str, str]:
     off, shut, vented = ppr['power_loss']['off'], hsv['power_loss']['off'], \
         hsv['power_loss']['vented']
     return _verdict(off['gauge_after_pa'] < 1e3), (
@@ -118,7 +120,7 @@ def _falls(ppr, hsv):
         f'{_seconds(vented["to_ten_percent_s"])})')
 
 
-def _constant(ppr, result):
+def _constant(ppr: dict[str, Any], result: dict[str, Any]) -> tuple[str, str]:
     hold = ppr['hold']
     return _verdict(hold['energised_share'] == 1.0 and hold['signal_mean'] > 0.0), (
         f'{hold["signal_mean"]:.2f} V all the time while holding; '
@@ -126,7 +128,7 @@ def _constant(ppr, result):
         f'{result["hold_s"]:g} s (power assumed)')
 
 
-def _shut(hsv, result):
+def _shut(hsv: dict[str, Any], result: dict[str, Any]) -> tuple[str, str]:
     hold, leak = hsv['hold'], hsv['hold_leaking']
     return _verdict(hold['shut_share'] > 0.95), (
         f'both shut {100.0 * hold["shut_share"]:.1f} % of {result["hold_s"]:g} s, '
@@ -135,7 +137,7 @@ def _shut(hsv, result):
         f'{_kpa(leak["error_max_pa"])})')
 
 
-def _noisy(ppr, hsv):
+def _noisy(ppr: dict[str, Any], hsv: dict[str, Any]) -> tuple[str, str]:
     noisier = (hsv['accuracy']['ripple_moving_rms_pa'] > ppr['accuracy']['ripple_moving_rms_pa']
                and hsv['moving']['pulses_per_s'] > 0.0)
     return _verdict(noisier, INDIRECT), (
@@ -181,12 +183,12 @@ NUMBERS = (
 )
 
 
-def number_head():
+def number_head() -> tuple[str, ...]:
     """Return the head of the table of numbers."""
     return ('quantity', 'unit', *TITLES.values())
 
 
-def number_rows(result):
+def number_rows(result: dict[str, Any]) -> list[tuple[str, ...]]:
     """Return the rows under :func:`number_head`; a dash where it did not settle."""
     rows = []
     for label, unit, scale, digits, part, key in NUMBERS:
@@ -210,7 +212,7 @@ def number_rows(result):
     return rows
 
 
-def notes(result):
+def notes(result: dict[str, Any]) -> list[str]:
     """Return the sentences that say what the numbers rest on."""
     power = ', '.join(f'{name} {value:g}' for name, value in result['power'].items())
     effects = ', '.join(result['effects']) or 'none'
@@ -228,9 +230,9 @@ def notes(result):
     ]
 
 
-def _kpa(value):
+def _kpa(value: float) -> str:
     return f'{value / 1e3:.2f} kPa'
 
 
-def _seconds(value):
+def _seconds(value: float) -> str:
     return 'never' if value is None else f'{value:.2f} s'

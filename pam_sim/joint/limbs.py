@@ -29,7 +29,7 @@ _CENTRE_OF_MASS = 0.606         # of the shank length, from the knee
 _GYRATION = 0.735               # of the shank length, about the knee
 
 
-def shank_and_foot(body_mass_kg=70.0, height_m=1.75):
+def shank_and_foot(body_mass_kg: float = 70.0, height_m: float = 1.75) -> dict[str, float]:
     """
     Return the joint parameters of shank and foot that turn about the knee.
 

@@ -14,6 +14,8 @@
 
 """Model files and presets of joints: YAML in, JointRig out."""
 
+import os
+
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.rig import JointRig
@@ -21,17 +23,20 @@ from pam_sim.located_yaml import Located
 from pam_sim.model_file import load_rig
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
+from pam_sim.rig import Rig
+
 
 _PRESETS = NamedFiles('joint/presets')
 KEYS = ('name', 'joint', 'load', *SIDES, 'parameters')
 
 
-def joint_preset_names():
+def joint_preset_names() -> list[str]:
     """Return the names of the presets, sorted."""
     return _PRESETS.names()
 
 
-def load_joint(source, valve=None, fidelity=None):
+def load_joint(source: str | os.PathLike[str] | Located | JointRig, valve: str | None = None,
+               fidelity: str | None = None) -> JointRig:
     """
     Return a joint from a preset or a model file.
 
@@ -56,11 +61,11 @@ def load_joint(source, valve=None, fidelity=None):
         joint = source
     else:
         data, name = _PRESETS.locate(source, 'joint')
-        joint = _from_mapping(data, name or file_stem(source))
+        joint = _from_mapping(data, name or file_stem(source) or '')
     return joint.with_(valve=valve, fidelity=fidelity)
 
 
-def load_rig_or_side(source, valve=None):
+def load_rig_or_side(source: str | os.PathLike[str], valve: str | None = None) -> Rig:
     """
     Return a rig by its preset or path, or one side of a joint by ``JOINT/flexor``.
 
@@ -79,11 +84,12 @@ def load_rig_or_side(source, valve=None):
     """
     joint, _, side = str(source).rpartition('/')
     if joint and side in SIDES:
-        return getattr(load_joint(joint, valve=valve), side)
+        loaded = load_joint(joint, valve=valve)
+        return loaded.flexor if side == 'flexor' else loaded.extensor
     return load_rig(source, valve=valve)
 
 
-def _from_mapping(data, name):
+def _from_mapping(data: Located, name: str) -> JointRig:
     data.check_keys(KEYS)
     name = data.get('name', str, name)
     base = None
@@ -96,22 +102,22 @@ def _from_mapping(data, name):
                 f'`load: {NAME}` is missing, or `joint` with one of: '
                 + ', '.join(joint_preset_names()))
         data.require('load', str, choices=(NAME,))
-    sides = {side: _side(data, side, base) for side in SIDES}
+    flexor, extensor = (_side(data, side, base) for side in SIDES)
     given = data.get('parameters', dict) if data.get('parameters') is not None else {}
     check_parameters(PARAMETERS, given)
     kept = base.parameters if base else {}
     try:
-        return JointRig(name or (base.name if base else 'joint'), **sides,
+        return JointRig(name or (base.name if base else 'joint'), flexor, extensor,
                         parameters={**kept, **dict(given)})
     except InputError as error:
         # The parts are sound; they do not fit each other.
         raise data.error(f'{error.where}: {error.problem}', error.where) from error
 
 
-def _side(data, side, base):
+def _side(data: Located, side: str, base: JointRig | None) -> Rig:
     """Return the rig of a side: a preset by name, a mapping as in a model file, or the base's."""
     if side not in data and base is not None:
-        return getattr(base, side)
+        return base.flexor if side == 'flexor' else base.extensor
     value = data.require(side)
     if isinstance(value, Located):
         return load_rig(value)

@@ -15,13 +15,18 @@
 """Turn a joint into the arrays of its compiled step."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import layout
 from pam_sim.joint.statics import static_angle
 from pam_sim.rollout import layout as muscle
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
 
 # Coupling step times the highest natural frequency, and times the damping rate: at 0.04 the
 # phase of the Verlet step is wrong by 7e-5 rad per radian of free oscillation.
@@ -30,8 +35,11 @@ _STEP_PER_DECAY = 0.1
 _MOST_SUBSTEPS = 100
 
 
-def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure_pa=P_ATM_PA,
-               initial_angle_rad=None, initial_velocity_rad_per_s=0.0):
+def pack_joint(
+        joint: 'JointRig', dt_s: float = 0.001, flexor_pressure_pa: float = P_ATM_PA,
+        extensor_pressure_pa: float = P_ATM_PA, initial_angle_rad: float | None = None,
+        initial_velocity_rad_per_s: float = 0.0,
+) -> tuple[FloatArray, FloatArray, dict[str, float], dict[str, float]]:
     """
     Return (state, par) of the joint and, for each muscle, the arguments that start it.
 
@@ -84,7 +92,7 @@ def pack_joint(joint, dt_s=0.001, flexor_pressure_pa=P_ATM_PA, extensor_pressure
     return state, _par(joint, dt_s, substeps), sides[0], sides[1]
 
 
-def _substeps(joint, dt_s):
+def _substeps(joint: 'JointRig', dt_s: float) -> int:
     """Return how many coupling steps one step needs: the limb may not turn far in one."""
     value = joint.parameters
     stiffness = value['limb_mass_kg'] * value['gravity_m_per_s2'] * value['centre_of_mass_m']
@@ -104,7 +112,7 @@ def _substeps(joint, dt_s):
     return count
 
 
-def _par(joint, dt_s, substeps):
+def _par(joint: 'JointRig', dt_s: float, substeps: int) -> FloatArray:
     value = joint.parameters
     lower, upper = joint.range_rad
     par = np.zeros(layout.PAR_SIZE)

@@ -14,22 +14,33 @@
 
 """The joint as a live object: one step at a time, the compiled step of the rollout."""
 
+from collections.abc import Iterable, Sequence
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
 from pam_sim.plant import Plant
 
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+
+
+Arrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
 
 class JointMuscle(Plant):
     """One muscle of a live joint: read as any plant, stepped by the joint only."""
 
-    def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
+    def step(self, signal: float | Sequence[float], external_force_n: float = 0.0,
+             contraction_m: float | None = None, steps: int = 1) -> None:
         """Refuse: the joint prescribes the contraction."""
         raise InputError('is stepped by its joint', self.rig.name)
 
     @property
-    def arrays(self):
+    def arrays(self) -> Arrays:
         """State, par, inp, out as the compiled step takes them."""
         return self.state, self.par, self._inp, self._out
 
@@ -55,7 +66,8 @@ class JointPlant:
 
     """
 
-    def __init__(self, joint, seed=0, dt_s=0.001, **initial):
+    def __init__(self, joint: 'JointRig', seed: int = 0, dt_s: float = 0.001,
+                 **initial: Any) -> None:
         self.joint = joint
         self.dt_s = float(dt_s)
         self._initial = initial
@@ -66,7 +78,7 @@ class JointPlant:
         self.extensor = JointMuscle(joint.extensor, int(seed) + 1, **extensor)
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Go back to the start."""
         self.state = self._start.copy()
         self._inp[:] = 0.0
@@ -75,12 +87,14 @@ class JointPlant:
         kernel.joint_look(*self.arrays)
 
     @property
-    def arrays(self):
+    def arrays(self) -> tuple[Arrays, Arrays, Arrays]:
         """Arguments of the compiled step: joint, flexor, extensor."""
         return ((self._inp, self.state, self.par, self._out), self.flexor.arrays,
                 self.extensor.arrays)
 
-    def step(self, flexor_signal, extensor_signal, external_torque_n_m=0.0):
+    def step(self, flexor_signal: float | Sequence[float],
+             extensor_signal: float | Sequence[float],
+             external_torque_n_m: float = 0.0) -> None:
         """
         Advance by ``dt_s`` with the valve signals held.
 
@@ -101,7 +115,7 @@ class JointPlant:
         inp = self._inp.copy()
         for first, signal, side in ((layout.IN_FLEXOR_0, flexor_signal, 'flexor'),
                                     (layout.IN_EXTENSOR_0, extensor_signal, 'extensor')):
-            values = (signal,) if np.isscalar(signal) else tuple(signal)
+            values = tuple(signal) if isinstance(signal, Iterable) else (signal,)
             rig = getattr(self.joint, side)
             wanted = len(rig.signal_names)
             if len(values) != wanted:
@@ -119,26 +133,26 @@ class JointPlant:
                              f'joint {self.joint.name}')
 
     @property
-    def time_s(self):
+    def time_s(self) -> float:
         """Time since the start, s."""
         return float(self._out[layout.OUT_TIME])
 
     @property
-    def angle_rad(self):
+    def angle_rad(self) -> float:
         """Joint angle, flexion positive, rad."""
         return float(self._out[layout.OUT_ANGLE])
 
     @property
-    def velocity_rad_per_s(self):
+    def velocity_rad_per_s(self) -> float:
         """Joint velocity, rad/s."""
         return float(self._out[layout.OUT_VELOCITY])
 
     @property
-    def torque_n_m(self):
+    def torque_n_m(self) -> float:
         """Torque of both tendons, N m."""
         return float(self._out[layout.OUT_TORQUE])
 
     @property
-    def outputs(self):
+    def outputs(self) -> FloatArray:
         """All outputs of the joint after the last step (copy), by ``layout.OUT_*``."""
         return self._out.copy()

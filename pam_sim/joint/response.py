@@ -14,6 +14,7 @@
 
 """What a simulation of a joint returns."""
 
+from pam_sim.annotations import FloatArray
 from pam_sim.joint import layout
 from pam_sim.joint.parameters import SIDES
 from pam_sim.response import brief_span, Response
@@ -38,7 +39,7 @@ class JointResponse:
 
     """
 
-    def __init__(self, outputs, flexor, extensor):
+    def __init__(self, outputs: FloatArray, flexor: FloatArray, extensor: FloatArray) -> None:
         self.outputs = outputs
         self.flexor = Response(flexor)
         self.extensor = Response(extensor)
@@ -48,16 +49,16 @@ class JointResponse:
         self.acceleration_rad_per_s2 = outputs[:, layout.OUT_ACCELERATION]
         self.torque_n_m = outputs[:, layout.OUT_TORQUE]
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of samples, N + 1."""
         return len(self.outputs)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         """Return length and names in one line."""
         return (f'JointResponse({len(self)} samples, {brief_span(self.time_s)}: {", ".join(OWN)}; '
                 'flexor, extensor)')
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, FloatArray]:
         """Return name -> ndarray; names of a muscle begin with ``flexor/`` or ``extensor/``."""
         signals = {name: getattr(self, name) for name in OWN}
         for side in SIDES:

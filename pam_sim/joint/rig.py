@@ -15,12 +15,20 @@
 """The joint: flexor, extensor and limb as one object that can be simulated."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from pam_sim.annotations import FloatArray, Number
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.text import joint_to_yaml
 from pam_sim.parameters import check_parameters
+
+if TYPE_CHECKING:
+    from pam_sim.joint.plant import JointPlant
+    from pam_sim.joint.response import JointResponse
+    from pam_sim.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -45,13 +53,13 @@ class JointRig:
     """
 
     name: str
-    flexor: object
-    extensor: object
-    parameters: dict = field(default_factory=dict)
+    flexor: 'Rig'
+    extensor: 'Rig'
+    parameters: dict[str, float] = field(default_factory=dict)
 
     load = NAME
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check the muscles and fill in nominal numbers."""
         for side in SIDES:
             self._check_side(side)
@@ -68,7 +76,7 @@ class JointRig:
                 f'the joint cannot move: stops and stretched muscles leave {lower:g} to '
                 f'{upper:g} rad', 'parameters')
 
-    def _check_side(self, side):
+    def _check_side(self, side: str) -> None:
         rig = getattr(self, side)
         if rig.load != 'driven':
             raise InputError(f'has load `{rig.load}`; a muscle of a joint has load `driven`', side)
@@ -79,7 +87,7 @@ class JointRig:
                     'its own `friction_n_m` and `damping_n_m_s`', side)
 
     @property
-    def range_rad(self):
+    def range_rad(self) -> tuple[float, float]:
         """Joint angles (lower, upper) between the stops: an end stop or a stretched braid."""
         value = self.parameters
         return (max(value['lower_stop_rad'],
@@ -87,14 +95,16 @@ class JointRig:
                 min(value['upper_stop_rad'],
                     value['extensor_contraction_at_zero_m'] / value['extensor_radius_m']))
 
-    def contractions_m(self, angle_rad):
+    def contractions_m(
+            self, angle_rad: Number) -> tuple[Number, Number]:
         """Return (flexor, extensor) contraction [m] by the pulley; scalars or arrays."""
         value = self.parameters
         return (value['flexor_contraction_at_zero_m'] + value['flexor_radius_m'] * angle_rad,
                 value['extensor_contraction_at_zero_m'] - value['extensor_radius_m'] * angle_rad)
 
-    def with_(self, parameters=None, flexor=None, extensor=None, valve=None, fidelity=None,
-              name=None):
+    def with_(self, parameters: dict[str, float] | None = None, flexor: 'Rig | None' = None,
+              extensor: 'Rig | None' = None, valve: str | None = None, fidelity: str | None = None,
+              name: str | None = None) -> 'JointRig':
         """
         Return a changed copy.
 
@@ -121,8 +131,8 @@ class JointRig:
                        parameters={**self.parameters, **(parameters or {})})
 
     # -- statics ---------------------------------------------------------------------------
-    def static_torque_n_m(self, angle_rad, flexor_pressure_pa, extensor_pressure_pa,
-                          external_torque_n_m=0.0):
+    def static_torque_n_m(self, angle_rad: float, flexor_pressure_pa: float,
+                          extensor_pressure_pa: float, external_torque_n_m: float = 0.0) -> float:
         """
         Return the net torque [N m] on the limb at rest at an angle, without dry friction.
 
@@ -140,8 +150,8 @@ class JointRig:
         return static_torque(self, angle_rad, (flexor_pressure_pa, extensor_pressure_pa),
                              external_torque_n_m)
 
-    def static_angle_rad(self, flexor_pressure_pa, extensor_pressure_pa, external_torque_n_m=0.0,
-                         near_rad=None):
+    def static_angle_rad(self, flexor_pressure_pa: float, extensor_pressure_pa: float,
+                         external_torque_n_m: float = 0.0, near_rad: float | None = None) -> float:
         """
         Return the angle [rad] at which the joint rests, without dry friction.
 
@@ -162,7 +172,8 @@ class JointRig:
         return static_angle(self, (flexor_pressure_pa, extensor_pressure_pa),
                             external_torque_n_m, near_rad)
 
-    def stiffness_n_m_per_rad(self, angle_rad, flexor_pressure_pa, extensor_pressure_pa):
+    def stiffness_n_m_per_rad(self, angle_rad: float, flexor_pressure_pa: float,
+                              extensor_pressure_pa: float) -> float:
         """Return minus the slope of the static torque over the angle, gravity included."""
         step = 1e-5
         return -(self.static_torque_n_m(angle_rad + step, flexor_pressure_pa, extensor_pressure_pa)
@@ -170,8 +181,9 @@ class JointRig:
                                           extensor_pressure_pa)) / (2.0 * step)
 
     # -- dynamics --------------------------------------------------------------------------
-    def simulate(self, flexor_signal, extensor_signal, external_torque_n_m=None, dt_s=0.001,
-                 **initial):
+    def simulate(self, flexor_signal: FloatArray, extensor_signal: FloatArray,
+                 external_torque_n_m: FloatArray | None = None, dt_s: float = 0.001,
+                 **initial: float) -> 'JointResponse':
         """
         Simulate with recorded or made-up inputs, each held from sample i to i + 1.
 
@@ -200,12 +212,12 @@ class JointRig:
         return simulate_joint(
             self, flexor_signal, extensor_signal, external_torque_n_m, dt_s, initial)
 
-    def plant(self, seed=0, dt_s=0.001, **initial):
+    def plant(self, seed: int = 0, dt_s: float = 0.001, **initial: float) -> 'JointPlant':
         """Return a live :class:`pam_sim.joint.plant.JointPlant` of this joint."""
         from pam_sim.joint.plant import JointPlant
         return JointPlant(self, seed, dt_s, **initial)
 
     # -- text ------------------------------------------------------------------------------
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return a model file that :func:`pam_sim.joint.load_joint` turns into an equal joint."""
         return joint_to_yaml(self)

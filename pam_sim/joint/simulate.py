@@ -14,17 +14,25 @@
 
 """Check the inputs of a joint simulation, run the rollout and check what came out."""
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.response import JointResponse
 from pam_sim.rollout import layout as muscle
 from pam_sim.rollout import simulate as one_muscle
 
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+
 MAX_TORQUE_N_M = 1e4
 
 
-def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, dt_s, initial):
+def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: FloatArray,
+                   external_torque_n_m: FloatArray | None, dt_s: float,
+                   initial: dict[str, Any]) -> JointResponse:
     """Return the JointResponse; arguments and errors as of ``JointRig.simulate``."""
     inputs = input_array(joint, flexor_signal, extensor_signal, external_torque_n_m)
     plant = joint.plant(dt_s=dt_s, **initial)
@@ -41,7 +49,8 @@ def simulate_joint(joint, flexor_signal, extensor_signal, external_torque_n_m, d
     return JointResponse(*rows)
 
 
-def input_array(joint, flexor_signal, extensor_signal, external_torque_n_m=None):
+def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: FloatArray,
+                external_torque_n_m: FloatArray | None = None) -> FloatArray:
     """
     Return the inputs (N, IN_SIZE) of a rollout; arguments as of ``JointRig.simulate``.
 

@@ -15,16 +15,22 @@
 """Where a joint rests: from the forces at rest of the kernel."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_sim.records import fields
 from pam_sim.rollout.layout import PARAMETERS, STATE
 from scipy.optimize import brentq
 
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
+
 _SCAN = 48                     # angles looked at for changes of sign over the whole range
 
 
-def static_torque(joint, angle_rad, pressures_pa, external_n_m):
+def static_torque(joint: 'JointRig', angle_rad: float, pressures_pa: tuple[float, float],
+                  external_n_m: float) -> float:
     """Return the net torque [N m] at rest; see ``JointRig.static_torque_n_m``."""
     value = joint.parameters
     torque = external_n_m - (
@@ -37,7 +43,7 @@ def static_torque(joint, angle_rad, pressures_pa, external_n_m):
     return torque
 
 
-def _static_force(rig, pressure, contraction):
+def _static_force(rig: 'Rig', pressure: float, contraction: float) -> float:
     state, par = rig.pack(initial_pressure_pa=pressure,
                           initial_contraction_m=max(contraction, 0.0))
     if contraction > fields(par, PARAMETERS).max_contraction_m:
@@ -45,7 +51,7 @@ def _static_force(rig, pressure, contraction):
     return max(fields(state, STATE).muscle_force_n, 0.0)
 
 
-def largest_torque_n_m(joint, pressure_pa):
+def largest_torque_n_m(joint: 'JointRig', pressure_pa: float) -> float:
     """Return the largest torque [N m] of either muscle alone, over the range, at a pressure."""
     arms = (joint.parameters['flexor_radius_m'], joint.parameters['extensor_radius_m'])
     return max(
@@ -54,14 +60,15 @@ def largest_torque_n_m(joint, pressure_pa):
             (joint.flexor, joint.extensor), joint.contractions_m(angle), arms))
 
 
-def static_angle(joint, pressures_pa, external_n_m=0.0, near_rad=None):
+def static_angle(joint: 'JointRig', pressures_pa: tuple[float, float], external_n_m: float = 0.0,
+                 near_rad: float | None = None) -> float:
     """Return the angle [rad] of rest; see ``JointRig.static_angle_rad``."""
     lower, upper = joint.range_rad
     if near_rad is None:
         near_rad = joint.parameters['hanging_angle_rad']
     near_rad = min(max(near_rad, lower), upper)
 
-    def torque(angle):
+    def torque(angle: float) -> float:
         return static_torque(joint, angle, pressures_pa, external_n_m)
 
     if torque(near_rad) == 0.0:

@@ -14,13 +14,18 @@
 
 """A joint as text: the model file that gives an equal joint."""
 
+from typing import Any, TYPE_CHECKING
+
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
 
-def joint_to_yaml(joint):
+
+def joint_to_yaml(joint: 'JointRig') -> str:
     """Return the text of a model file that gives an equal joint."""
-    data = {'name': joint.name, 'load': NAME}
+    data: dict[str, Any] = {'name': joint.name, 'load': NAME}
     for side in SIDES:
         data[side] = load_yaml(getattr(joint, side).to_yaml()).plain()
     changed = {p.name: joint.parameters[p.name] for p in PARAMETERS

@@ -20,17 +20,23 @@ positive angle turns the limb, which points down at ``hanging_angle_rad``, backw
 flexes. Inertia is that of the joint's parameters, moved to the centre of mass.
 """
 
+from typing import TYPE_CHECKING
 import xml.etree.ElementTree as ElementTree
 
 from pam_sim.joint.statics import largest_torque_n_m
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+    from pam_sim.joint.rig import JointRig
 
 PRESSURE_PA = P_ATM_PA + 600_000.0      # the pressure limit for which effort is stated
 VELOCITY_RAD_PER_S = 10.0               # URDF asks for a number; nothing here limits the rate
 SLENDERNESS = 0.02                      # inertia about the limb's own axis, share of the other
 
 
-def joint_urdf(joint, name):
+def joint_urdf(joint: 'JointRig', name: str) -> str:
     """
     Return the text of a URDF with the links ``NAME_base`` and ``NAME_limb``.
 
@@ -62,7 +68,7 @@ def joint_urdf(joint, name):
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding='unicode') + '\n'
 
 
-def _limb(robot, name, value):
+def _limb(robot: 'Element', name: str, value: dict[str, float]) -> None:
     """Add the link of the limb: a rod that hangs down from the axis."""
     down_m, mass_kg = value['centre_of_mass_m'], value['limb_mass_kg']
     swing = max(value['inertia_kg_m2'] - mass_kg * down_m ** 2, 0.0)
@@ -81,5 +87,5 @@ def _limb(robot, name, value):
         shape, 'cylinder', radius=_text(0.1 * down_m), length=_text(2.0 * down_m))
 
 
-def _text(number):
+def _text(number: float) -> str:
     return f'{number:.9g}'

@@ -35,7 +35,8 @@ PARAMETERS = (
 
 
 @inlined
-def acceleration(net_n, contraction_m, velocity_m_per_s, inverse_mass_per_kg, max_contraction_m):
+def acceleration(net_n: float, contraction_m: float, velocity_m_per_s: float,
+                 inverse_mass_per_kg: float, max_contraction_m: float) -> float:
     """
     Return the acceleration [m/s^2], zero where an end stop holds the mass.
 

@@ -17,9 +17,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.muscle.force_maps import LENGTH_M, read_force_map
-from pam_sim.muscle.law import Validity
+from pam_sim.muscle.force_maps import ForceMap, LENGTH_M, read_force_map
+from pam_sim.muscle.law import MuscleLaw, Validity
 from pam_sim.muscle.laws.chou_hannaford import ANGLE_RAD
 from pam_sim.muscle.registry import get_law
 from scipy.optimize import least_squares
@@ -79,12 +80,12 @@ class Fit:
     censored: int
 
 
-def residuals_n(formula_n, points):
+def residuals_n(formula_n: FloatArray, points: ForceMap) -> FloatArray:
     """Return formula minus measurement [N]; where nothing was measured only what is above zero."""
     return np.where(points.censored, np.maximum(0.0, formula_n), formula_n - points.force_n)
 
 
-def judge(law, points):
+def judge(law: MuscleLaw, points: ForceMap) -> Fit:
     """Return the Fit figures of a law as it stands, without fitting."""
     force = np.maximum(0.0, law.formula_n(points.pressure_gauge_pa, points.strain))
     error = (force - points.force_n)[~points.censored]
@@ -95,7 +96,9 @@ def judge(law, points):
                int(points.censored.sum()))
 
 
-def fit_law(name, points, muscle=None, fixed=None, free=None):
+def fit_law(name: str, points: ForceMap, muscle: str | None = None,
+            fixed: dict[str, float] | None = None,
+            free: tuple[str, ...] | None = None) -> Fit:
     """
     Return the Fit of a law to a map: bounded least squares, deterministic.
 
@@ -135,7 +138,7 @@ def fit_law(name, points, muscle=None, fixed=None, free=None):
     first = np.clip([start[key] for key in names], lower, upper)
     scale = np.maximum(np.abs(first), 1e-3 * (upper - lower))
 
-    def errors(scaled):
+    def errors(scaled: FloatArray) -> FloatArray:
         law.values.update(zip(names, scaled * scale))
         return residuals_n(law.tension_n(points), points)
 
@@ -151,7 +154,7 @@ def fit_law(name, points, muscle=None, fixed=None, free=None):
     return judge(result, points)
 
 
-def fit_table():
+def fit_table() -> dict[str, dict[str, Fit]]:
     """Return {map name: {label of CASES: Fit}} for both measured maps; under a second."""
     return {name: {label: fit_law(law, read_force_map(name), muscle, fixed)
                    for label, (law, muscle, fixed) in CASES.items()} for name in LENGTH_M}
@@ -160,10 +163,11 @@ def fit_table():
 class _Unchecked:
     """A law whose values may change under way; only the end result must be a muscle."""
 
-    def __init__(self, kind, values, muscle):
-        self._law = kind.__new__(kind)
+    def __init__(self, kind: type[MuscleLaw], values: dict[str, float],
+                 muscle: str | None) -> None:
+        self._law: MuscleLaw = kind.__new__(kind)
         self._law.validity = kind.SETS[muscle or next(iter(kind.SETS))].validity
         self.values = self._law.values = dict(values)
 
-    def tension_n(self, points):
+    def tension_n(self, points: ForceMap) -> FloatArray:
         return self._law._tension_n(points.pressure_gauge_pa, points.strain)

@@ -56,7 +56,7 @@ class ForceMap:
     censored: np.ndarray
 
 
-def read_force_map(name):
+def read_force_map(name: str) -> ForceMap:
     """
     Return a measured map; ``dmsp_10_250`` or ``dmsp_20_300``.
 

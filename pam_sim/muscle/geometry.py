@@ -21,6 +21,8 @@ Automation 12(1), eq. 4: V = L (Lf^2 - L^2) / (4 pi n^2).
 
 import math
 
+from pam_sim.annotations import Number
+
 from pam_sim.compiled import inlined
 
 LENGTH_M = 0.300
@@ -29,13 +31,15 @@ BRAID_ANGLE_RAD = math.radians(28.6)      # of the threads, from the axis, at x 
 MAX_STRAIN = 0.25                         # mechanical end of contraction
 
 
-def braid(length_m=LENGTH_M, bore_m=BORE_M, angle_rad=BRAID_ANGLE_RAD):
+def braid(length_m: float = LENGTH_M, bore_m: float = BORE_M,
+          angle_rad: float = BRAID_ANGLE_RAD) -> tuple[float, float]:
     """Return (thread length Lf [m], turns n [-]) of the braid."""
     return (length_m / math.cos(angle_rad),
             length_m * math.tan(angle_rad) / (math.pi * bore_m))
 
 
-def volume_of(contraction_m, length_m, thread_squared_m2, inverse_4_pi_n2):
+def volume_of(contraction_m: Number, length_m: float, thread_squared_m2: float,
+              inverse_4_pi_n2: float) -> Number:
     """
     Return the inner volume [m^3] without dead volume; scalars or arrays.
 

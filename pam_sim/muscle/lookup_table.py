@@ -14,15 +14,22 @@
 
 """The table behind the lookup law: contraction and air mass against pressure and load."""
 
+from collections.abc import Callable
 import csv
 from dataclasses import dataclass
+import os
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, whole_file
 from pam_sim.short_repr import short_repr
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
+
+if TYPE_CHECKING:
+    from pam_sim.muscle.law import MuscleLaw
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
 
@@ -59,7 +66,7 @@ class LookupTable:
     air_mass_kg: np.ndarray
     source: str = ''
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in COLUMNS:
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
             if not np.all(np.isfinite(getattr(self, name))):
@@ -85,13 +92,13 @@ class LookupTable:
             raise InputError('air mass must be positive and rise with pressure',
                              'lookup table, air_mass_kg')
 
-    def __eq__(self, other):
+    def __eq__(self, other: object) -> bool:
         return isinstance(other, LookupTable) and self.source == other.source and all(
             np.array_equal(getattr(self, name), getattr(other, name)) for name in COLUMNS)
 
-    __hash__ = None
+    __hash__ = None     # type: ignore[assignment]  # that is how Python says `not hashable`
 
-    def write_csv(self, path):
+    def write_csv(self, path: Path) -> None:
         """Write the table, one line per point, atomically; the source goes into a comment."""
         with whole_file(path) as temporary, \
                 open(temporary, 'w', newline='', encoding='utf-8') as stream:
@@ -105,7 +112,7 @@ class LookupTable:
                         pressure, load, self.strain[i, j], self.air_mass_kg[i, j])])
 
 
-def read_commented_csv(path):
+def read_commented_csv(path: str | os.PathLike[str]) -> tuple[list[list[str]], str]:
     """
     Return (rows, text of the ``#`` lines) of a CSV file.
 
@@ -125,7 +132,7 @@ def read_commented_csv(path):
         line for line in lines if line.strip() and not line.startswith('#'))), source
 
 
-def read_table(path):
+def read_table(path: str | os.PathLike[str]) -> LookupTable:
     """
     Return the LookupTable of a CSV file with the header of ``COLUMNS``; ``#`` lines are source.
 
@@ -149,10 +156,12 @@ def read_table(path):
     if len(data) != pressure.size * load.size or np.any(np.isnan(surfaces)):
         raise InputError(f'needs every pair of {pressure.size} pressures and {load.size} loads '
                          f'once; has {len(data)} rows', str(path))
-    return LookupTable(pressure, load, *surfaces, source)
+    strain, air_mass_kg = surfaces
+    return LookupTable(pressure, load, strain, air_mass_kg, source)
 
 
-def table_from_law(law, volume_m3, pressure_gauge_pa, load_n, dead_volume_m3=0.0):
+def table_from_law(law: 'MuscleLaw', volume_m3: Callable[..., Any], pressure_gauge_pa: FloatArray,
+                   load_n: FloatArray, dead_volume_m3: float = 0.0) -> LookupTable:
     """
     Return the table an ideal experiment on another law would give.
 

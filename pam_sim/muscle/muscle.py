@@ -19,12 +19,15 @@ Muscles by name are YAML files in ``pam_sim/muscle/sizes``; a model file may nam
 state its own, from one of them or anew.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 import math
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import Number
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
@@ -32,6 +35,9 @@ from pam_sim.muscle.lookup_table import LookupTable, read_table
 from pam_sim.muscle.registry import make_law
 from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import Parameter
+
+if TYPE_CHECKING:
+    from pam_sim.muscle.law import MuscleLaw
 
 _SIZES = NamedFiles('muscle/sizes')
 DIMENSIONS = (
@@ -73,20 +79,20 @@ class LawChoice:
     """
 
     name: str = 'sarosi'
-    set: str = None  # noqa: A003
-    parameters: dict = field(default_factory=dict)
-    table: LookupTable = None
+    set: str | None = None  # noqa: A003
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    table: LookupTable | None = None
 
     @cached_property
-    def law(self):
+    def law(self) -> 'MuscleLaw':
         """Return the law itself; made once."""
         if self.table is not None:
             return make_law(self.name, self.table)
         return make_law(self.name, self.parameters or None, self.set)
 
-    def plain(self):
+    def plain(self) -> dict[str, Any]:
         """Return the choice as plain data for a model file."""
-        data = {'name': self.name}
+        data: dict[str, Any] = {'name': self.name}
         if self.table is not None:
             data['table'] = {key: getattr(self.table, key) if key == 'source'
                              else getattr(self.table, key).tolist() for key in _TABLE_KEYS}
@@ -122,32 +128,32 @@ class Muscle:
     rests_on: str = ''
 
     @property
-    def stroke_m(self):
+    def stroke_m(self) -> float:
         """Largest contraction, m."""
         return self.max_strain * self.length_m
 
     @cached_property
-    def shape(self):
+    def shape(self) -> tuple[float, float, float]:
         """Arguments of :func:`pam_sim.muscle.geometry.volume_of` after the contraction."""
         thread, turns = geometry.braid(self.length_m, self.bore_m, self.braid_angle_rad)
         return self.length_m, thread * thread, 1.0 / (4.0 * math.pi * turns * turns)
 
     @cached_property
-    def stiffness_n_per_m(self):
+    def stiffness_n_per_m(self) -> float:
         """Largest fall of the tension with contraction up to 600 kPa, N/m: how short to step."""
         strain = np.linspace(0.0, self.max_strain, 51)
         force = self.law.law.force_n(np.array([[200e3], [400e3], [600e3]]), strain, 'allow')
         return float(np.max(-np.diff(force)) / (strain[1] * self.length_m))
 
-    def volume_m3(self, contraction_m):
+    def volume_m3(self, contraction_m: Number) -> Number:
         """Return the inner volume [m^3] at a contraction [m]; scalar or array."""
         return geometry.volume_of(contraction_m, *self.shape)
 
-    def with_law(self, law):
+    def with_law(self, law: LawChoice | str) -> 'Muscle':
         """Return the muscle with another law, a LawChoice or a name."""
         return replace(self, law=checked_law(LawChoice(law) if isinstance(law, str) else law))
 
-    def plain(self):
+    def plain(self) -> dict[str, Any] | str:
         """Return the muscle as plain data for a model file: its name if that says all."""
         if self.name in muscle_names() and self == get_muscle(self.name):
             return self.name
@@ -158,13 +164,13 @@ class Muscle:
         return data
 
 
-def muscle_names():
+def muscle_names() -> list[str]:
     """Return the names of the muscles there are, sorted."""
     return _SIZES.names()
 
 
 @lru_cache(maxsize=None)
-def get_muscle(name):
+def get_muscle(name: str) -> Muscle:
     """
     Return a muscle by name.
 
@@ -181,7 +187,7 @@ def get_muscle(name):
     return read_muscle(_SIZES.read(name), name)
 
 
-def read_muscle(data, name='muscle'):
+def read_muscle(data: Located, name: str = 'muscle') -> Muscle:
     """
     Return the muscle a mapping describes.
 
@@ -212,7 +218,7 @@ def read_muscle(data, name='muscle'):
     return replace(base, name=name, **numbers, law=law, rests_on=' '.join(rests_on.split()))
 
 
-def read_law(data, base=None):
+def read_law(data: Located, base: LawChoice | None = None) -> LawChoice:
     """
     Return the LawChoice under the key ``law`` of a mapping: a name, or a mapping.
 
@@ -239,10 +245,10 @@ def read_law(data, base=None):
         table = _read_law_table(stated) if 'table' in stated else None
     else:
         name, chosen = data.require('law', str), None
-    return checked_law(LawChoice(name, chosen, given, table), where)
+    return checked_law(LawChoice(name, chosen, given or {}, table), where)
 
 
-def checked_law(choice, where=''):
+def checked_law(choice: LawChoice, where: str = '') -> LawChoice:
     """
     Return a LawChoice with its set and plain parameters, once the law could be made.
 
@@ -262,7 +268,7 @@ def checked_law(choice, where=''):
     return LawChoice(choice.name, law.muscle, dict(choice.parameters or {}), choice.table)
 
 
-def _read_law_table(stated):
+def _read_law_table(stated: Located) -> LookupTable:
     given = stated['table']
     if isinstance(given, str):
         path = Path(given)
@@ -272,5 +278,5 @@ def _read_law_table(stated):
         raise stated.error('`table` is the path of a CSV file or a mapping of '
                            + ', '.join(_TABLE_KEYS), 'table')
     given.check_keys(_TABLE_KEYS)
-    return LookupTable(*(given.require(key, list) for key in _TABLE_KEYS[:4]),
-                       given.get('source', str, ''))
+    pressure, load, strain, air_mass_kg = (given.require(key, list) for key in _TABLE_KEYS[:4])
+    return LookupTable(pressure, load, strain, air_mass_kg, given.get('source', str, ''))

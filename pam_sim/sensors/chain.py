@@ -14,8 +14,14 @@
 
 """What the sensors add to the signals of the rig."""
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.parameters import check_parameters, Parameter
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 SENSOR_PARAMETERS = (
     Parameter('pressure_noise_pa', 'Pa', 0.0, 0.0, 1e5, description='White noise, 1 sigma.'),
@@ -47,10 +53,10 @@ class SensorChain:
 
     """
 
-    def __init__(self, settings=None, seed=0):
-        settings = getattr(settings, 'sensors', settings)
+    def __init__(self, settings: 'Rig | dict[str, float] | None' = None, seed: int = 0) -> None:
+        given: Any = getattr(settings, 'sensors', settings)
         self.settings = check_parameters(
-            SENSOR_PARAMETERS, settings or {}, 'sensor setting', 'sensors')
+            SENSOR_PARAMETERS, given or {}, 'sensor setting', 'sensors')
         self.seed = int(seed)
         value = self.settings
         self._sigma = np.array([value['pressure_noise_pa'], value['contraction_noise_m'],
@@ -60,7 +66,8 @@ class SensorChain:
         self._random = np.random.default_rng(self.seed)
         self._adds_noise = bool(np.any(self._sigma))
 
-    def read(self, time_s, pressure_pa, contraction_m, force_n):
+    def read(self, time_s: float, pressure_pa: float, contraction_m: float,
+             force_n: float) -> tuple[float, float, float, int]:
         """
         Return one reading.
 
@@ -86,9 +93,11 @@ class SensorChain:
         for index, step in enumerate(self._step):
             if step > 0.0:
                 reading[index] = round(reading[index] / step) * step
-        return (*reading, jitter_ns)
+        pressure_pa, contraction_m, force_n = reading
+        return pressure_pa, contraction_m, force_n, jitter_ns
 
-    def read_all(self, time_s, pressure_pa, contraction_m, force_n):
+    def read_all(self, time_s: FloatArray, pressure_pa: FloatArray, contraction_m: FloatArray,
+                 force_n: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
         """
         Return readings of whole arrays, the same numbers as sample by sample.
 
@@ -107,5 +116,5 @@ class SensorChain:
             np.asarray(time_s, float).tolist(), np.asarray(pressure_pa, float).tolist(),
             np.asarray(contraction_m, float).tolist(), np.asarray(force_n, float).tolist())]
         columns = list(zip(*rows)) if rows else [(), (), (), ()]
-        return (*(np.array(column, dtype=float) for column in columns[:3]),
-                np.array(columns[3], dtype=np.int64))
+        pressure, contraction, force = (np.array(column, dtype=float) for column in columns[:3])
+        return pressure, contraction, force, np.array(columns[3], dtype=np.int64)

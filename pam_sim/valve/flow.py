@@ -27,7 +27,7 @@ RATIO_LINEAR = 0.999
 
 
 @inlined
-def flow_function(ratio, critical_ratio):
+def flow_function(ratio: float, critical_ratio: float) -> float:
     """
     Return psi(r), dimensionless: 1 when choked, 0 at or above equal pressures.
 
@@ -51,7 +51,8 @@ def flow_function(ratio, critical_ratio):
 
 
 @inlined
-def mass_flow_kg_per_s(upstream_pa, downstream_pa, conductance_kg_per_s_pa, critical_ratio):
+def mass_flow_kg_per_s(upstream_pa: float, downstream_pa: float, conductance_kg_per_s_pa: float,
+                       critical_ratio: float) -> float:
     """
     Return the mass flow [kg/s], never negative (no back flow).
 

@@ -49,20 +49,21 @@ PARAMETERS = (
 
 
 @inlined
-def clip_duty(duty):
+def clip_duty(duty: float) -> float:
     """Return a duty limited to 0 … 1."""
     return min(max(duty, 0.0), 1.0)
 
 
 @inlined
-def open_time_in(start_s, end_s, on_s, off_s):
+def open_time_in(start_s: float, end_s: float, on_s: float, off_s: float) -> float:
     """Return how long [s] a valve open from ``on_s`` to ``off_s`` is open in [start, end]."""
     overlap = min(end_s, off_s) - max(start_s, on_s)
     return overlap if overlap > 0.0 else 0.0
 
 
 @inlined
-def pulse_edges(pulse_s, last_off_s, period_s, open_time_s, close_time_s):
+def pulse_edges(pulse_s: float, last_off_s: float, period_s: float, open_time_s: float,
+                close_time_s: float) -> tuple[float, float]:
     """
     Return (on, off) edges [s] of one valve in the PWM period that begins now.
 

@@ -41,7 +41,7 @@ PARAMETERS = (
 
 
 @inlined
-def set_point_pa(voltage_v, gain_pa_per_v, atmosphere_pa):
+def set_point_pa(voltage_v: float, gain_pa_per_v: float, atmosphere_pa: float) -> float:
     """Return the absolute pressure set point [Pa] of a command voltage, clipped to 0-6 V."""
     voltage = min(max(voltage_v, 0.0), MAX_VOLTAGE_V)
     return atmosphere_pa + gain_pa_per_v * voltage

@@ -14,33 +14,42 @@
 
 """The mode of a controller file: which there are, what they add to the file."""
 
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.control.modes.force import force_to_mapping, ForceMode
 from pam_actuation.control.modes.joint import joint_to_mapping, JointMode
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED, tracked_by
 from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.located_yaml import Located
+    from pam_sim.rig import Rig
 
 KEYS = ('mode', 'force', 'joint')
 KINDS = ('sofc', 'pid')       # laws that can be wrapped
-_MODES = {FORCE.mode: ForceMode, JOINT.mode: JointMode}
+_MODES: dict[str, type[ForceMode] | type[JointMode]] = {
+    FORCE.mode: ForceMode, JOINT.mode: JointMode}
 
 
 LARGE_JOINT_KG_M2 = 0.03      # moment of inertia: a leg, and not a rod on a bench
 
 
-def preset_for(experiment, rig):
+def preset_for(experiment: 'Experiment', rig: 'Rig') -> str:
     """Return the name of the self-organizing controller for an experiment's quantity."""
     mode = 'force_' if experiment.domain == FORCE.topic else ''
     return f'sofc_{mode}{rig.valve}'
 
 
-def joint_preset_for(joint, valve):
+def joint_preset_for(joint: 'JointRig', valve: str) -> str:
     """Return the name of the self-organizing controller for a joint of this size."""
     size = 'knee' if joint.parameters['inertia_kg_m2'] > LARGE_JOINT_KG_M2 else 'joint'
     return f'sofc_{size}_{valve}'
 
 
-def read_mode(tree, rig):
+def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | JointMode | None:
     """
     Return the mode a controller file asks for, None for contraction.
 
@@ -55,11 +64,13 @@ def read_mode(tree, rig):
         if key in tree and key != name:
             raise tree.error(f'`{key}` belongs to `mode: {key}`, the mode here is {name}', key)
     if name == CONTRACTION.mode:
-        if hasattr(rig, 'flexor'):
+        if isinstance(rig, JointRig):
             raise InputError(
                 f'{rig.name} is a joint; its controller needs `mode: joint`', tree.where())
-        load = LOADS.get(getattr(rig, 'load', None))
-        if load is not None and not load.MOVES_FREELY and 'static_inverse' not in tree:
+        # What stands in for a rig need not have a load.
+        load = LOADS.get(getattr(rig, 'load', ''))
+        if rig is not None and load is not None and not load.MOVES_FREELY and (
+                'static_inverse' not in tree):
             raise InputError(
                 f'the load `{rig.load}` of {rig.name} has its contraction prescribed; its '
                 'controller needs `mode: force`', tree.where())
@@ -67,10 +78,15 @@ def read_mode(tree, rig):
     kind = tree.require('controller', str)
     if kind not in KINDS:
         raise tree.error(f'a {kind} controller has no `mode: {name}`', 'mode')
-    return _MODES[name](tree, rig)
+    if name == FORCE.mode:
+        return ForceMode(tree, rig)
+    if rig is not None and not isinstance(rig, JointRig):
+        raise InputError(
+            f'`mode: joint` needs a joint; {rig.name} is a single muscle', tree.where('mode'))
+    return JointMode(tree, rig)
 
 
-def mode_to_mapping(controller):
+def mode_to_mapping(controller: Any) -> dict[str, Any]:
     """Return what the mode of a controller adds to its file, as plain data."""
     tracked = tracked_by(controller)
     if tracked == FORCE:

@@ -36,6 +36,7 @@ from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedL
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
 from pam_sim.located_yaml import Located
 from pam_sim.records import cells, part, record, values_of, zeros
 from pam_sim.rig import Rig
@@ -89,12 +90,13 @@ def look_ahead(par: np.record, st: np.record, contraction_m: float, elapsed_s: f
         st.known = 1.0
     elif elapsed_s > 0.0:
         fading = par.fading
-        st.contraction_m += st.rate_m_per_s * elapsed_s
-        residual = contraction_m - st.contraction_m
-        st.contraction_m += (1.0 - fading * fading) * residual
+        expected_m = st.contraction_m + st.rate_m_per_s * elapsed_s
+        residual = contraction_m - expected_m
+        st.contraction_m = expected_m + (1.0 - fading * fading) * residual
         st.rate_m_per_s += (1.0 - fading) * (1.0 - fading) * residual / elapsed_s
-    st.ahead_m = st.contraction_m + par.lead_s * st.rate_m_per_s
-    return st.ahead_m
+    ahead_m: float = st.contraction_m + par.lead_s * st.rate_m_per_s
+    st.ahead_m = ahead_m
+    return ahead_m
 
 
 @compiled
@@ -270,7 +272,7 @@ class ForceMode:
 
     tracked = FORCE
 
-    def __init__(self, tree: Located, rig: Rig | None) -> None:
+    def __init__(self, tree: Located, rig: Rig | JointRig | None) -> None:
         """
         Read the block ``force`` of a controller file; what it lacks comes from the rig.
 
@@ -283,7 +285,7 @@ class ForceMode:
         if 'static_inverse' in tree:
             raise tree.error('force mode has no `static_inverse`, it has `force: surface`',
                              'static_inverse')
-        if hasattr(rig, 'flexor'):
+        if isinstance(rig, JointRig):
             raise InputError(
                 f'`mode: force` needs a single muscle; {rig.name} is a joint', tree.where('mode'))
         block = tree.get('force', dict)
@@ -291,16 +293,20 @@ class ForceMode:
         if block is not None:
             block.check_keys(KEYS)
             own = block.get('surface', dict)
-        if rig is None and (own is None or 'stiffness_n_per_m' not in block):
-            raise tree.error(
-                'without a rig `force` must bring `stiffness_n_per_m` and `surface`', 'mode')
-        self.surface = tabulate_force_surface(rig) if own is None else surface_from_tree(own)
         stiffness = contraction = None
         if block is not None:
             stiffness = block.get(
                 'stiffness_n_per_m', float, None, lower=1.0, upper=1e7, unit='N/m')
             contraction = block.get('contraction_m', float, None, lower=0.0, upper=1.0, unit='m')
-        self.stiffness_n_per_m = nominal_stiffness_n_per_m(rig) if stiffness is None else stiffness
+        if rig is None:
+            if own is None or stiffness is None:
+                raise tree.error(
+                    'without a rig `force` must bring `stiffness_n_per_m` and `surface`', 'mode')
+            self.surface, self.stiffness_n_per_m = surface_from_tree(own), stiffness
+        else:
+            self.surface = tabulate_force_surface(rig) if own is None else surface_from_tree(own)
+            self.stiffness_n_per_m = (
+                nominal_stiffness_n_per_m(rig) if stiffness is None else stiffness)
         if contraction is None:
             contraction = 0.0 if rig is None else rig.parameters.get('contraction_m', 0.0)
         self.contraction_m = contraction

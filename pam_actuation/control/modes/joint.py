@@ -34,7 +34,7 @@ from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedL
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
-from pam_sim.joint import JointRig
+from pam_sim.joint.rig import JointRig
 from pam_sim.located_yaml import Located
 from pam_sim.records import cells, part, record, size_of, values_of, zeros
 from pam_sim.units import P_ATM_PA
@@ -143,8 +143,9 @@ def _commands(par: np.record, st: np.record, u_pa: float, raw: np.record,
             mean = par.lowest_pa
         st.co_contraction_pa = min(max(mean, par.lowest_pa), par.highest_pa)
     step = par.co_contraction_pa - st.co_contraction_pa
-    st.co_contraction_pa += min(max(step, -par.reach_pa), par.reach_pa)
-    flexor_pa, extensor_pa = pair_of(u_pa, st.co_contraction_pa, par.lowest_pa, par.highest_pa)
+    mean_pa: float = st.co_contraction_pa + min(max(step, -par.reach_pa), par.reach_pa)
+    st.co_contraction_pa = mean_pa
+    flexor_pa, extensor_pa = pair_of(u_pa, mean_pa, par.lowest_pa, par.highest_pa)
     commands.flexor_pa = flexor_pa
     commands.extensor_pa = extensor_pa
 
@@ -227,7 +228,7 @@ class JointController(WrappedLaw):
              ref_lead_rad: float, ref_lead_rate_rad_per_s: float, learn: bool = True,
              elapsed_s: float = math.nan, pressures_pa: Sequence[float] = (math.nan, math.nan),
              forces_n: Sequence[float] = (math.nan, math.nan),
-             held_back: float = 0.0) -> tuple[float, ...]:
+             held_back: float = 0.0) -> tuple[float, float]:
         """
         Run one tick.
 
@@ -341,7 +342,7 @@ class JointMode:
 
         """
         block = tree.get('joint', dict)
-        numbers = {} if rig is None else getattr(rig, 'parameters', {})
+        numbers: Mapping[str, float] = {} if rig is None else getattr(rig, 'parameters', {})
         if rig is not None and not hasattr(rig, 'flexor'):
             raise InputError(
                 f'`mode: joint` needs a joint; {rig.name} is a single muscle', tree.where('mode'))
@@ -387,8 +388,9 @@ class JointMode:
 
     def wrap(self, law: CompiledController) -> JointController:
         """Return the law in this mode, with the static inverse of the joint if it had none."""
-        controller = JointController(law, *(self.values[key] for key in KEYS), self._where)
-        if not self._own_inverse:
+        radius_m, contraction_m, gauge_pa = (self.values[key] for key in KEYS)
+        controller = JointController(law, radius_m, contraction_m, gauge_pa, self._where)
+        if not self._own_inverse and self._joint is not None:
             lowest, highest = limits_gauge_pa(law.settings)
             law.static_inverse[:] = tabulate_joint_inverse(
                 self._joint, P_ATM_PA + controller.co_contraction_gauge_pa, P_ATM_PA + lowest,

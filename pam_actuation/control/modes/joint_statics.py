@@ -92,7 +92,8 @@ def tabulate_joint_inverse(joint: JointRig, co_contraction_pa: float, lowest_pa:
         the limit.
 
     """
-    angle = np.linspace(*joint.range_rad, nodes)
+    lower, upper = joint.range_rad
+    angle = np.linspace(lower, upper, nodes)
     low = np.full(nodes, lowest_pa)
     high = np.full(nodes, highest_pa)
     for _ in range(_BISECTIONS):

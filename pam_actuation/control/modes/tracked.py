@@ -15,6 +15,7 @@
 """The quantity a controller tracks: its name, its unit, the topic that measures it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,6 @@ JOINT = Tracked('joint', 'rad', 'joint_angle')
 TRACKED = {one.mode: one for one in (CONTRACTION, FORCE, JOINT)}
 
 
-def tracked_by(controller):
+def tracked_by(controller: Any) -> Tracked:
     """Return what a controller tracks; a law by itself tracks contraction."""
     return getattr(controller, 'tracked', CONTRACTION)

@@ -14,6 +14,8 @@
 
 """A control law, which works in metres of contraction, made to track something else."""
 
+from typing import Any
+
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.modes.tracked import Tracked
@@ -45,7 +47,7 @@ class WrappedLaw:
     """
 
     tracked: Tracked
-    made_for = None         # facts of the rig, see ``control/made_for``
+    made_for: dict[str, Any] | None = None      # facts of the rig, see ``control/made_for``
     other_rig = ''          # how the rig it runs on differs, if that was accepted
 
     def __init__(self, law: CompiledController) -> None:

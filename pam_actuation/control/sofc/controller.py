@@ -14,6 +14,9 @@
 
 """The self-organizing fuzzy controller as a class: owner of the arrays of ``sofc_step``."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.settings import checked_settings
@@ -25,6 +28,7 @@ from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.settings import parameter_array, PARAMETERS, SCALING, SETTINGS
 from pam_actuation.control.sofc.step import sofc_step
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of
 
@@ -54,9 +58,12 @@ class SelfOrganizingFuzzyController(CompiledController):
     """
 
     kind = 'sofc'
-    state_names = OUTPUT.names
+    state_names = OUTPUT.names or ()
+    rules: RuleBase
 
-    def __init__(self, static_inverse, settings=None, rules=None, rig_name='', where=None):
+    def __init__(self, static_inverse: FloatArray, settings: dict[str, Any] | None = None,
+                 rules: RuleBase | None = None, rig_name: str = '',
+                 where: Callable[[str], str] | None = None) -> None:
         settings = checked_settings(SETTINGS, settings or {}, where)
         super().__init__(settings, STATE, rig_name)
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
@@ -70,7 +77,7 @@ class SelfOrganizingFuzzyController(CompiledController):
                 'max_pressure_gauge_pa must be larger than min_pressure_gauge_pa',
                 where('max_pressure_gauge_pa') if where else 'max_pressure_gauge_pa')
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        scaling = {name: self.settings[name] for name in SCALING}
+        scaling: dict[str, Any] = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
         self.rules = RuleBase(
             linear_feedback_table(), np.zeros((2, int(self.settings['reference_knots']))),
@@ -94,21 +101,21 @@ class SelfOrganizingFuzzyController(CompiledController):
         sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)
                     else array.copy() for array in self._arguments))
 
-    def learning_reason(self):
+    def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
         return REASONS[int(fields(self._outputs, OUTPUT).learning_reason)]
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         super().pause()
         self._ring[:] = 0.0
 
-    def reset(self):
+    def reset(self) -> None:
         """Return to the initial rules and forget the motion."""
         self.rules.reset()
         self.pause()
 
-    def replace_rules(self, rules, where='rules'):
+    def replace_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """
         Exchange the rules without a step in the command.
 
@@ -126,13 +133,13 @@ class SelfOrganizingFuzzyController(CompiledController):
         self.rules.assign(rules)
         self._keep_output(before)
 
-    def reset_rules(self):
+    def reset_rules(self) -> None:
         """Return to the initial rules without a step in the command."""
         before = self._rule_output_pa()
         self.rules.reset()
         self._keep_output(before)
 
-    def _keep_output(self, before_pa):
+    def _keep_output(self, before_pa: float) -> None:
         self.rules_replaced += 1
         self._ring[:] = 0.0        # no credit for rules that are gone
         state = fields(self._state, STATE)
@@ -145,7 +152,7 @@ class SelfOrganizingFuzzyController(CompiledController):
         integral = state.integral_pa + change / (state.integral_shape or 1.0)  # 0 = not begun
         state.integral_pa = min(max(integral, -limit), limit)
 
-    def _rule_output_pa(self):
+    def _rule_output_pa(self) -> float:
         """Return the contribution [Pa] of all rule tables where the last tick was."""
         out = fields(self._outputs, OUTPUT)
         share = out.contracting_share

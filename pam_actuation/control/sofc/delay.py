@@ -26,6 +26,7 @@ be spread.
 from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
 LONGEST_S = 0.4
@@ -59,7 +60,8 @@ class CreditEstimate:
     blocks: int
 
 
-def estimate_credit(command_pa, answer, rate_hz, where='recording'):
+def estimate_credit(command_pa: FloatArray, answer: FloatArray, rate_hz: float,
+                    where: str = 'recording') -> CreditEstimate | None:
     """
     Estimate credit delay and spread from recorded command and answer.
 
@@ -108,7 +110,7 @@ def estimate_credit(command_pa, answer, rate_hz, where='recording'):
         max(float(np.std(delays)), 1.0) / rate_hz, float(np.median(correlations)), len(found))
 
 
-def _peak(command, answer, longest):
+def _peak(command: FloatArray, answer: FloatArray, longest: int) -> tuple[float, float] | None:
     """Return (delay in samples, correlation) where a block fits best, None where nothing does."""
     size = len(command)
     command = command - command.mean()

@@ -137,11 +137,12 @@ def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_
     raw = (rate_m_per_s - st.lead_rate_m_per_s) / period
     st.lead_rate_m_per_s = rate_m_per_s
     part = period / (par.acceleration_filter_s + period)
-    st.acceleration_m_per_s2 += part * (raw - st.acceleration_m_per_s2)
-    if abs(st.acceleration_m_per_s2) < _ACCELERATION_FLOOR_M_PER_S2:
-        st.acceleration_m_per_s2 = 0.0
+    acceleration: float = st.acceleration_m_per_s2 + part * (raw - st.acceleration_m_per_s2)
+    if abs(acceleration) < _ACCELERATION_FLOOR_M_PER_S2:
+        acceleration = 0.0
+    st.acceleration_m_per_s2 = acceleration
     moving = (par.rate_feedforward_pa_s_per_m * rate_m_per_s
-              + par.acceleration_feedforward_pa_s2_per_m * st.acceleration_m_per_s2)
+              + par.acceleration_feedforward_pa_s2_per_m * acceleration)
     quasi_static = static_pa + moving
     if rate_jumped:
         st.quasi_static_pa = quasi_static

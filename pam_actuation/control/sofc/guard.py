@@ -109,13 +109,14 @@ def _judge(par: np.record, st: np.record, values: Tables, kept: Tables) -> bool:
                 par.anneal_floor, par.anneal * st.rate_factor)
         return False
     st.rate_factor = 1.0
-    st.bad_windows += 1.0
-    if st.bad_windows <= 1.0:
+    bad_windows: float = st.bad_windows + 1.0
+    st.bad_windows = bad_windows
+    if bad_windows <= 1.0:
         st.first_bad_rms_m = rms
         return False
     if rms > _GROWING * former:
         return True
-    if st.bad_windows >= _NEW_NORMAL:
+    if bad_windows >= _NEW_NORMAL:
         if rms > _GROWING * st.first_bad_rms_m:
             return True
         _new_best(st, rms, values, kept)

@@ -27,6 +27,7 @@ tick counts by how far the reference moved over the knots, so that a rule mends
 the same share of the error whether the reference passes it fast or slowly.
 """
 
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 
 LEARNING = 0
@@ -46,12 +47,13 @@ REASONS = (
 
 
 @compiled
-def _bounded(value, limit):
+def _bounded(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
 @compiled
-def modify_feedback(table, initial, share, i, wi, j, wj, gain, leak, step_limit):
+def modify_feedback(table: FloatArray, initial: FloatArray, share: float, i: int, wi: float,
+                    j: int, wj: float, gain: float, leak: float, step_limit: float) -> float:
     """
     Change the feedback rules that were active; return the squared norm of the change.
 
@@ -76,7 +78,9 @@ def modify_feedback(table, initial, share, i, wi, j, wj, gain, leak, step_limit)
 
 
 @compiled
-def modify_feedforward(table, initial, share, k, wk, gain_pa, leak, step_limit_pa, limit_pa):
+def modify_feedforward(table: FloatArray, initial: FloatArray, share: float, k: int, wk: float,
+                       gain_pa: float, leak: float, step_limit_pa: float,
+                       limit_pa: float) -> float:
     """
     Change the feed-forward rules that were active; return the squared norm [Pa^2].
 
@@ -98,7 +102,8 @@ def modify_feedforward(table, initial, share, k, wk, gain_pa, leak, step_limit_p
 
 
 @compiled
-def modify_motion(table, initial, m, wm, n, wn, gain_pa, leak, step_limit_pa, limit_pa):
+def modify_motion(table: FloatArray, initial: FloatArray, m: int, wm: float, n: int, wn: float,
+                  gain_pa: float, leak: float, step_limit_pa: float, limit_pa: float) -> float:
     """
     Change the motion rules that were active; return the squared norm [Pa^2].
 

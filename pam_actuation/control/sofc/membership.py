@@ -24,6 +24,7 @@ cover the whole universe by construction.
 import math
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 
 SET_COUNT = 7
@@ -34,7 +35,7 @@ SET_WORDS = (
 
 
 @compiled
-def locate(value, lower, upper, count):
+def locate(value: float, lower: float, upper: float, count: int) -> tuple[int, float]:
     """
     Return the lower one of the two active sets and the degree of the upper one.
 
@@ -51,7 +52,7 @@ def locate(value, lower, upper, count):
 
 
 @compiled
-def gaussian_degree(degree, width):
+def gaussian_degree(degree: float, width: float) -> float:
     """
     Return the degree of the upper set when both active sets are Gaussian.
 
@@ -67,7 +68,8 @@ def gaussian_degree(degree, width):
 
 
 @compiled
-def locate_signed_logarithmic(value, fine, upper, count):
+def locate_signed_logarithmic(value: float, fine: float, upper: float,
+                              count: int) -> tuple[int, float]:
     """
     Return the lower active set and the degree of the upper one on a signed logarithmic grid.
 
@@ -77,12 +79,13 @@ def locate_signed_logarithmic(value, fine, upper, count):
     return locate(math.asinh(value / fine) / math.asinh(upper / fine), -1.0, 1.0, count)
 
 
-def signed_logarithmic_knots(fine, upper, count):
+def signed_logarithmic_knots(fine: float, upper: float, count: int) -> FloatArray:
     """Return the values at which the sets of ``locate_signed_logarithmic`` have their peaks."""
     return fine * np.sinh(np.linspace(-1.0, 1.0, count) * math.asinh(upper / fine))
 
 
-def memberships(value, lower=-1.0, upper=1.0, count=SET_COUNT, gaussian_width=None):
+def memberships(value: float, lower: float = -1.0, upper: float = 1.0, count: int = SET_COUNT,
+                gaussian_width: float | None = None) -> FloatArray:
     """Return the degrees of all sets at a value, shape (count,), for plots and tests."""
     degrees = np.zeros(count)
     index, degree = locate(float(value), lower, upper, count)

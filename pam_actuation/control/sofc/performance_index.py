@@ -25,6 +25,7 @@ first-order decay of the error. Two forms:
 """
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 
 LEVELS = 13
@@ -38,7 +39,7 @@ _POSITIVE_ROWS = (
     (0, 0, 0, 0, 0, 0, 6, 6, 6, 6, 6, 6, 6))
 
 
-def _full_table():
+def _full_table() -> FloatArray:
     """Complete the rows of positive error by the antisymmetry P(-e, -ce) = -P(e, ce)."""
     table = np.zeros((LEVELS, LEVELS))
     for level in range(1, 7):
@@ -52,13 +53,13 @@ TABLE = _full_table()     # rows error level -6..6, columns change-of-error leve
 
 
 @compiled
-def index_linear(error_m, rate_m_per_s, tau_s, limit_m):
+def index_linear(error_m: float, rate_m_per_s: float, tau_s: float, limit_m: float) -> float:
     """Return the linear performance index [m]."""
     return min(max(error_m + tau_s * rate_m_per_s, -limit_m), limit_m)
 
 
 @compiled
-def index_table(error_scaled, rate_scaled, limit_m):
+def index_table(error_scaled: float, rate_scaled: float, limit_m: float) -> float:
     """Return the tabulated performance index [m] of error and change scaled to [-1, 1]."""
     row = int(np.rint(6.0 * min(max(error_scaled, -1.0), 1.0))) + 6
     column = int(np.rint(6.0 * min(max(rate_scaled, -1.0), 1.0))) + 6

@@ -25,12 +25,15 @@ import hashlib
 import json
 import math
 import os
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, write_text
 
@@ -38,7 +41,7 @@ SCHEMA = 2
 VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
-_SHAPES = {
+_SHAPES: dict[str, tuple[int | str, ...]] = {
     'feedback': (2, SET_COUNT, SET_COUNT),
     'feedforward': (2, 'reference_knots'),
     'motion': ('motion_position_knots', 'motion_rate_knots')}
@@ -47,13 +50,13 @@ _ARRAYS = tuple(
 _KEYS = ('schema', 'shape', 'scaling', *_ARRAYS, 'sha256')
 
 
-def _digest(content):
+def _digest(content: dict[str, Any]) -> str:
     """Return the sha256 of the canonical JSON text of a mapping."""
     text = json.dumps(content, sort_keys=True, separators=(',', ':'))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def rules_to_mapping(rules):
+def rules_to_mapping(rules: RuleBase) -> dict[str, Any]:
     """Return a rule base as a mapping of plain numbers and lists, checksum included."""
     content = {
         'schema': SCHEMA,
@@ -63,7 +66,8 @@ def rules_to_mapping(rules):
     return {**content, 'sha256': _digest(content)}
 
 
-def rules_from_mapping(mapping, where, expected=None):
+def rules_from_mapping(mapping: dict[str, Any], where: str,
+                       expected: RuleBase | None = None) -> RuleBase:
     """
     Return the rule base of a mapping written by ``rules_to_mapping``.
 
@@ -100,7 +104,7 @@ def rules_from_mapping(mapping, where, expected=None):
     return rules
 
 
-def _check_whole(mapping, where):
+def _check_whole(mapping: dict[str, Any], where: str) -> None:
     """Raise InputError unless a mapping is a rule file of this schema, entire and unspoiled."""
     if not isinstance(mapping, dict) or 'schema' not in mapping:
         raise InputError('not a rule file: it names no schema', where)
@@ -122,7 +126,7 @@ def _check_whole(mapping, where):
         raise InputError('rule file is damaged: its checksum does not fit its content', where)
 
 
-def _checked_scaling(scaling, where):
+def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     """Return the scaling of a file; InputError unless it says what the numbers mean."""
     if not isinstance(scaling, dict):
         raise InputError('scaling is not a mapping', where)
@@ -143,7 +147,7 @@ def _checked_scaling(scaling, where):
     return dict(scaling)
 
 
-def _check_tracked(given, where):
+def _check_tracked(given: dict[str, Any], where: str) -> None:
     """Raise InputError unless the rules are of contraction or say all of what they track."""
     if not given:
         return
@@ -160,7 +164,8 @@ def _check_tracked(given, where):
             raise InputError(f'{name} is {_short(value)}, no usable number', where)
 
 
-def _checked_array(mapping, name, scaling, where):
+def _checked_array(mapping: dict[str, Any], name: str, scaling: dict[str, float],
+                   where: str) -> FloatArray:
     """Return one table of a file as an array of finite numbers, of the shape of its scaling."""
     try:
         array = np.array(mapping[name])
@@ -172,7 +177,9 @@ def _checked_array(mapping, name, scaling, where):
     shapes = mapping['shape']
     for source, wanted in (
             ('the file says', shapes.get(table) if isinstance(shapes, dict) else None),
-            ('its scaling says', [scaling.get(length, length) for length in _SHAPES[table]])):
+            ('its scaling says', [
+                length if isinstance(length, int) else scaling.get(length, length)
+                for length in _SHAPES[table]])):
         if list(array.shape) != wanted:
             raise InputError(
                 f'{name} has shape {list(array.shape)}, {source} {_short(wanted)}', where)
@@ -182,13 +189,13 @@ def _checked_array(mapping, name, scaling, where):
     return array
 
 
-def _short(value):
+def _short(value: Any) -> str:
     """Return a value of a foreign file as a short piece of one sentence."""
     text = ascii(value)
     return text if len(text) <= 40 else f'{text[:40]}...'
 
 
-def check_fit(rules, expected, where):
+def check_fit(rules: RuleBase, expected: RuleBase, where: str) -> None:
     """
     Raise InputError unless two rule bases agree in rig, valve, scaling and shapes.
 
@@ -211,7 +218,7 @@ def check_fit(rules, expected, where):
                 f'{list(other)}', where)
 
 
-def identity_parts(identity):
+def identity_parts(identity: object) -> tuple[str, str, str]:
     """
     Return (rig, valve, mode) of a rig identity: ``rig/valve``, or ``rig/valve/mode``.
 
@@ -224,7 +231,7 @@ def identity_parts(identity):
     return '/'.join(parts), '', ''
 
 
-def _rig_differences(mine, other):
+def _rig_differences(mine: object, other: object) -> list[str]:
     """Return in words what differs between two rig identities."""
     both = zip(('rig', 'valve', 'mode'), identity_parts(mine), identity_parts(other))
     found = [f'{what} {first or "unknown"} (here {second or "unknown"})'
@@ -232,13 +239,13 @@ def _rig_differences(mine, other):
     return found if found or mine == other else [f'rig {mine} (here {other})']
 
 
-def _stated(value):
+def _stated(value: object) -> str:
     if value is None:
         return 'not stated'
     return f'{value:.10g}' if isinstance(value, float) else str(value)
 
 
-def save_rules(rules, path):
+def save_rules(rules: RuleBase, path: Path | str) -> None:
     """
     Write a rule base to a file: temporary file, flushed to disk, then renamed over.
 
@@ -256,7 +263,7 @@ def save_rules(rules, path):
     write_text(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n', parents=False)
 
 
-def load_rules(path, expected=None):
+def load_rules(path: Path | str, expected: RuleBase | None = None) -> RuleBase:
     """
     Return the rule base of a file.
 

@@ -31,7 +31,8 @@ Automatica 15, 1979).
 
 from dataclasses import dataclass, field
 import hashlib
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from pam_actuation.control.sofc.membership import (
@@ -47,7 +48,7 @@ DIRECTIONS = ('contracting', 'extending')
 
 
 @compiled
-def contracting_share(share, way_m, blend_m):
+def contracting_share(share: float, way_m: float, blend_m: float) -> float:
     """
     Return the degree 0..1 of direction 'contracting' after a further way of the reference.
 
@@ -58,7 +59,7 @@ def contracting_share(share, way_m, blend_m):
 
 
 @compiled
-def infer_feedback(table, share, i, wi, j, wj):
+def infer_feedback(table: FloatArray, share: float, i: int, wi: float, j: int, wj: float) -> float:
     """
     Return the output of the feedback rules in [-1, 1].
 
@@ -73,20 +74,20 @@ def infer_feedback(table, share, i, wi, j, wj):
 
 
 @compiled
-def infer_feedforward(table, share, k, wk):
+def infer_feedforward(table: FloatArray, share: float, k: int, wk: float) -> float:
     """Return the output of the feed-forward rules [Pa] at the active knots ``k, wk``."""
     return (share * ((1.0 - wk) * table[0, k] + wk * table[0, k + 1])
             + (1.0 - share) * ((1.0 - wk) * table[1, k] + wk * table[1, k + 1]))
 
 
 @compiled
-def infer_motion(table, m, wm, n, wn):
+def infer_motion(table: FloatArray, m: int, wm: float, n: int, wn: float) -> float:
     """Return the output of the motion rules [Pa] at position knots m and rate knots n."""
     return ((1.0 - wm) * ((1.0 - wn) * table[m, n] + wn * table[m, n + 1])
             + wm * ((1.0 - wn) * table[m + 1, n] + wn * table[m + 1, n + 1]))
 
 
-def linear_feedback_table():
+def linear_feedback_table() -> FloatArray:
     """Return the initial feedback rules (2, 7, 7): the linear surface 0.5 (e + de)."""
     grid = np.linspace(-1.0, 1.0, SET_COUNT)
     surface = 0.5 * (grid[:, None] + grid[None, :])
@@ -100,8 +101,8 @@ class Antecedent:
 
     name: str
     unit: str
-    knots: np.ndarray
-    words: tuple = ()
+    knots: FloatArray
+    words: tuple[str, ...] = ()
 
 
 @short_repr
@@ -115,10 +116,10 @@ class RuleTable:
     """
 
     name: str
-    antecedents: tuple
-    values: np.ndarray
-    initial: np.ndarray
-    fired: np.ndarray
+    antecedents: tuple[Antecedent, ...]
+    values: FloatArray
+    initial: FloatArray
+    fired: FloatArray
     limit: float
     scale: float
     unit: str
@@ -129,6 +130,10 @@ class RuleTable:
 TRACKED_SCALING = ('tracked_unit', 'tracked_per_m', 'tracked_zero_m')
 TRACKED_UNITS = ('N', 'rad')
 _WAYS = {'N': ('rising', 'falling'), 'rad': ('flexing', 'extending')}
+
+
+def _not_given() -> FloatArray:
+    return np.empty(0)
 
 
 @short_repr
@@ -155,29 +160,27 @@ class RuleBase:
 
     NAMES = ('feedback', 'feedforward', 'motion')
 
-    feedback: np.ndarray
-    feedforward: np.ndarray
-    scaling: dict = field(default_factory=dict)
-    motion: np.ndarray = None
-    feedback_initial: np.ndarray = None
-    feedforward_initial: np.ndarray = None
-    motion_initial: np.ndarray = None
-    feedback_fired: np.ndarray = None
-    feedforward_fired: np.ndarray = None
-    motion_fired: np.ndarray = None
+    feedback: FloatArray
+    feedforward: FloatArray
+    scaling: dict[str, Any] = field(default_factory=dict)
+    motion: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
+    feedback_initial: FloatArray = field(default_factory=_not_given)
+    feedforward_initial: FloatArray = field(default_factory=_not_given)
+    motion_initial: FloatArray = field(default_factory=_not_given)
+    feedback_fired: FloatArray = field(default_factory=_not_given)
+    feedforward_fired: FloatArray = field(default_factory=_not_given)
+    motion_fired: FloatArray = field(default_factory=_not_given)
 
-    def __post_init__(self):
-        if self.motion is None:
-            self.motion = np.zeros((2, 2))
+    def __post_init__(self) -> None:
         for name in self.NAMES:
             value = np.ascontiguousarray(getattr(self, name), dtype=float)
             setattr(self, name, value)
             for suffix, default in (('_initial', value.copy()), ('_fired', value * 0.0)):
                 given = getattr(self, name + suffix)
-                given = default if given is None else np.ascontiguousarray(given, dtype=float)
+                given = np.ascontiguousarray(given, dtype=float) if given.size else default
                 setattr(self, name + suffix, given)
 
-    def tables(self):
+    def tables(self) -> tuple[RuleTable, ...]:
         """
         Return every table of rules with its antecedents, as ``RuleTable``.
 
@@ -195,47 +198,49 @@ class RuleBase:
             'change of error', f'{unit}/s', grid * scaling.get('change_universe_m_per_s', 1.0),
             SET_WORDS)
         limit_pa = scaling.get('feedforward_limit_pa', np.inf)
-        span = [per_m * (scaling.get(name, default) - zero_m) for name, default in (
-            ('reference_lower_m', 0.0), ('reference_upper_m', 1.0))]
+        lower, upper = (per_m * (scaling.get(name, default) - zero_m) for name, default in (
+            ('reference_lower_m', 0.0), ('reference_upper_m', 1.0)))
         rates = per_m * signed_logarithmic_knots(
             scaling.get('motion_rate_fine_m_per_s', 1.0),
             scaling.get('motion_rate_upper_m_per_s', 1.0), self.motion.shape[1])
         described = (
             ('feedback', (direction, error, change), 1.0, scaling.get('feedback_gain_pa', 1.0)),
             ('feedforward', (direction, Antecedent(
-                'reference', unit, np.linspace(*span, self.feedforward.shape[1]))), limit_pa, 1.0),
+                'reference', unit, np.linspace(
+                    lower, upper, self.feedforward.shape[1]))), limit_pa, 1.0),
             ('motion', (
-                Antecedent('reference', unit, np.linspace(*span, self.motion.shape[0])),
+                Antecedent('reference', unit, np.linspace(
+                    lower, upper, self.motion.shape[0])),
                 Antecedent('rate of the reference', f'{unit}/s', rates)), limit_pa, 1.0))
         return tuple(
             RuleTable(name, antecedents, getattr(self, name), getattr(self, name + '_initial'),
                       getattr(self, name + '_fired'), limit, scale, 'Pa')
             for name, antecedents, limit, scale in described)
 
-    def arrays(self, suffix=''):
+    def arrays(self, suffix: str = '') -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the arrays of all tables: values, or with '_initial', '_fired' those."""
         return tuple(getattr(self, name + suffix) for name in self.NAMES)
 
-    def copy(self):
+    def copy(self) -> 'RuleBase':
         """Return an independent copy."""
         return RuleBase(scaling=dict(self.scaling), **{
             name + suffix: getattr(self, name + suffix).copy()
             for name in self.NAMES for suffix in ('', '_initial', '_fired')})
 
-    def assign(self, other):
+    def assign(self, other: 'RuleBase') -> None:
         """Take over the numbers of another rule base of equal shape, in place."""
         for suffix in ('', '_initial', '_fired'):
             for mine, theirs in zip(self.arrays(suffix), other.arrays(suffix)):
                 mine[...] = theirs
 
-    def reset(self):
+    def reset(self) -> None:
         """Return to the initial rules and forget how often they fired."""
         for values, initial, fired in zip(
                 self.arrays(), self.arrays('_initial'), self.arrays('_fired')):
             values[...] = initial
             fired[...] = 0.0
 
-    def digest(self):
+    def digest(self) -> str:
         """Return the sha256 of the rules as hexadecimal text."""
         total = hashlib.sha256()
         for value in self.arrays():
@@ -243,19 +248,19 @@ class RuleBase:
             total.update(value.astype('<f8').tobytes())
         return total.hexdigest()
 
-    def knots_m(self):
+    def knots_m(self) -> FloatArray:
         """Return the reference positions [m] the feed-forward rules stand for."""
         return np.linspace(
             self.scaling['reference_lower_m'], self.scaling['reference_upper_m'],
             self.feedforward.shape[1])
 
-    def save(self, path):
+    def save(self, path: Path | str) -> None:
         """Write the rules to a file atomically; see ``persistence.save_rules``."""
         from pam_actuation.control.sofc.persistence import save_rules
         save_rules(self, path)
 
     @classmethod
-    def load(cls, path, expected=None):
+    def load(cls, path: Path, expected: 'RuleBase | None' = None) -> 'RuleBase':
         """Return the rules of a file, refused whole if they do not fit ``expected``."""
         from pam_actuation.control.sofc.persistence import load_rules
         return load_rules(path, expected)

@@ -21,7 +21,6 @@ memory of the firing strengths; modification of the rules that were active one
 credit delay ago; roll-back.
 """
 
-from collections.abc import Callable
 import math
 
 import numpy as np
@@ -39,7 +38,7 @@ from pam_actuation.control.sofc.rule_table import (
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.records import part
 from pam_sim.units import P_ATM_PA
 
@@ -422,7 +421,7 @@ def _step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables,
                  ring.view(ENTRY), part(st, 0, STATE), part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
-def _entry(key: int) -> Callable[..., float]:
+def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
     def sofc_step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables,

@@ -32,8 +32,13 @@ about a tenth of a millimetre and much about a whole one.
 
 from dataclasses import dataclass
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import Number
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import Antecedent, RuleBase, RuleTable
 
 NOTHING_KPA, LITTLE_KPA, MUCH_KPA = 0.05, 2.0, 10.0
 _ACTS_PA = 1.0            # a rule whose output is smaller does nothing
@@ -55,25 +60,25 @@ class SpokenRule:
     """
 
     table: str
-    place: tuple
+    place: tuple[int, ...]
     value_pa: float
     initial_pa: float
     fired_s: float
     sentence: str
 
     @property
-    def importance_pa_s(self):
+    def importance_pa_s(self) -> float:
         """How long the rule acted times how much [Pa s]."""
         return self.fired_s * abs(self.value_pa)
 
 
-def shown(value, unit):
+def shown(value: Number, unit: str) -> tuple[Number, str]:
     """Return a value in the unit people read, and that unit."""
     factor, name = SHOWN.get(unit, (1.0, unit))
     return value * factor, name
 
 
-def number(value):
+def number(value: float) -> str:
     """Return a number of a knot in three significant digits, without an exponent."""
     if abs(value) < 1e-9:
         return '0'
@@ -82,7 +87,7 @@ def number(value):
     return text.rstrip('0').rstrip('.') if '.' in text else text
 
 
-def sentence(table, place):
+def sentence(table: 'RuleTable', place: tuple[int, ...]) -> str:
     """
     Return one rule of a table in words.
 
@@ -109,7 +114,7 @@ def sentence(table, place):
     return f'{", ".join(knots + [direction] * bool(direction))}: {_addition(size_kpa)}'
 
 
-def _near(antecedent, index):
+def _near(antecedent: 'Antecedent', index: int) -> str:
     """Return in words where a knot is: a place, or a rate with its direction."""
     value, unit = shown(float(antecedent.knots[index]), antecedent.unit)
     if not antecedent.unit.endswith('/s'):
@@ -120,7 +125,7 @@ def _near(antecedent, index):
     return f'{up if value > 0 else down} at {number(abs(value))} {unit}'
 
 
-def _action(size_kpa):
+def _action(size_kpa: float) -> str:
     """Return what a rule does to the pressure, with its size in a word and as a number."""
     size = abs(size_kpa)
     if size < NOTHING_KPA:
@@ -131,7 +136,7 @@ def _action(size_kpa):
             f'({size_kpa:+.{digits}f} kPa)')
 
 
-def _addition(size_kpa):
+def _addition(size_kpa: float) -> str:
     """Return what a rule adds to the pressure."""
     size = abs(size_kpa)
     if size < NOTHING_KPA:
@@ -139,7 +144,7 @@ def _addition(size_kpa):
     return f'{"add" if size_kpa > 0 else "take off"} {size:.{2 if size < 1.0 else 1}f} kPa'
 
 
-def ranked(rules):
+def ranked(rules: 'RuleBase') -> list[SpokenRule]:
     """
     Return the rules that act, as SpokenRule, the most important first.
 

@@ -288,7 +288,7 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
         cell = np.interp(recording.grid_s, recording.time_s['force'],
                          recording.measured['force'])
     noise = [noise_sd(recording.measured['force'])] if cell is not None else []
-    weight = np.zeros(0)
+    weight: FloatArray = np.zeros(0)
     if subsystem == 'load' or cell is None:
         weight = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
         if recording.external_force_n is not None:
