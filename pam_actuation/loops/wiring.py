@@ -119,23 +119,20 @@ def controller_tick(bus: Bus, control: Controller) -> Callable[[int, bool], None
 def driver_tick(bus: Bus, driver: Driver, prefix: str = '',
                 told: Callable[[int, Status], object] | None = None) -> Tick:
     """Return the tick of a driver; ``told(now_ns, status)`` hears its status."""
-    send_signal = signal_tick(bus, driver, prefix, told)
-
     def tick(now_ns: int) -> None:
-        send_signal(now_ns)
+        signal, status = driver.tick(now_ns)
+        bus.send(f'{prefix}valve_signal', signal, now_ns)
         send_followed(bus, driver, now_ns, prefix)
+        if told is not None:
+            told(now_ns, status)
 
     return tick
 
 
-def signal_tick(bus: Bus, driver: Driver, prefix: str = '',
-                told: Callable[[int, Status], object] | None = None) -> Tick:
+def signal_tick(bus: Bus, driver: Driver) -> Tick:
     """Return the tick of a driver that does not say which pressure it follows."""
     def tick(now_ns: int) -> None:
-        signal, status = driver.tick(now_ns)
-        bus.send(f'{prefix}valve_signal', signal, now_ns)
-        if told is not None:
-            told(now_ns, status)
+        bus.send('valve_signal', driver.tick(now_ns)[0], now_ns)
 
     return tick
 
