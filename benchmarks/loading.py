@@ -15,7 +15,7 @@
 """
 Measure how fast bags load, beside the reader of rosbags, and what an hour costs.
 
-Run ``python benchmarks/loading.py``; it prints the tables of docs/reference/bags.md. Both
+Run ``python benchmarks/loading.py``; it prints the tables of docs/results/loading.md. Both
 readers read the same bags in turn in the same run; the best of several runs
 counts. What they return is compared number by number. The bags are made in a
 temporary folder (about 0.6 GB for the hour) and removed.
