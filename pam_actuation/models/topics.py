@@ -70,12 +70,12 @@ def service_text(service: Service) -> str:
     """Return the paragraph on a quality of service."""
     publisher, recorder = service.publisher, service.recorder
     return f"""\
-{publisher.reliability.capitalize()}, {publisher.durability.replace('_', ' ')}; \
-publishers and consumers keep the last {publisher.depth}, the recorder {recorder.depth} \
-(any depth matches). No deadline, lifespan or
-liveliness is offered or requested, so a publisher or subscriber with default settings always
-matches; time-outs are done in the nodes. History, depth and reliability can be overridden at start
-with the parameters `qos_overrides.<topic>.<publisher|subscription>.*`.
+{publisher.reliability.capitalize()}, {publisher.durability.replace('_', ' ')}. \
+Publishers and subscribers keep the last {publisher.depth} messages, the recorder \
+{recorder.depth}; any depth matches.
+Deadline, lifespan and liveliness are not set, so a publisher or subscriber with default
+settings always matches. The nodes check time-outs themselves. The parameters
+`qos_overrides.<topic>.<publisher|subscription>.*` override history, depth and reliability at start.
 """
 
 
@@ -127,10 +127,11 @@ def _fields(topic: Topic) -> list[str]:
 
 
 def _rules(topic: Topic) -> list[str]:
-    held = ('Its value is held until the next message' if topic.held
-            else 'Between messages it is interpolated')
-    missing = {'told': 'told by every verb that reads a bag', 'kept': 'ignored, the value before '
-               'is held', 'allowed': 'allowed'}[topic.missing]
+    held = ('The value is held until the next message' if topic.held
+            else 'Between messages the value is interpolated')
+    missing = {'told': 'reported by every command that reads a bag',
+               'kept': 'ignored; the last value is held',
+               'allowed': 'allowed'}[topic.missing]
     return [f'- {held} (`run.on_grid`).',
             f'- A number that is missing or not finite is {missing}.']
 
