@@ -75,7 +75,8 @@ Publishers and subscribers keep the last {publisher.depth} messages, the recorde
 {recorder.depth}; any depth matches.
 Deadline, lifespan and liveliness are not set, so a publisher or subscriber with default
 settings always matches. The nodes check time-outs themselves. The parameters
-`qos_overrides.<topic>.<publisher|subscription>.*` override history, depth and reliability at start.
+`qos_overrides.<topic>.<publisher|subscription>.*` override history, depth and
+reliability at start.
 """
 
 
