@@ -29,12 +29,15 @@ This module imports next to nothing: what comes before it cannot be guarded.
 """
 
 import atexit
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 import os
 import signal
 import sys
 import threading
 import time
+from types import FrameType
+from typing import Any
 
 EXIT_INTERRUPTED = 130
 ONE_WISH_S = 1.0            # several within this time are one
@@ -45,9 +48,10 @@ OWNERS_OF_MEMORY = f'{os.sep}llvmlite{os.sep}'
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)     # what a node is ended by
 
 
-def leave_at_once(program, exit_code=EXIT_INTERRUPTED, numbers=(signal.SIGINT,)):
+def leave_at_once(program: str, exit_code: int = EXIT_INTERRUPTED,
+                  numbers: Iterable[int] = (signal.SIGINT,)) -> None:
     """End the process by any of these signals from now on, with one line and nothing else."""
-    def leave(number, frame):
+    def leave(number: int, frame: FrameType | None) -> None:
         try:
             os.write(2, f'{program}: stopped by {signal.Signals(number).name}\n'.encode())
         finally:
@@ -57,20 +61,20 @@ def leave_at_once(program, exit_code=EXIT_INTERRUPTED, numbers=(signal.SIGINT,))
         signal.signal(number, leave)
 
 
-def ignore(numbers=(signal.SIGINT,)):
+def ignore(numbers: Iterable[int] = (signal.SIGINT,)) -> None:
     """Let these signals change nothing any more: the process is about to end by itself."""
     for number in (*numbers, signal.SIGALRM):       # that of a Worker, which may still ask again
         signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
-def undisturbed():
+def undisturbed() -> Iterator[None]:
     """Ignore further signals while something is brought to an end in order."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, _unheard) for number in numbers}
+    before: dict[int, Any] = {number: signal.signal(number, _unheard) for number in numbers}
     try:
         yield
     finally:
@@ -79,7 +83,7 @@ def undisturbed():
 
 
 @contextmanager
-def held():
+def held() -> Iterator[Callable[[], bool]]:
     """
     Hold SIGINT and SIGTERM back; give a function that tells whether one came.
 
@@ -87,19 +91,21 @@ def held():
     but impatient repetitions within a second are one.
     In another thread than the main one, which gets no signals, nothing is held back.
     """
-    came, first_s = threading.Event(), []
+    came = threading.Event()
+    first_s: list[float] = []
     if threading.current_thread() is not threading.main_thread():
         yield came.is_set
         return
-    before = {}
+    before: dict[int, Any] = {}     # what signal.signal gives and takes
 
-    def note(number, frame):
+    def note(number: int, frame: FrameType | None) -> None:
         first_s.append(time.monotonic())
         if first_s[-1] - first_s[0] > ONE_WISH_S:
             raise KeyboardInterrupt
         came.set()
 
     try:
+        number: int
         for number in (signal.SIGINT, signal.SIGTERM):
             # What is ignored, as in a process in the background, stays ignored.
             if signal.getsignal(number) not in (signal.SIG_IGN, None):
@@ -111,7 +117,7 @@ def held():
 
 
 @contextmanager
-def kept_from_children():
+def kept_from_children() -> Iterator[None]:
     """
     Keep SIGINT from the processes that are started meanwhile; what comes for this one waits.
 
@@ -124,7 +130,7 @@ def kept_from_children():
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _unheard(number, frame):
+def _unheard(number: int, frame: FrameType | None) -> None:
     """Stand in for SIG_IGN, which child processes would inherit."""
 
 
@@ -135,7 +141,7 @@ class Worker:
     The caller's frame is where the work begins; the handlers stay until ``ignore``.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._base = sys._getframe(1)
         self._pid = os.getpid()
         self._asked_s = -ONE_WISH_S
@@ -144,7 +150,7 @@ class Worker:
         signal.signal(signal.SIGALRM, self._ask)
         signal.signal(signal.SIGINT, self._ask)
 
-    def _ask(self, number, frame):
+    def _ask(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._pid:        # a child on its way to another program
             return
         now_s = time.monotonic()
@@ -156,10 +162,10 @@ class Worker:
         self._asked_s = now_s
         raise KeyboardInterrupt
 
-    def _ask_again(self):
+    def _ask_again(self) -> None:
         signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
 
-    def _is_delicate(self, frame):
+    def _is_delicate(self, frame: FrameType | None) -> bool:
         """Tell whether an import, a destructor or the like is under way."""
         while frame is not None and frame is not self._base:
             code = frame.f_code
@@ -169,7 +175,7 @@ class Worker:
             frame = frame.f_back
         return False
 
-    def _not_raised(self, unraisable):
+    def _not_raised(self, unraisable: 'sys.UnraisableHookArgs') -> None:
         """Ask again where an interruption fell into a callback, which cannot hand it on."""
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             self._asked_s = -ONE_WISH_S
@@ -178,7 +184,7 @@ class Worker:
             self._unraisable(unraisable)
 
 
-def end_interrupted():
+def end_interrupted() -> None:
     """
     End the process with exit code 130, without waiting for threads that still compute.
 

@@ -18,14 +18,19 @@ The simulated joint on a clock: valve signals of two muscles in, measurements ou
 The counterpart of ``plant_loop`` for a flexor and an extensor that turn one limb.
 """
 
+from collections.abc import Callable, Hashable
 from functools import partial
 import math
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.messages import JointAngle
+from pam_actuation.messages import JointAngle, ValveSignal
 from pam_actuation.plant_loop import HeldSignal, muscle_readings, PlantClock
 from pam_sim.joint.parameters import SIDES
 from pam_sim.sensors import SensorChain
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
 
 ANGLE_NOISE_RAD = 5e-4                      # design value of an encoder on the joint
 ANGLE_STEP_RAD = 2.0 * math.pi / 2 ** 14    # of 14 bit a turn
@@ -45,7 +50,7 @@ class JointPlantLoop(PlantClock):
 
     """
 
-    def __init__(self, joint, seed=0, longest_catch_up_s=0.25):
+    def __init__(self, joint: 'JointRig', seed: int = 0, longest_catch_up_s: float = 0.25) -> None:
         self.joint = joint
         self.plant = joint.plant(seed)
         super().__init__(self.plant.dt_s, longest_catch_up_s)
@@ -55,20 +60,20 @@ class JointPlantLoop(PlantClock):
                         for k, (side, rig) in enumerate(zip(SIDES, rigs))}
         self._noise = np.random.default_rng((seed, len(SIDES)))
 
-    def takes(self):
+    def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by name relative to the joint."""
         return {f'{side}/valve_signal': partial(self.set_signal, side) for side in SIDES}
 
-    def set_signal(self, side, message, writer=None):
+    def set_signal(self, side: str, message: ValveSignal, writer: Hashable = None) -> None:
         """Take a valve signal of one muscle."""
         self.signals[side].take(message, writer, self.now_ns or 0)
 
-    def step(self, count):
+    def step(self, count: int) -> None:
         """Advance the joint by some steps with the signals held."""
         for _ in range(count):
             self.plant.step(self.signals['flexor'].efforts, self.signals['extensor'].efforts)
 
-    def sample(self, now_ns):
+    def sample(self, now_ns: int) -> dict[str, Any]:
         """
         Read the sensors; return the messages by topic, relative to the joint.
 

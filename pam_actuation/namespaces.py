@@ -27,7 +27,7 @@ LONGEST = 150       # ROS allows 255 characters for the name of a service below 
 _PART = re.compile(r'(?!.*__)[A-Za-z_][A-Za-z0-9_]*')
 
 
-def namespace_of(text, where='namespace'):
+def namespace_of(text: str, where: str = 'namespace') -> str:
     """
     Return a namespace as ROS writes it: a slash before each part, '' for the root.
 
@@ -48,13 +48,13 @@ def namespace_of(text, where='namespace'):
     return namespace
 
 
-def launch_namespace(text):
+def launch_namespace(text: str) -> str:
     """Return a namespace as launch takes it; without a slash before it, it stays relative."""
     namespace = namespace_of(text)
     return namespace if text.startswith('/') else namespace.removeprefix('/')
 
 
-def node_name_of(text, namespace='', where='name'):
+def node_name_of(text: str, namespace: str = '', where: str = 'name') -> str:
     """
     Return the full name of a node; a name without a slash is one in ``namespace``.
 

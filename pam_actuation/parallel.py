@@ -14,16 +14,18 @@
 
 """Work in processes of joblib that Ctrl-C does not reach: who started them ends them."""
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker as standard_tracker
 import sys
+from typing import Any
 
 import joblib
 from joblib.externals.loky.backend import resource_tracker
 from pam_actuation.interrupts import kept_from_children
 
 
-def in_processes(jobs, calls):
+def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
     """
     Return a generator of the results of some calls, in their order.
 
@@ -40,11 +42,12 @@ def in_processes(jobs, calls):
         for tracker in (resource_tracker, standard_tracker):
             tracker.ensure_running()
     with kept_from_children():
-        return joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)
+        results: Iterator[Any] = joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)
+        return results
 
 
 @contextmanager
-def _silent_trackers():
+def _silent_trackers() -> Iterator[None]:
     """
     Let trackers that are started meanwhile give no warnings.
 

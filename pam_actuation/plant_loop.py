@@ -20,12 +20,17 @@ signal without limit, steps its physics up to the time it is told and reads its 
 when asked. The simulator node and the offline simulation both use it.
 """
 
+from collections.abc import Callable, Hashable, Iterable
 import math
+from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from pam_actuation.messages import (
     Contraction, Force, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
 from pam_sim.rig import Rig
 from pam_sim.sensors import SensorChain
+
+if TYPE_CHECKING:
+    from pam_sim.plant import Plant
 
 _NS = 1_000_000_000
 SAFE_COUNTS_NS = 100_000_000     # a safe signal against the openings of others
@@ -45,15 +50,16 @@ class HeldSignal:
 
     """
 
-    def __init__(self, valve):
+    def __init__(self, valve: str) -> None:
         self._names = VALVE_NAMES[valve]
         self._safe = SAFE_EFFORTS[valve]
         self._last = self.efforts = (0.0,) * len(self._names)
-        self._safe_until_ns = {}        # writer to the time until which its safe signal counts
+        # writer to the time until which its safe signal counts
+        self._safe_until_ns: dict[Hashable, int] = {}
         self.taken = 0
         self.ignored = 0
 
-    def take(self, message: ValveSignal, writer=None, now_ns=0):
+    def take(self, message: ValveSignal, writer: Hashable = None, now_ns: int = 0) -> None:
         """
         Take efforts by name; anything not finite or unknown is ignored and counted.
 
@@ -70,7 +76,7 @@ class HeldSignal:
         if writer is not None and self._another_vents(writer, now_ns):
             self.efforts = self._safe
 
-    def _another_vents(self, writer, now_ns):
+    def _another_vents(self, writer: Hashable, now_ns: int) -> bool:
         if self._last == self._safe:
             self._safe_until_ns[writer] = now_ns + SAFE_COUNTS_NS
         else:
@@ -80,7 +86,8 @@ class HeldSignal:
         return bool(self._safe_until_ns.keys() - {writer})
 
 
-def muscle_readings(plant, sensors, stamp_ns, time_s):
+def muscle_readings(plant: 'Plant', sensors: SensorChain, stamp_ns: int,
+                    time_s: float) -> dict[str, Any]:
     """
     Read the sensors of one muscle; return the messages by short topic name.
 
@@ -125,20 +132,24 @@ class PlantClock:
 
     """
 
-    def __init__(self, dt_s, longest_catch_up_s):
+    def __init__(self, dt_s: float, longest_catch_up_s: float) -> None:
         self.dt_ns = round(dt_s * _NS)
         self.longest_catch_up_ns = round(longest_catch_up_s * _NS)
-        self._start_ns = None
+        self._start_ns: int | None = None
         self.steps = 0
         self.overruns = 0
         self.skipped_s = 0.0
 
     @property
-    def now_ns(self):
+    def now_ns(self) -> int | None:
         """Return the time of the plant's state [ns], None before the start."""
         return None if self._start_ns is None else self._start_ns + self.steps * self.dt_ns
 
-    def advance_to(self, now_ns):
+    def step(self, count: int) -> None:
+        """Advance the plant by some steps."""
+        raise NotImplementedError
+
+    def advance_to(self, now_ns: int) -> int:
         """
         Step the physics up to ``now_ns``; return the number of steps done.
 
@@ -148,7 +159,7 @@ class PlantClock:
         if self._start_ns is None:
             self._start_ns = now_ns
             return 0
-        behind_ns = now_ns - self.now_ns
+        behind_ns = now_ns - (self._start_ns + self.steps * self.dt_ns)
         if behind_ns > self.longest_catch_up_ns:
             skipped_ns = (behind_ns - self.longest_catch_up_ns) // self.dt_ns * self.dt_ns
             self._start_ns += skipped_ns
@@ -162,7 +173,10 @@ class PlantClock:
         return count
 
 
-class Backlog:
+Arrived = TypeVar('Arrived')
+
+
+class Backlog(Generic[Arrived]):
     """
     Holds back what arrives just after the plant stood still, until the rest is there.
 
@@ -179,14 +193,14 @@ class Backlog:
 
     """
 
-    def __init__(self, after_s=0.05, patience_s=0.02):
+    def __init__(self, after_s: float = 0.05, patience_s: float = 0.02) -> None:
         self._after_ns = round(after_s * _NS)
         self._patience_ns = round(patience_s * _NS)
-        self._last_ns = None
+        self._last_ns: int | None = None
         self._until_ns = 0
-        self._held = []
+        self._held: list[Arrived] = []
 
-    def take(self, now_ns, arrived):
+    def take(self, now_ns: int, arrived: Iterable[Arrived]) -> list[Arrived] | None:
         """Return what is to be applied now, as a list; None while more may be on its way."""
         last_ns, self._last_ns = self._last_ns, now_ns
         if last_ns is not None and now_ns - last_ns > self._after_ns:
@@ -224,38 +238,38 @@ class PlantLoop(PlantClock):
         self._external_n = 0.0
 
     @property
-    def signal(self):
+    def signal(self) -> tuple[float, ...]:
         """Return the efforts that act on the valve."""
         return self._held.efforts
 
     @property
-    def signals(self):
+    def signals(self) -> int:
         """Return the number of valve messages taken."""
         return self._held.taken
 
     @property
-    def signals_ignored(self):
+    def signals_ignored(self) -> int:
         """Return the number of efforts that were not usable."""
         return self._held.ignored
 
-    def takes(self):
+    def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by short name."""
         return {'external_force': self.set_external_force, 'valve_signal': self.set_signal}
 
-    def set_signal(self, message: ValveSignal, writer=None):
+    def set_signal(self, message: ValveSignal, writer: Hashable = None) -> None:
         """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
         self._held.take(message, writer, self.now_ns or 0)
 
-    def set_external_force(self, message: Force):
+    def set_external_force(self, message: Force) -> None:
         """Take the disturbance force on the load [N]; not finite is ignored."""
         if math.isfinite(message.force_n):
             self._external_n = float(message.force_n)
 
-    def step(self, count):
+    def step(self, count: int) -> None:
         """Advance the plant by some steps with the signal held."""
         self.plant.step(self._held.efforts, self._external_n, steps=count)
 
-    def sample(self, now_ns):
+    def sample(self, now_ns: int) -> dict[str, Any]:
         """
         Read the sensors; return the messages by short topic name.
 

@@ -21,6 +21,7 @@ prefix that holds the installed package (pip, colcon merged or not), or in the
 share folder that the ament index names. No ROS is needed for the first two.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from pam_sim.errors import did_you_mean, InputError
@@ -80,12 +81,12 @@ def node_page(name: str) -> Path:
     return path
 
 
-def list_config(kind: str) -> list:
+def list_config(kind: str) -> list[str]:
     """Return the sorted names (without .yaml) of the configurations of one kind."""
     return sorted(path.stem for path in (config_dir() / kind).glob('*.yaml'))
 
 
-def find_config(kind: str, name) -> Path:
+def find_config(kind: str, name: Path | str) -> Path:
     """
     Return the configuration file that a user means.
 
@@ -124,7 +125,7 @@ def find_config(kind: str, name) -> Path:
         'a file of your own is given with its .yaml ending', where=text)
 
 
-def _candidates():
+def _candidates() -> Iterator[Path]:
     """Yield the folders that may hold the shared files, the nearest first."""
     package = Path(__file__).resolve().parent
     yield package.parent

@@ -22,13 +22,13 @@ import sys
 NEEDED = ('rclpy', 'lifecycle_msgs', 'diagnostic_msgs', 'sensor_msgs', 'std_srvs')
 
 
-def ros_missing(module):
+def ros_missing(module: str) -> str:
     """Return the sentence that says what to install where an import of ROS 2 failed."""
     return (f'live nodes need ROS 2 ({module} is missing): source its setup file or '
             'install the extra ros, pip install "pam_actuation[ros]"')
 
 
-def end_without_ros():
+def end_without_ros() -> None:
     """
     End the process with one sentence and exit code 2 if it is a node and ROS 2 is not there.
 
@@ -42,7 +42,7 @@ def end_without_ros():
         sys.exit(2)
 
 
-def _program():
+def _program() -> str | None:
     """Return the name of the node that this process is, None if it is none."""
     if sys.argv[0] == '-m':         # python -m, while its package is being imported
         package, _, name = sys.orig_argv[sys.orig_argv.index('-m') + 1].rpartition('.')
@@ -52,7 +52,7 @@ def _program():
     return name if folder and os.path.isfile(os.path.join(nodes, f'{name}.py')) else None
 
 
-def _is_there(module):
+def _is_there(module: str) -> bool:
     try:
         return find_spec(module) is not None
     except ImportError:

@@ -34,7 +34,7 @@ NOMINAL_RIG = 'dmsp_5_300_hanging_mass'
 EXPERIMENT = 'short_sine'
 
 
-def warm_up():
+def warm_up() -> None:
     """Run a short experiment with each valve, so that everything a rig needs is compiled."""
     experiment = load_experiment(EXPERIMENT)
     with tempfile.TemporaryDirectory() as folder:
@@ -46,7 +46,7 @@ def warm_up():
                     str(Path(folder) / f'{rig_name}_{valve}'))
 
 
-def main():
+def main() -> int:
     """Compile and say so; return exit code 0."""
     print('compiling the numerical code, once per installation ...', flush=True)
     warm_up()

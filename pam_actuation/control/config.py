@@ -35,10 +35,14 @@ controller instead its ``model`` and ``gains``, see ``lqi_files``.
 import os
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.lqi import LqiController
+
 from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, mode_to_mapping, read_mode
 from pam_actuation.control.modes.tracked import FORCE, tracked_by
+from pam_actuation.control.modes.wrapped import WrappedLaw
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import (
@@ -54,6 +58,8 @@ if TYPE_CHECKING:
     from pam_actuation.control.modes.force import ForceMode
     from pam_actuation.control.modes.joint import JointMode
     from pam_sim.rig import Rig
+
+Controller = CompiledController | WrappedLaw
 
 _KINDS = ('sofc', 'pid', 'lqi')
 _KEYS = ('controller', 'rig', 'made_for', 'settings', *MODE_KEYS)
@@ -196,21 +202,22 @@ def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',
     return tabulate_static_inverse(rig)
 
 
-def controller_to_yaml(controller: Any, rules_file: str | os.PathLike[str] | None = None) -> str:
+def controller_to_yaml(controller: Controller,
+                       rules_file: str | os.PathLike[str] | None = None) -> str:
     """
     Return YAML text that rebuilds a controller bit for bit, its present rules included.
 
     A recording keeps this text, so that it can be replayed without rig, preset or rule file.
     With ``rules_file`` the text names that file, to lie in the same folder, instead.
     """
-    settings = dict(controller.settings)
+    settings: dict[str, Any] = dict(controller.settings)
     if 'index_form' in settings:
         settings['index_form'] = _INDEX_FORMS[int(round(settings['index_form']))]
     data = {
         'controller': controller.kind, 'rig': controller.rig_name,
         **({'made_for': dict(controller.made_for)} if controller.made_for else {}),
         'settings': settings, **mode_to_mapping(controller)}
-    if controller.kind == 'lqi':
+    if isinstance(controller, LqiController):
         data.update(lqi_to_mapping(controller))
     elif tracked_by(controller) != FORCE:       # there the surface says it
         data['static_inverse'] = inverse_to_mapping(controller.static_inverse)

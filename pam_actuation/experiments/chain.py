@@ -15,11 +15,16 @@
 """A chain of primitives in one domain: a value and its rate over time."""
 
 import bisect
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.experiments.primitives import make_primitive
 from pam_sim.errors import InputError
 from pam_sim.units import allowed_range, P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.primitives.base import Primitive
 
 CHECK_EVERY_S = 0.01        # as often as the reference is sent
 _MOST_CHECKS = 100_000
@@ -60,6 +65,9 @@ FORCE = Domain('disturbance', 'n', 0.0, -200.0, 200.0, 10_000.0)
 TRACKED = ('contraction', 'force')      # domains that a controller of one muscle tracks
 
 
+Segment = tuple[str, Mapping[str, Any], str]      # name, arguments, place in the file
+
+
 class Chain:
     """
     Primitives one after another, each from where the former ended.
@@ -78,9 +86,10 @@ class Chain:
 
     """
 
-    def __init__(self, domain, segments):
+    def __init__(self, domain: Domain, segments: Sequence[Segment]) -> None:
         self.domain = domain
-        self.segments, self._starts = [], []
+        self.segments: list[Primitive] = []
+        self._starts: list[float] = []
         self._raw = [(name, dict(arguments or {})) for name, arguments, _ in segments]
         value, t = domain.rest, 0.0
         for name, arguments, where in segments:
@@ -97,7 +106,7 @@ class Chain:
             value = primitive.end
         self.duration_s = t
 
-    def _check_range(self, primitive, name, where):
+    def _check_range(self, primitive: 'Primitive', name: str, where: str) -> None:
         domain, duration_s = self.domain, primitive.duration_s
         unit = _SHOWN.get(domain.unit, domain.unit)
         count = min(max(round(duration_s / CHECK_EVERY_S), 200), _MOST_CHECKS)
@@ -114,10 +123,10 @@ class Chain:
                     f'{name} moves at {abs(rate):.4g} {unit}/s after {t:.3g} s; allowed '
                     f'for {domain.name} is up to {domain.fastest:g} {unit}/s', where)
 
-    def _index(self, t_s):
+    def _index(self, t_s: float) -> int:
         return max(bisect.bisect_right(self._starts, t_s) - 1, 0)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
         if t_s < 0.0:
             return self.segments[0].at(0.0)[0], 0.0
@@ -126,25 +135,25 @@ class Chain:
         k = self._index(t_s)
         return self.segments[k].at(t_s - self._starts[k])
 
-    def shuts_valve(self, t_s):
+    def shuts_valve(self, t_s: float) -> bool:
         """Tell whether the primitive at t_s shuts the valve; never outside the chain."""
         return 0.0 <= t_s < self.duration_s and self.segments[self._index(t_s)].SHUTS_VALVE
 
     @property
-    def cycles(self):
+    def cycles(self) -> tuple[float, float, int] | None:
         """Return (start_s, period_s, count) of the first periodic primitive, or None."""
         for start, segment in zip(self._starts, self.segments):
             if segment.periods:
                 return (start, *segment.periods)
         return None
 
-    def extremes(self):
+    def extremes(self) -> tuple[float, float]:
         """Return the lowest and highest value, looked at every 10 ms."""
         count = min(max(round(self.duration_s / CHECK_EVERY_S), 1), _MOST_CHECKS)
         values = [self.at(self.duration_s * k / count)[0] for k in range(count + 1)]
         return min(values), max(values)
 
-    def jumps(self, least):
+    def jumps(self, least: float) -> list[tuple[float, str, float, float]]:
         """
         Return where the value jumps by more than ``least`` although no step is asked for.
 
@@ -158,12 +167,12 @@ class Chain:
             before = segment.end
         return found
 
-    def share_above(self, limit):
+    def share_above(self, limit: float) -> float:
         """Return the share of the time, 0 to 1, in which the value is above a limit."""
         count = min(max(round(self.duration_s / CHECK_EVERY_S), 1), _MOST_CHECKS)
         return sum(self.at(self.duration_s * k / count)[0] > limit
                    for k in range(count + 1)) / (count + 1)
 
-    def plain(self):
+    def plain(self) -> list[dict[str, Any]]:
         """Return the list of segments as it stands in a file."""
         return [{name: arguments} for name, arguments in self._raw]

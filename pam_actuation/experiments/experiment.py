@@ -14,12 +14,20 @@
 
 """An experiment file: a domain and a chain of primitives, checked before it runs."""
 
-from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S, TRACKED
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from pam_actuation.experiments.chain import Chain, DOMAINS, FORCE, LONGEST_S, Segment, TRACKED
 from pam_actuation.experiments.limits import check_rig, jump_remarks, reach_remarks
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
 from pam_sim.files import check_name
-from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located
+from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located, LocatedList
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 KEYS = (
     'name', 'description', 'domain', 'needs', 'stop_after_s', 'segments', 'disturbance')
@@ -57,8 +65,10 @@ class Experiment:
 
     """
 
-    def __init__(self, name, description, domain, segments, where='', disturbance=(), needs=(),
-                 stop_after_s=None):
+    def __init__(
+            self, name: str, description: str, domain: str, segments: Sequence[Segment],
+            where: str = '', disturbance: Sequence[Segment] = (), needs: Sequence[str] = (),
+            stop_after_s: float | None = None) -> None:
         if domain not in DOMAINS:
             raise InputError(
                 f'domain is "{domain}"; allowed: {", ".join(DOMAINS)}', where)
@@ -76,49 +86,50 @@ class Experiment:
         self.stop_after_s = stop_after_s
         self.duration_s = whole_s if stop_after_s is None else min(stop_after_s, whole_s)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
         if t_s >= self.duration_s:
             return self.chain.at(self.duration_s)[0], 0.0
         return self.chain.at(t_s)
 
-    def shuts_valve(self, t_s):
+    def shuts_valve(self, t_s: float) -> bool:
         """Tell whether both valves of a pair are shut at t_s, whatever the value."""
         return t_s < self.duration_s and self.chain.shuts_valve(t_s)
 
-    def external_force_n(self, t_s):
+    def external_force_n(self, t_s: float) -> float:
         """Return the disturbance on the load [N], against contraction positive; 0 outside."""
         if self.disturbance is None or not 0.0 <= t_s < min(
                 self.disturbance.duration_s, self.duration_s):
             return 0.0
         return self.disturbance.at(t_s)[0]
 
-    def sends_valve_command(self, valve):
+    def sends_valve_command(self, valve: str) -> bool:
         """Tell whether some part of it speaks to a valve of this type directly."""
         if self.asks_for_motion or self.domain == 'pressure':
             return valve == 'hsv' and any(s.SHUTS_VALVE for s in self.chain.segments)
         return True
 
     @property
-    def asks_for_motion(self):
+    def asks_for_motion(self) -> bool:
         """Whether the values are a reference for a controller, of a muscle or of a joint."""
         return self.tracked or self.domain == 'joint_angle'
 
     @property
-    def tracked(self):
+    def tracked(self) -> bool:
         """Whether a controller of one muscle tracks the values."""
         return self.domain in TRACKED
 
     @property
-    def cycles(self):
+    def cycles(self) -> tuple[float, float, int] | None:
         """Return (start_s, period_s, count) of the first periodic primitive, or None."""
         return self.chain.cycles
 
-    def check_reachable(self, rig):
+    def check_reachable(self, rig: 'JointRig | Rig') -> None:
         """Raise InputError where the experiment asks for what the rig cannot do."""
         check_rig(self, rig)
 
-    def remarks(self, valve, rig=None, controller=None):
+    def remarks(self, valve: str, rig: 'JointRig | Rig | None' = None,
+                controller: Any = None) -> tuple[str, ...]:
         """
         Return sentences a person should read before this experiment runs.
 
@@ -132,16 +143,17 @@ class Experiment:
             May keep the pressure lower than the driver does.
 
         """
-        said = ()
+        said: tuple[str, ...] = ()
         if valve == 'ppr' and any(s.SHUTS_VALVE for s in self.chain.segments):
             said = (
                 'decay: a pressure regulator has no shut state; it holds the last command and '
                 'refills what leaks, so this recording shows nothing of a leak',)
         return (*said, *jump_remarks(self), *reach_remarks(self, rig, controller))
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the experiment as plain data, as it stands in a file."""
-        data = {'name': self.name, 'description': self.description, 'domain': self.domain}
+        data: dict[str, Any] = {
+            'name': self.name, 'description': self.description, 'domain': self.domain}
         if self.needs:
             data['needs'] = list(self.needs)
         if self.stop_after_s is not None:
@@ -151,12 +163,12 @@ class Experiment:
             data['disturbance'] = self.disturbance.plain()
         return data
 
-    def to_yaml(self):
+    def to_yaml(self) -> str:
         """Return YAML text from which ``load_experiment`` makes the same experiment."""
         return dump_yaml(self.to_dict())
 
 
-def load_experiment(source):
+def load_experiment(source: Path | str) -> Experiment:
     """
     Load an experiment by name (``config/experiments/NAME.yaml``), path or YAML text.
 
@@ -171,27 +183,29 @@ def load_experiment(source):
         source = find_config('experiments', source)
     data = load_yaml(source)
     data.check_keys(KEYS)
+    nothing = LocatedList()
     return Experiment(
         check_name(data.require('name', str), '`name`', data.where('name')),
         data.get('description', str, ''),
         data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
         _segments(data.require('segments', list)), data.where('segments'),
-        _segments(data.get('disturbance', list, ())), _needs(data.get('needs', list, ())),
+        _segments(data.get('disturbance', list, nothing)),
+        _needs(data.get('needs', list, nothing)),
         data.get('stop_after_s', float, None, 0.01, LONGEST_S, unit='s'))
 
 
-def _needs(items):
+def _needs(items: LocatedList) -> tuple[str, ...]:
     """Return the names of the topics an experiment needs."""
     return tuple(check_value(item, f'item {k + 1} of `needs`', items.where(k), str, choices=NEEDS)
                  for k, item in enumerate(items))
 
 
-def _segments(items):
+def _segments(items: LocatedList) -> list[Segment]:
     """Return (name, arguments, where) of every entry of a list of segments."""
     return [_segment(items, k) for k in range(len(items))]
 
 
-def _segment(items, index):
+def _segment(items: LocatedList, index: int) -> Segment:
     item, where = items[index], items.where(index)
     if isinstance(item, str):
         return item, {}, where

@@ -18,13 +18,21 @@ The live loops of a joint on a virtual clock: plant, both drivers and the contro
 The loops are the ones the nodes call, joined by messages that take no time.
 """
 
+from collections.abc import Callable
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.joint_plant_loop import JointPlantLoop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
-from pam_actuation.messages import START_NS
+from pam_actuation.messages import ControllerState, Pressure, START_NS
 from pam_sim.joint.parameters import SIDES
+from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.joint_loop import JointControllerLoop
+    from pam_sim.joint.rig import JointRig
 
 _NS = 1_000_000_000
 
@@ -43,17 +51,17 @@ class JointLoops:
 
     """
 
-    def __init__(self, joint, control, seed=0):
+    def __init__(self, joint: 'JointRig', control: 'JointControllerLoop', seed: int = 0) -> None:
         self.control = control
         self.plant = JointPlantLoop(joint, seed=seed)
         self.drivers = [DriverLoop(rig.valve, driver_config(rig))
                         for rig in (joint.flexor, joint.extensor)]
         self.period_ns = round(_NS / control.rate_hz)
         self.now_ns = START_NS
-        self.state = None           # the newest ``ControllerState``
+        self.state: ControllerState | None = None       # the newest
         self.ticks = 0
-        self._commands = None
-        self._instead = {}
+        self._commands = Pressure(START_NS, P_ATM_PA), Pressure(START_NS, P_ATM_PA)
+        self._instead: dict[str, Any] = {}
         self.plant.advance_to(self.now_ns)
         self._bus = bus = Bus()
         first_ns = START_NS + self.period_ns
@@ -65,20 +73,21 @@ class JointLoops:
         for topic, take in control.takes().items():
             bus.connect(topic, self._unless_replaced(topic, take))
 
-    def _unless_replaced(self, topic, take):
+    def _unless_replaced(self, topic: str,
+                         take: Callable[[Any], None]) -> Callable[[Any], None]:
         """Return what hands on a message, or what stands in its place in this tick."""
-        def taken(message):
+        def taken(message: Any) -> None:
             both = self._instead.get(topic.rpartition('/')[2], message)
             take(self._instead.get(topic, both))
         return taken
 
-    def _tick_control(self, now_ns):
+    def _tick_control(self, now_ns: int) -> None:
         self._commands, self.state = self.control.tick(now_ns)
         self.ticks += 1
         for side, command in zip(SIDES, self._commands):
             self._bus.send(f'{side}/pressure_command', command, now_ns)
 
-    def tick(self, **instead):
+    def tick(self, **instead: Any) -> tuple[Pressure, Pressure]:
         """
         Run one period; return the commands of flexor and extensor as ``Pressure``.
 
@@ -91,6 +100,7 @@ class JointLoops:
         self._bus.run_until(self.now_ns)
         return self._commands
 
-    def internal(self, name):
+    def internal(self, name: str) -> float:
         """Return a number of the newest ``controller_state``."""
+        assert self.state is not None, 'after the first tick'
         return self.state.values[self.state.names.index(name)]

@@ -14,12 +14,22 @@
 
 """What a rig can do of an experiment, asked before the first message is sent."""
 
+from types import SimpleNamespace
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.control.modes.force_surface import highest_force_n
 from pam_actuation.control.modes.tracked import tracked_by
 from pam_actuation.drivers.for_rig import driver_config
 from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
 from pam_sim.units import gauge_kpa, P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.modes.wrapped import WrappedLaw
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
 
 # Design values: of a contraction [m] that friction may take, and of jumps worth a word.
 FRICTION_PA = 30e3
@@ -28,7 +38,7 @@ _SHOWN = {'contraction': (1e3, 'mm'), 'force': (1.0, 'N'), 'joint_angle': (1.0, 
 _VALVE_OF = {'ppr_voltage': 'ppr', 'hsv_duty': 'hsv'}
 
 
-def check_rig(experiment, rig):
+def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
     """
     Raise InputError where an experiment asks for more than a rig can give.
 
@@ -39,7 +49,7 @@ def check_rig(experiment, rig):
     moves freely. Measured topics it needs.
     """
     place = f'experiment "{experiment.name}"'
-    if experiment.domain == 'joint_angle' or hasattr(rig, 'flexor'):
+    if experiment.domain == 'joint_angle' or isinstance(rig, JointRig):
         _check_joint(experiment, rig, place)
         return
     if experiment.domain == 'contraction':
@@ -62,7 +72,9 @@ def check_rig(experiment, rig):
             place)
 
 
-def check_tracked(experiment, controller):
+def check_tracked(
+        experiment: 'Experiment',
+        controller: 'CompiledController | WrappedLaw | None') -> None:
     """Raise InputError where an experiment is in one quantity, its controller in another."""
     if not experiment.tracked:
         return
@@ -73,7 +85,8 @@ def check_tracked(experiment, controller):
             f'experiment "{experiment.name}"')
 
 
-def highest_gauge_pa(rig, controller=None):
+def highest_gauge_pa(rig: 'Rig',
+                     controller: 'CompiledController | SimpleNamespace | None' = None) -> float:
     """Return the highest pressure [Pa gauge] that driver, supply and controller allow."""
     config = driver_config(rig)
     limits = [config.safety.max_pressure_gauge_pa]
@@ -84,9 +97,10 @@ def highest_gauge_pa(rig, controller=None):
     return min(limits)
 
 
-def reach_remarks(experiment, rig, controller=None):
+def reach_remarks(experiment: 'Experiment', rig: 'JointRig | Rig | None',
+                  controller: Any = None) -> tuple[str, ...]:
     """Return a sentence if a reference asks for more than the rig holds at its limit."""
-    if rig is None or experiment.domain != 'contraction' or hasattr(rig, 'flexor') \
+    if rig is None or experiment.domain != 'contraction' or isinstance(rig, JointRig) \
             or not LOADS[rig.load].MOVES_FREELY:
         return ()
     gauge_pa = highest_gauge_pa(rig, controller)
@@ -101,7 +115,7 @@ def reach_remarks(experiment, rig, controller=None):
             f'{time}, where the error says nothing of the controller',)
 
 
-def jump_remarks(experiment):
+def jump_remarks(experiment: 'Experiment') -> tuple[str, ...]:
     """Return a sentence on every jump of a reference that no step asks for."""
     if experiment.domain not in LEAST_JUMP:
         return ()
@@ -114,7 +128,7 @@ def jump_remarks(experiment):
         if start < experiment.duration_s)
 
 
-def _check_stroke(experiment, rig, place):
+def _check_stroke(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
     stroke = rig.muscle.stroke_m
     worst = experiment.chain.extremes()[1]
     if worst > stroke:
@@ -123,7 +137,7 @@ def _check_stroke(experiment, rig, place):
             f'{1e3 * stroke:.1f} mm', place)
 
 
-def _check_force(experiment, rig, place):
+def _check_force(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
     if LOADS[rig.load].MOVES_FREELY:
         raise InputError(
             f'asks for a force; the load `{rig.load}` of {rig.name} moves freely, a force can be '
@@ -137,11 +151,12 @@ def _check_force(experiment, rig, place):
             f'asks for {worst:.1f} N; {rig.name} allows 0 to {highest:.1f} N', place)
 
 
-def _check_joint(experiment, joint, place):
-    if not hasattr(joint, 'flexor') or experiment.domain != 'joint_angle':
+def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) -> None:
+    is_joint = isinstance(joint, JointRig)
+    if not isinstance(joint, JointRig) or experiment.domain != 'joint_angle':
         raise InputError(
             f'is in {experiment.domain}; {joint.name} is '
-            + ('a joint' if hasattr(joint, 'flexor') else 'a single muscle'), place)
+            + ('a joint' if is_joint else 'a single muscle'), place)
     lower, upper = joint.range_rad
     worst = experiment.chain.extremes()
     if worst[0] < lower or worst[1] > upper:
@@ -150,7 +165,7 @@ def _check_joint(experiment, joint, place):
             f'{upper:.3f} rad', place)
 
 
-def _check_pressure(experiment, rig, place):
+def _check_pressure(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
     config = driver_config(rig)
     highest = P_ATM_PA + config.safety.max_pressure_gauge_pa
     if rig.valve == 'hsv':

@@ -20,6 +20,7 @@ nothing, so the first run hangs a hook of 0.1 kg on the muscle; its weight is
 read off the load cell like every other load.
 """
 
+from collections.abc import Callable, Iterable
 import os
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.parallel import in_processes
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2
 
 HOOK_KG = 0.1
@@ -41,7 +43,7 @@ SENSORS = ('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n', 'stamp_j
 SENSORS_FROM = 'dmsp_5_300_realistic'     # whose noise a rig without any is given
 
 
-def with_sensor_noise(rig):
+def with_sensor_noise(rig: Rig) -> Rig:
     """Return the rig with the sensor noise of the realistic rig where it has none itself."""
     if any(rig.sensors[name] for name in SENSORS):
         return rig
@@ -49,12 +51,13 @@ def with_sensor_noise(rig):
     return rig.with_(sensors={name: usual[name] for name in SENSORS})
 
 
-def bag_name(load_n):
+def bag_name(load_n: float) -> str:
     """Return the folder name of the bag of one load."""
     return f'load_{load_n:05.1f}_n'.replace('.', '_')
 
 
-def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT, overwrite=False):
+def simulate_load(rig: Rig, load_n: float, out: str | os.PathLike[str], seed: int = 0,
+                  experiment: str = EXPERIMENT, overwrite: bool = False) -> str:
     """
     Simulate one bag of the series.
 
@@ -83,12 +86,15 @@ def simulate_load(rig, load_n, out, seed=0, experiment=EXPERIMENT, overwrite=Fal
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     mass = max(load_n / GRAVITY_M_PER_S2, HOOK_KG)
     simulate_experiment(load_experiment(experiment), rig.with_(parameters={'mass_kg': mass}),
-                        None, out, seed=1000 * seed + int(round(load_n)), overwrite=overwrite)
+                        None, os.fspath(out), seed=1000 * seed + int(round(load_n)),
+                        overwrite=overwrite)
     return os.fspath(out)
 
 
-def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPERIMENT,
-                   progress=None, overwrite=False):
+def simulate_loads(rig: Rig, folder: str | os.PathLike[str], seed: int = 0,
+                   loads_n: Iterable[float] = LOADS_N, jobs: int = 2,
+                   experiment: str = EXPERIMENT, progress: Callable[[int], object] | None = None,
+                   overwrite: bool = False) -> list[str]:
     """
     Simulate one bag per load, in parallel processes; return their paths in the order of loads.
 
@@ -120,7 +126,7 @@ def simulate_loads(rig, folder, seed=0, loads_n=LOADS_N, jobs=2, experiment=EXPE
         raise InputError(f'the rig {rig.name} has no hanging mass: its load is `{rig.load}`')
     if load_experiment(experiment).domain != 'pressure':
         raise InputError(f'the experiment {experiment} is not in the pressure domain')
-    loads = np.asarray(loads_n, dtype=float)
+    loads = np.asarray(list(loads_n), dtype=float)
     if loads.size < 3 or np.any(np.diff(loads) < 1.0) or loads[0] < 0.0 or loads[-1] > 490.0:
         raise InputError('needs 3 or more loads, ascending by at least 1 N, from 0 to 490 N',
                          'loads')

@@ -21,8 +21,10 @@ seed, all stamps from the virtual clock.
 """
 
 from collections import Counter
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
 import os
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation import interrupts
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
@@ -42,6 +44,12 @@ from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.modes.force import ForceController
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
+
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
 LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live
@@ -51,11 +59,12 @@ NAMESPACE = '/muscle'
 class _Recorder:
     """Encode messages into a bag and count them, as publisher and recorder at once."""
 
-    def __init__(self, writer, namespace):
+    def __init__(self, writer: BagWriter, namespace: str) -> None:
         self._writer, self._namespace = writer, namespace
-        self._known, self.counts = set(), Counter()
+        self._known: set[str] = set()
+        self.counts: Counter[str] = Counter()
 
-    def write(self, topic, message, now_ns):
+    def write(self, topic: str, message: Any, now_ns: int) -> None:
         """Write one message under its full topic name."""
         row = topic_of(topic)
         name = row.full_name(self._namespace)
@@ -65,7 +74,7 @@ class _Recorder:
         self._writer.write(name, encode(topic, message), now_ns, now_ns)
         self.counts[name] += 1
 
-    def finish(self, now_ns, said):
+    def finish(self, now_ns: int, said: str) -> None:
         """Write the last status: the counts as a node states them."""
         published = tuple((f'published.{name}', str(count)) for name, count in self.counts.items()
                           if not name.endswith('/diagnostics'))
@@ -76,7 +85,11 @@ class _Recorder:
 class _Loops:
     """The loops of the live nodes on a bus, and how far they came."""
 
-    def __init__(self, experiment, rig, controller, seed, learning, recorder, transport_ns, ticks):
+    def __init__(
+            self, experiment: 'Experiment', rig: 'Rig',
+            controller: 'CompiledController | ForceController | None',
+            seed: int, learning: bool, recorder: _Recorder, transport_ns: int,
+            ticks: Mapping[str, Iterable[int]]) -> None:
         self._recorder = recorder
         self._status_ns = -STATUS_EVERY_NS
         self.bus = bus = Bus(transport_ns, recorder.write)
@@ -85,7 +98,8 @@ class _Loops:
         driver = DriverLoop(rig.valve, driver_config(rig))
         lead_ns = LEAD_NS if experiment.tracked else 0
 
-        def add(name, tick, rate_hz, lead_ns=lead_ns):
+        def add(name: str, tick: Callable[[int], object], rate_hz: float,
+                lead_ns: int = lead_ns) -> None:
             times = ticks.get(name)
             bus.add(tick, every(rate_hz, lead_ns=lead_ns) if times is None
                     else (START_NS + int(after_ns) for after_ns in times))
@@ -94,20 +108,21 @@ class _Loops:
         attach(bus, driver)
         add('plant', attach_plant(bus, plant), PUBLISH_RATE_HZ)
         add('reference', reference_tick(bus, reference), reference.rate_hz, 0)
-        if experiment.tracked:
+        if experiment.tracked and controller is not None:
             control = ControllerLoop(controller)
             attach(bus, control)
-            add('controller', partial(controller_tick(bus, control), learning=learning),
-                controller.rate_hz)
+            decide = controller_tick(bus, control)
+            add('controller', lambda now_ns: decide(now_ns, learning), controller.rate_hz)
         add('driver', driver_tick(bus, driver, told=self._told), driver.rate_hz)
 
-    def _told(self, now_ns, status):
+    def _told(self, now_ns: int, status: Status) -> None:
         """Record the status of the driver from time to time."""
         if now_ns - self._status_ns >= STATUS_EVERY_NS:
             self._status_ns = now_ns
             self._recorder.write('diagnostics', status, now_ns)
 
-    def run(self, end_ns, progress, stopped):
+    def run(self, end_ns: int, progress: Callable[[int], object] | None,
+            stopped: Callable[[], bool]) -> None:
         """
         Call every loop when it is due, in order of time, until the experiment is over.
 
@@ -123,9 +138,13 @@ class _Loops:
                 progress(reported)
 
 
-def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
-                        overwrite=False, progress=None, namespace=NAMESPACE, ticks=None,
-                        transport_ns=0):
+def simulate_experiment(
+        experiment: 'Experiment', rig: 'Rig',
+        controller: 'CompiledController | ForceController | None',
+        out: Path | str, seed: int = 0, learning: bool = True, overwrite: bool = False,
+        progress: Callable[[int], object] | None = None, namespace: str = NAMESPACE,
+        ticks: Mapping[str, Iterable[int]] | None = None,
+        transport_ns: int = 0) -> dict[str, Any]:
     """
     Simulate an experiment and record it as a bag.
 
@@ -205,7 +224,8 @@ def simulate_experiment(experiment, rig, controller, out, seed=0, learning=True,
             'counts': dict(recorder.counts)}
 
 
-def _recorded(loops, recorder, experiment, progress, stopped):
+def _recorded(loops: _Loops, recorder: _Recorder, experiment: 'Experiment',
+              progress: Callable[..., Any] | None, stopped: Callable[..., Any]) -> Ending:
     """Run the loops to the end or to an interrupt; return the Ending."""
     end = START_NS + round(experiment.duration_s * 1e9)
     ended, said = COMPLETE, 'finished'

@@ -21,23 +21,28 @@ and name the effects (:mod:`pam_sim.gap.plan`); the best one becomes an experime
 simulated as a whole and judged again.
 """
 
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
+from typing import Any
 
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.files import preset_for
-from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.experiments.experiment import Experiment, load_experiment
 from pam_actuation.experiments.separating import (
     HIGHEST_GAUGE_PA, LOWEST_GAUGE_PA, sensors_for, simulated)
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import check_health
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import READABLE
-from pam_sim.gap.plan.outlook import in_proportion, least_factors, outlooks, score
+from pam_sim.gap.plan.outlook import in_proportion, least_factors, Outlook, outlooks, score
 from pam_sim.gap.plan.sensitivity import Sensitivities
 from pam_sim.located_yaml import dump_yaml
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
+
+Segments = list[dict[str, dict[str, float]]]      # as an experiment file has them
 
 LONGEST_S = 60.0
 START_S, BETWEEN_S = 2.5, 1.0
@@ -63,21 +68,21 @@ class Planned:
 
     name: str
     duration_s: float
-    outlooks: list
+    outlooks: list[Outlook]
     score: float
-    experiment: dict
+    experiment: dict[str, Any]
 
-    def to_dict(self, rig):
+    def to_dict(self, rig: Rig) -> dict[str, Any]:
         """Return it as plain data; pairs are (effect, what can stand in for it)."""
         return {'name': self.name, 'duration_s': self.duration_s, 'score': self.score,
                 'effects': [o.to_dict(rig) for o in self.outlooks],
                 'inseparable_pairs': self.pairs(), 'experiment': self.experiment}
 
-    def pairs(self):
+    def pairs(self) -> list[list[str]]:
         """Return the pairs that cannot be told apart: [effect, what can stand in for it]."""
         return [[o.name, rival] for o in self.outlooks for rival in o.inseparable]
 
-    def text(self, rig):
+    def text(self, rig: Rig) -> str:
         """Return a table for people."""
         lines = [f'{self.name} ({self.duration_s:.0f} s), score {self.score:.2f}']
         rows = [('effect', 'shows from', 'named from', 'looks like')]
@@ -100,19 +105,19 @@ class Planned:
 class Plan:
     """Protocols as asked for and the best of the candidates, which comes last."""
 
-    rig: object
-    signals: tuple
-    noise: dict
+    rig: Rig
+    signals: tuple[str, ...]
+    noise: dict[str, float]
     materiality: float
-    protocols: list
+    protocols: list[Planned]
     tried: int
 
     @property
-    def best(self):
+    def best(self) -> Planned:
         """Return the best protocol of the candidate set."""
         return self.protocols[-1]
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the plan as plain data."""
         return {'schema': 1, 'rig': self.rig.name, 'valve': self.rig.valve,
                 'signals': list(self.signals), 'noise': self.noise,
@@ -120,7 +125,7 @@ class Plan:
                 'protocols': [p.to_dict(self.rig) for p in self.protocols],
                 'best': self.best.name}
 
-    def text(self):
+    def text(self) -> str:
         """Return the plan for people."""
         noise = ', '.join(f'{s} {self.noise[s] * READABLE[s][0]:.3g} {READABLE[s][1]}'
                           for s in self.signals)
@@ -133,8 +138,9 @@ class Plan:
             f'{LONGEST_S:g} s.'])
 
 
-def plan(rig, experiments=(), with_force=True, materiality=1.0, only=None,
-         progress=lambda done: None):
+def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = True,
+         materiality: float = 1.0, only: Sequence[str] | None = None,
+         progress: Callable[[float], object] = lambda done: None) -> Plan:
     """
     Judge protocols on a rig before anything is measured, and make the best of 60 s.
 
@@ -166,7 +172,7 @@ def plan(rig, experiments=(), with_force=True, materiality=1.0, only=None,
     noise, noisy = sensors_for(rig)
     steps, done = len(experiments) + len(pieces(rig.valve)) + 1, [0]
 
-    def looked(plain):
+    def looked(plain: dict[str, Any]) -> Sensitivities:
         found = sensitivities(plain, noisy, with_force, only)
         done[0] += 1
         progress(done[0] / steps)
@@ -189,7 +195,8 @@ def plan(rig, experiments=(), with_force=True, materiality=1.0, only=None,
     return Plan(rig, signals, {s: noise[s] for s in signals}, materiality, judged, tried)
 
 
-def _best(looks, valve, floors):
+def _best(looks: Mapping[str, Sensitivities], valve: str,
+          floors: float) -> tuple[list[str], int]:
     """Return (pieces of the best choice, how many choices there are)."""
     factors, _ = least_factors(list(looks.values()), floors)
     inners = {n: piece.inner(factors) for n, piece in looks.items()}
@@ -201,12 +208,12 @@ def _best(looks, valve, floors):
     return found[ranked.index(max(ranked))], len(found)
 
 
-def pieces(valve):
+def pieces(valve: str) -> dict[str, Segments]:
     """Return name -> segments of the pieces that protocols are made of."""
     low, high = P_ATM_PA + LOWEST_GAUGE_PA, P_ATM_PA + HIGHEST_GAUGE_PA
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     band = {'low_pa': low, 'high_pa': high}
-    found = {
+    found: dict[str, Segments] = {
         'edges': [{'random_steps': {**band, 'min_hold_s': 0.25, 'max_hold_s': 0.9,
                                     'duration_s': 10.0, 'seed': 7}}],
         'edges_long': [{'random_steps': {**band, 'min_hold_s': 0.6, 'max_hold_s': 2.5,
@@ -230,7 +237,7 @@ def pieces(valve):
     return found
 
 
-def choices(names, valve):
+def choices(names: Collection[str], valve: str) -> list[list[str]]:
     """Return the choices of pieces that fit and to which no further piece could be added."""
     fitting = [set(c) for size in range(1, len(names) + 1) for c in combinations(names, size)
                if length_of(c, valve) <= LONGEST_S]
@@ -238,40 +245,44 @@ def choices(names, valve):
             if not any(c < other for other in fitting)]
 
 
-def length_of(names, valve):
+def length_of(names: Iterable[str], valve: str) -> float:
     """Return how long [s] the protocol of these pieces lasts."""
     return START_S + sum(_length(n, valve) + BETWEEN_S for n in names)
 
 
 @lru_cache(maxsize=None)
-def _length(name, valve):
+def _length(name: str, valve: str) -> float:
     segments = pieces(valve)[name]
     return load_experiment(dump_yaml(_plain('piece', '', segments, ()))).duration_s
 
 
-def _joined(names, valve):
+def _joined(names: Iterable[str], valve: str) -> Segments:
     low = P_ATM_PA + LOWEST_GAUGE_PA
-    found = []
+    found: Segments = []
     for name in names:
         found += pieces(valve)[name] + [{'ramp': {'to_pa': low, 'duration_s': BETWEEN_S}}]
     return found
 
 
-def _experiment(names, segments, rig, with_force):
+def _experiment(names: Iterable[str], segments: Segments, rig: Rig,
+                with_force: bool) -> dict[str, Any]:
     needs = ['pressure', *(['contraction'] if rig.load == 'hanging_mass' else []),
              *(['force'] if with_force else [])]
-    start = [{'rest': {'duration_s': 1.0}},
-             {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': START_S - 1.0}}]
+    start: Segments = [
+        {'rest': {'duration_s': 1.0}},
+        {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': START_S - 1.0}}]
     return _plain(NAME, f'Planned for {rig.name} with {rig.valve}: {", ".join(names)}',
                   start + segments, needs)
 
 
-def _plain(name, description, segments, needs):
+def _plain(name: str, description: str, segments: Segments,
+           needs: Iterable[str]) -> dict[str, Any]:
     return {'name': name, 'description': description, 'domain': 'pressure',
             'needs': list(needs), 'segments': segments}
 
 
-def sensitivities(plain, rig, with_force=True, only=None):
+def sensitivities(plain: dict[str, Any], rig: Rig, with_force: bool = True,
+                  only: Sequence[str] | None = None) -> Sensitivities:
     """Return the Sensitivities of a protocol, given as plain data, on a rig with its sensors."""
     experiment = load_experiment(dump_yaml(plain))
     controller = None
@@ -286,13 +297,13 @@ def sensitivities(plain, rig, with_force=True, only=None):
     return Sensitivities(rig, Recording(run, rig.valve, rig.load != 'hanging_mass'), only)
 
 
-def _judged(plain, looks, materiality):
+def _judged(plain: dict[str, Any], looks: Sensitivities, materiality: float) -> Planned:
     found = outlooks(looks, materiality)
     return Planned(plain['name'], load_experiment(dump_yaml(plain)).duration_s, found,
                    score(o.factors for o in found), plain)
 
 
-def _shown(size):
+def _shown(size: dict[str, Any] | None) -> str:
     if size is None:
         return 'no size'
     values = size['equivalent'] or size['parameters']

@@ -14,9 +14,14 @@
 
 """Turn an experiment into reference messages on a clock."""
 
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.control.modes.tracked import FORCE, JOINT
 from pam_actuation.messages import (
     AngleReference, AngleTrajectory, Force, Pressure, Reference, ReferenceTrajectory, ValveSignal)
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
 
 POINT_NS = 20_000_000          # points of the trajectory, at most 20 ms apart on the wire
 POINTS = 31                    # horizon 0.6 s; the wire asks for 0.5 s or more
@@ -42,7 +47,8 @@ class ReferenceLoop:
 
     """
 
-    def __init__(self, experiment, rate_hz=100.0, valve='ppr'):
+    def __init__(self, experiment: 'Experiment', rate_hz: float = 100.0,
+                 valve: str = 'ppr') -> None:
         self.experiment = experiment
         self.valve = valve
         self.rate_hz = float(rate_hz)
@@ -50,18 +56,18 @@ class ReferenceLoop:
         self._tracked_topics = (
             ('joint_reference', 'joint_trajectory') if experiment.domain == JOINT.topic
             else ('reference', 'reference_trajectory'))
-        self.start_ns = None
+        self.start_ns: int | None = None
         self._next_trajectory_ns = 0
 
-    def elapsed_s(self, now_ns):
+    def elapsed_s(self, now_ns: int) -> float:
         """Return seconds since the first tick."""
         return 0.0 if self.start_ns is None else (now_ns - self.start_ns) * 1e-9
 
-    def finished(self, now_ns):
+    def finished(self, now_ns: int) -> bool:
         """Return whether the experiment is over."""
         return self.start_ns is not None and self.elapsed_s(now_ns) >= self.experiment.duration_s
 
-    def tick(self, now_ns):
+    def tick(self, now_ns: int) -> dict[str, Any]:
         """
         Return the messages due now as a dict of short topic name to message.
 
@@ -75,7 +81,7 @@ class ReferenceLoop:
             self.start_ns = self._next_trajectory_ns = now_ns
         elapsed_s = self.elapsed_s(now_ns)
         value, rate = self.experiment.at(elapsed_s)
-        out = {}
+        out: dict[str, Any] = {}
         if self.experiment.disturbance:
             out['external_force'] = Force(now_ns, self.experiment.external_force_n(elapsed_s))
         if self.experiment.asks_for_motion:
@@ -93,9 +99,10 @@ class ReferenceLoop:
         return out
 
     @property
-    def topics(self):
+    def topics(self) -> tuple[str, ...]:
         """Return the topics it may send on, the one with the wanted value first."""
         domain = self.experiment.domain
+        topics: tuple[str, ...]
         if self.experiment.asks_for_motion:
             topics = self._tracked_topics
         else:
@@ -103,16 +110,16 @@ class ReferenceLoop:
             topics += ('valve_command',) if self._speaks_to_valve else ()
         return (*topics, 'external_force') if self.experiment.disturbance else topics
 
-    def safe_messages(self, now_ns):
+    def safe_messages(self, now_ns: int) -> dict[str, Any]:
         """Return the messages that end an experiment early: no disturbance, valve vented."""
-        out = {}
+        out: dict[str, Any] = {}
         if self.experiment.disturbance:
             out['external_force'] = Force(now_ns, 0.0)
         if self._speaks_to_valve:
             out['valve_command'] = self._vent(now_ns)
         return out
 
-    def _valve_command(self, now_ns, value):
+    def _valve_command(self, now_ns: int, value: float) -> ValveSignal:
         if self.finished(now_ns):
             return self._vent(now_ns)
         if self.experiment.domain == 'ppr_voltage':
@@ -120,19 +127,20 @@ class ReferenceLoop:
         shut = self.experiment.shuts_valve(self.elapsed_s(now_ns))
         return _duty_command(now_ns, 0.0 if shut else value)
 
-    def _vent(self, now_ns):
+    def _vent(self, now_ns: int) -> ValveSignal:
         if self.valve == 'hsv':
             return _duty_command(now_ns, -1.0)
         return ValveSignal(now_ns, ('ppr_voltage',), (0.0,))
 
-    def trajectory(self, now_ns):
+    def trajectory(self, now_ns: int) -> AngleTrajectory | ReferenceTrajectory:
         """
         Return the next 0.6 s of the reference as one message.
 
         Its points lie on the grid of the experiment, its stamp is the one before now: a jump
         has the same time in every message, however late the tick is.
         """
-        begin_ns = now_ns - (now_ns - self.start_ns) % POINT_NS
+        start_ns = now_ns if self.start_ns is None else self.start_ns
+        begin_ns = now_ns - (now_ns - start_ns) % POINT_NS
         offsets = tuple(k * POINT_NS for k in range(POINTS))
         points = [self.experiment.at(self.elapsed_s(begin_ns + o)) for o in offsets]
         values, rates = (tuple(column) for column in zip(*points))
@@ -142,7 +150,7 @@ class ReferenceLoop:
             return AngleTrajectory(begin_ns, offsets, values, rates)
         return ReferenceTrajectory(begin_ns, offsets, values, rates)
 
-    def _wanted(self, now_ns, value, rate):
+    def _wanted(self, now_ns: int, value: float, rate: float) -> AngleReference | Reference:
         if self.experiment.domain == FORCE.topic:
             return Reference(now_ns, force_n=value)
         if self.experiment.domain == JOINT.topic:
@@ -150,6 +158,6 @@ class ReferenceLoop:
         return Reference(now_ns, value, rate)
 
 
-def _duty_command(now_ns, duty):
+def _duty_command(now_ns: int, duty: float) -> ValveSignal:
     """Return the valve command of a pair of valves: above 0 fills, below 0 vents."""
     return ValveSignal(now_ns, ('fill_duty', 'vent_duty'), (max(duty, 0.0), max(-duty, 0.0)))

@@ -24,23 +24,36 @@ on counts. A load cell is asked for where none was there and the rivals stay tog
 without it.
 """
 
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 import tempfile
+from typing import Any
 
 import numpy as np
 
-from pam_actuation.bags.load import load_run
+from pam_actuation.bags.load import load_run, RecordedRun
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.modes.force import ForceController
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.select.comparison import gap, preference, share
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.located_yaml import dump_yaml
+from pam_sim.rig import Rig
+from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
+
+# Name -> what a piece shows, its segments as an experiment file has them.
+Menu = dict[str, tuple[str, list[dict[str, dict[str, float]]]]]
+Rival = tuple[str, Rig, Hypothesis, FloatArray]     # name, fitted model, hypothesis, parameters
 
 HIGHEST_GAUGE_PA = 550e3     # below the pressure limit of the driver
 LOWEST_GAUGE_PA = 200e3      # a hanging mass of 5 kg has left its stop
@@ -52,12 +65,12 @@ SURE_T = 4.0                 # of a test on simulated data; the rig's own forms 
 SURE_SHARE = 10.0 * CRITERIA.same_form_share
 
 
-def menu(valve):
+def menu(valve: str) -> Menu:
     """Return name -> (what it shows, segments) of the menu for a valve; all begin at rest."""
     low, high = P_ATM_PA + LOWEST_GAUGE_PA, P_ATM_PA + HIGHEST_GAUGE_PA
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     band = {'low_pa': low, 'high_pa': high}
-    found = {
+    found: Menu = {
         'edges': ('sharp steps at random times show transport and speed', [
             {'random_steps': {**band, 'min_hold_s': 0.25, 'max_hold_s': 0.9,
                               'duration_s': 16.0, 'seed': 7}}]),
@@ -84,7 +97,10 @@ def menu(valve):
     return found
 
 
-def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
+def next_experiment(
+        rig: Rig, rivals: Sequence[Rival], recorded: Collection[str],
+        noise: Mapping[str, float],
+        out_of_time: Callable[[], bool] = lambda: False) -> dict[str, Any] | None:
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
@@ -102,7 +118,8 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
         Returns whether to stop looking.
 
     """
-    found, truth = [], rivals[0][1].with_(sensors=_sensors(noise))
+    found: list[tuple[tuple[bool, float, float], str, bool]] = []
+    truth = rivals[0][1].with_(sensors=_sensors(noise))
     pieces = menu(rig.valve)
     for name in pieces:
         if out_of_time() and found:
@@ -134,10 +151,10 @@ def next_experiment(rig, rivals, recorded, noise, out_of_time=lambda: False):
             'needs': needs, 'experiment': {**plain, 'needs': needs}}
 
 
-def _experiment(pieces, names):
+def _experiment(pieces: Menu, names: Sequence[str]) -> dict[str, Any]:
     """Return an experiment as plain data: rest, then pieces of the menu, each from below."""
     low = {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': 1.5}}
-    segments = [{'rest': {'duration_s': 1.0}}]
+    segments: list[dict[str, dict[str, float]]] = [{'rest': {'duration_s': 1.0}}]
     for name in names:
         segments += [low, *pieces[name][1]]
     text = '; '.join(pieces[name][0] for name in names)
@@ -145,7 +162,8 @@ def _experiment(pieces, names):
             'description': f'{text[0].upper()}{text[1:]}'}
 
 
-def separation(run, rig, rivals, with_force):
+def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
+               with_force: bool) -> tuple[float, float]:
     """
     Return how far the nearest rival stays off a run of the first, and how sure that decides.
 
@@ -186,7 +204,8 @@ def separation(run, rig, rivals, with_force):
     return float(nearest), float(decided)
 
 
-def _decided(estimator, problem, first, other):
+def _decided(estimator: Estimator, problem: SubsystemProblem, first: Fit,
+             other: Fit) -> float:
     s = problem.subsystem
     base = estimator.base.errors[s]
     t = np.nan_to_num(preference(problem, base, first.errors[s], other.errors[s]))
@@ -194,23 +213,24 @@ def _decided(estimator, problem, first, other):
     return min(t / SURE_T, apart / SURE_SHARE)
 
 
-def identification_run(rig):
+def identification_run(rig: Rig) -> RecordedRun:
     """Return a simulated run of the experiment ``pressure_identification`` with sensor noise."""
     return simulated(load_experiment('pressure_identification').to_dict(), sensors_for(rig)[1])
 
 
-def sensors_for(rig):
+def sensors_for(rig: Rig) -> tuple[dict[str, float], Rig]:
     """Return (noise by signal, the rig with it): its own, else that of the realistic rig."""
     own = {s: rig.sensors.get(name, 0.0) for s, name in SENSOR_NOISE.items()}
     noise = {s: own[s] or NOISE[s] for s in NOISE}
     return noise, rig.with_(sensors=_sensors(noise))
 
 
-def _sensors(noise):
+def _sensors(noise: Mapping[str, float]) -> dict[str, float]:
     return {name: noise.get(s, NOISE[s]) for s, name in SENSOR_NOISE.items()}
 
 
-def simulated(plain, rig, controller=None):
+def simulated(plain: dict[str, Any], rig: Rig,
+              controller: CompiledController | ForceController | None = None) -> RecordedRun:
     """Return the simulated run of an experiment, given as plain data."""
     with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
         simulate_experiment(load_experiment(dump_yaml(plain)), rig, controller,

@@ -27,7 +27,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 import os
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.config import load_controller
@@ -47,6 +47,9 @@ from pam_sim.errors import InputError
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from pam_actuation.control.config import Controller
 
 SENSORS = ('pressure', 'contraction', 'force', 'supply_pressure')
 _UNITS = {'pressure_pa': 'Pa', 'contraction_m': 'm', 'force_n': 'N', 'ppr_voltage': 'V',
@@ -116,7 +119,7 @@ class _Chain:
     A loop ticks when it did in the recording. What the recording gives is sent when it arrived.
     """
 
-    def __init__(self, rig: Rig, controller: object | None, seed: int) -> None:
+    def __init__(self, rig: Rig, controller: 'Controller | None', seed: int) -> None:
         self.bus = Bus(on_sent=self._sent)
         self._newest: dict[str, Any] = {}       # by topic, of what was sent
         self._samples: dict[int, dict[str, Message]] = {}   # by the recorded stamp of a reading
@@ -195,7 +198,8 @@ class _Chain:
         columns[2].append(replayed)
 
 
-def replay_chain(run: Run, controller: object = None) -> ChainReplay:
+def replay_chain(run: Run,
+                 controller: 'Controller | str | os.PathLike[str] | None' = None) -> ChainReplay:
     """
     Repeat the experiment of a recording in simulation.
 
@@ -219,19 +223,21 @@ def replay_chain(run: Run, controller: object = None) -> ChainReplay:
         raise InputError('the recording does not say which rig it is', str(run.path))
     rig = load_rig(text)
     run.require('valve_signal')
-    controller = _controller(run, rig, controller)
+    runs = _controller(run, rig, controller)
     seed = run.metadata.get('seed', '0')
     if not seed.isdigit():
         raise InputError(f'its seed `{seed}` is not a whole number', str(run.path))
-    chain = _Chain(rig, controller, int(seed))
-    topics = set(ORDER) if controller is not None else set(ORDER) - {'controller_state'}
+    chain = _Chain(rig, runs, int(seed))
+    topics = set(ORDER) if runs is not None else set(ORDER) - {'controller_state'}
     chain.run(recorded_topics(run, topics))
     stamp_ns, recorded, replayed = (
         {name: np.array(columns[k]) for name, columns in chain.rows.items()} for k in range(3))
     return ChainReplay(rig.name, stamp_ns, recorded, replayed, run.start_ns)
 
 
-def _controller(run: Run, rig: Rig, controller: object) -> object:
+def _controller(
+        run: Run, rig: Rig,
+        controller: 'Controller | str | os.PathLike[str] | None') -> 'Controller | None':
     """Return the controller of the loop, None for an experiment without one."""
     own = run.metadata.get('controller')
     if controller is None and not own:

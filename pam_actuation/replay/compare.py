@@ -14,19 +14,26 @@
 
 """Replay a recorded run: controller, driver and plant, each alone or chained."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import os
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from pam_actuation.bags.ending import early_sentences
-from pam_actuation.replay.chain import replay_chain
-from pam_actuation.replay.controller import replay_controller
-from pam_actuation.replay.difference import difference
-from pam_actuation.replay.driver import replay_driver
-from pam_actuation.replay.plant import replay_plant
+from pam_actuation.replay.chain import ChainReplay, replay_chain
+from pam_actuation.replay.controller import replay_controller, ReplayResult
+from pam_actuation.replay.difference import Difference, difference
+from pam_actuation.replay.driver import DriverReplay, replay_driver
+from pam_actuation.replay.plant import PlantReplay, replay_plant
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.control.config import Controller
 
 PARTS = ('controller', 'driver', 'plant')
 
@@ -57,63 +64,62 @@ class Replay:
 
     """
 
-    controller: object = None
-    driver: object = None
-    plant: object = None
-    chain: object = None
-    notes: dict = None
+    controller: ReplayResult | None = None
+    driver: DriverReplay | None = None
+    plant: PlantReplay | None = None
+    chain: ChainReplay | None = None
+    notes: dict[str, str] = field(default_factory=dict)
     counterfactual: bool = False
     start_ns: int = 0
-    remarks: tuple = ()
+    remarks: tuple[str, ...] = ()
 
     @property
-    def unexpected_difference(self):
+    def unexpected_difference(self) -> bool:
         """Whether the recorded controller was not reproduced to the bit."""
         return (self.controller is not None and not self.counterfactual
                 and not self.controller.identical)
 
     @property
-    def command_difference(self):
+    def command_difference(self) -> Difference | None:
         """Return the Difference of the pressure commands of the controller replay."""
-        c = self.controller
-        return difference('pressure_command', 'Pa', c.stamp_ns, c.recorded_pa, c.replayed_pa,
-                          self.start_ns)
+        return None if self.controller is None else _of_commands(self.controller, self.start_ns)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
-        out = {'counterfactual': self.counterfactual, 'remarks': list(self.remarks)}
+        out: dict[str, Any] = {
+            'counterfactual': self.counterfactual, 'remarks': list(self.remarks)}
         if self.controller is not None:
             out['controller'] = {
                 'ticks': int(len(self.controller.recorded_pa)),
                 'identical': bool(self.controller.identical),
                 'max_abs_difference_pa': float(self.controller.max_abs_difference_pa),
-                'signals': [self.command_difference.to_dict()],
+                'signals': [_of_commands(self.controller, self.start_ns).to_dict()],
                 'differing_states': dict(self.controller.differing_states)}
         for name in ('driver', 'plant', 'chain'):
             part = getattr(self, name)
             if part is not None:
                 out[name] = part.to_dict()
-        out.update({f'{name}_note': note for name, note in (self.notes or {}).items()})
+        out.update({f'{name}_note': note for name, note in self.notes.items()})
         return out
 
-    def text(self):
+    def text(self) -> str:
         """Return the same for people."""
         lines = []
         if self.controller is not None:
-            lines.extend(self._controller_lines())
+            lines.extend(self._controller_lines(self.controller))
         for name in ('driver', 'plant', 'chain'):
             if getattr(self, name) is not None:
                 lines.extend(getattr(self, name).lines())
-        lines.extend(f'{name}: not replayed, {note}' for name, note in (self.notes or {}).items())
+        lines.extend(f'{name}: not replayed, {note}' for name, note in self.notes.items())
         lines.extend(f'remark: {text}' for text in self.remarks)
         return '\n'.join(lines)
 
-    def _controller_lines(self):
+    def _controller_lines(self, found: ReplayResult) -> list[str]:
         what = 'another tuning against the recorded commands' if self.counterfactual \
             else 'replayed against the recorded commands'
-        lines = [f'controller: {self.controller.ticks} ticks, {what}',
-                 self.command_difference.line()]
-        differing = self.controller.differing_states
+        lines = [f'controller: {found.ticks} ticks, {what}',
+                 _of_commands(found, self.start_ns).line()]
+        differing = found.differing_states
         if differing:
             lines.append('  internals that differ (ticks): ' + ', '.join(
                 f'{name} ({n})' for name, n in differing.items()))
@@ -121,9 +127,9 @@ class Replay:
             lines.append('  controller_state: every internal identical to the bit')
         return lines
 
-    def save(self, path):
+    def save(self, path: Path | str) -> None:
         """Write the replayed signals as .npz, the same bytes each time, whole or not at all."""
-        arrays = {}
+        arrays: dict[str, npt.NDArray[Any]] = {}
         if self.controller is not None:
             arrays['command_stamp_ns'] = np.asarray(self.controller.stamp_ns)
             arrays['recorded_command_pa'] = np.asarray(self.controller.recorded_pa)
@@ -132,10 +138,16 @@ class Replay:
             if part is not None:
                 arrays.update(part.arrays())
         with whole_file(path, suffix='.npz', parents=False) as temporary:
-            np.savez(temporary, **arrays)
+            np.savez(temporary, allow_pickle=True, **arrays)
 
 
-def replay_run(run, controller=None, only=None, chain=False):
+def _of_commands(found: ReplayResult, start_ns: int) -> Difference:
+    return difference('pressure_command', 'Pa', found.stamp_ns, found.recorded_pa,
+                      found.replayed_pa, start_ns)
+
+
+def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[str] | None' = None,
+               only: str | None = None, chain: bool = False) -> Replay:
     """
     Step the parts of the rig offline on the recorded inputs.
 
@@ -160,7 +172,7 @@ def replay_run(run, controller=None, only=None, chain=False):
         What was asked for cannot be replayed, or nothing can; the controller is unusable.
 
     """
-    result = Replay(counterfactual=controller is not None, start_ns=run.start_ns, notes={},
+    result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
                     remarks=tuple(early_sentences([run])))
     if chain:
         result.chain = replay_chain(run, controller)
@@ -185,7 +197,8 @@ def replay_run(run, controller=None, only=None, chain=False):
     return result
 
 
-def _why_not(run, name, controller):
+def _why_not(run: 'RecordedRun', name: str,
+             controller: 'Controller | str | os.PathLike[str] | None') -> str:
     """Return why a part cannot be replayed, '' if it can."""
     if name == 'controller':
         if 'controller_state' not in run or not (controller or run.metadata.get('controller')):
@@ -198,7 +211,7 @@ def _why_not(run, name, controller):
     return ''
 
 
-def _try_driver(run, result, only):
+def _try_driver(run: 'RecordedRun', result: Replay, only: str | None) -> None:
     """Replay the driver; beside other parts, a bag whose clocks disagree is only noted."""
     try:
         result.driver = replay_driver(run)

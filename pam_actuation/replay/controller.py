@@ -37,7 +37,7 @@ from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.config import Controller
     from pam_sim.run import Run, Series
 
 # Input of a tick -> (topic it came from, field of that topic).
@@ -85,9 +85,9 @@ class ReplayResult:
     identical: bool
     ticks: int
     commands_missing: int = 0
-    differing_states: dict = field(default_factory=dict)
+    differing_states: dict[str, int] = field(default_factory=dict)
     controller: Any = None
-    states: dict = field(default_factory=dict)
+    states: dict[str, FloatArray] = field(default_factory=dict)
 
     def sentence(self) -> str:
         """Return the outcome in one sentence."""
@@ -98,9 +98,9 @@ class ReplayResult:
                 f'{self.max_abs_difference_pa:g} Pa; differing: {where or "commands"}')
 
 
-def replay_controller(run: 'Run', controller: 'CompiledController | None' = None,
+def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[str] | None' = None,
                       keep_states: bool = False,
-                      progress: Callable[..., Any] | None = None) -> ReplayResult:
+                      progress: Callable[[float], object] | None = None) -> ReplayResult:
     """
     Replay the controller of a recording.
 
@@ -131,15 +131,18 @@ def replay_controller(run: 'Run', controller: 'CompiledController | None' = None
     states = run.require('controller_state')
     commands = run.require('pressure_command')
     own = controller is None
-    if own:
+    chosen: Controller
+    if controller is None:
         text = run.metadata.get('controller')
         if not text:
             raise InputError('the recording does not say which controller ran', run.path)
-        controller = load_controller(text)
+        chosen = load_controller(text)
     elif isinstance(controller, (str, os.PathLike)):
         rig_text = run.metadata.get('rig')
-        controller = load_controller(controller, load_rig(rig_text) if rig_text else None)
-    unit = tracked_by(controller).unit
+        chosen = load_controller(controller, load_rig(rig_text) if rig_text else None)
+    else:
+        chosen = controller
+    unit = tracked_by(chosen).unit
     columns = _columns(states, unit, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     _check_complete(columns, order, run.path)
@@ -147,16 +150,16 @@ def replay_controller(run: 'Run', controller: 'CompiledController | None' = None
     command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
 
     rises_slowly = HELD_BACK in states.values       # versions before did not
-    core = TickCore(controller, rises_slowly)
+    core = TickCore(chosen, rises_slowly)
     sent_after = SlowRise(active=False)     # what made the recorded commands of those of the law
     compare = tuple(core.names) if own else ()
-    wanted = [columns.get(name) for name in compare]
-    if own and any(column is None for column in wanted):
-        missing = [name for name, column in zip(compare, wanted) if column is None]
-        raise InputError(f'controller_state lacks {missing[0]}', run.path)
-    differing = {}
+    lacking = [name for name in compare if name not in columns]
+    if lacking:
+        raise InputError(f'controller_state lacks {lacking[0]}', run.path)
+    wanted = [columns[name] for name in compare]
+    differing: dict[str, int] = {}
     recorded, replayed = np.empty(len(order)), np.empty(len(order))
-    kept = np.empty((len(order), len(core.names))) if keep_states else None
+    kept = np.empty((len(order) if keep_states else 0, len(core.names)))
     missing = 0
     for place, row in enumerate(order.tolist()):
         if progress is not None and place % _PROGRESS_EVERY == 0:
@@ -170,7 +173,7 @@ def replay_controller(run: 'Run', controller: 'CompiledController | None' = None
         running = int(columns['input_reason'][row]) in RUNNING
         if running:
             sent_pa = sent_after.limited(
-                float(columns['command_pa'][row]), 1.0 / controller.rate_hz)
+                float(columns['command_pa'][row]), 1.0 / chosen.rate_hz)
         elif rises_slowly:
             sent_after.begin()
         if stamp not in command_at:
@@ -184,7 +187,7 @@ def replay_controller(run: 'Run', controller: 'CompiledController | None' = None
     return ReplayResult(
         states.stamp_ns[order], recorded, replayed, difference,
         bool(np.array_equal(recorded, replayed)) and not differing, len(order), missing,
-        differing, controller, dict(zip(core.names, kept.T)) if keep_states else {})
+        differing, chosen, dict(zip(core.names, kept.T)) if keep_states else {})
 
 
 def _same(a: float, b: float) -> bool:

@@ -15,8 +15,10 @@
 """How far a replayed signal is from the recorded one: rms, largest, and where."""
 
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
 
 # SI unit -> what people read: factor, unit.
 _SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'V': (1e3, 'mV')}
@@ -53,15 +55,15 @@ class Difference:
     span: float
 
     @property
-    def identical(self):
+    def identical(self) -> bool:
         """Return whether every message is equal to the bit."""
         return self.differing == 0
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
         return {**asdict(self), 'identical': self.identical}
 
-    def line(self):
+    def line(self) -> str:
         """Return one line for people."""
         if self.identical:
             return f'  {self.signal}: {self.count} messages, identical to the bit'
@@ -72,7 +74,8 @@ class Difference:
                 f'(range recorded {span}; {self.differing} of {self.count} messages differ)')
 
 
-def difference(signal, unit, stamp_ns, recorded, replayed, start_ns):
+def difference(signal: str, unit: str, stamp_ns: IntArray, recorded: FloatArray,
+               replayed: FloatArray, start_ns: int) -> Difference:
     """
     Compare two signals message by message.
 

@@ -15,16 +15,22 @@
 """Step the recorded rig's model on the recorded valve signal and compare the signals."""
 
 from dataclasses import dataclass
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.replay.difference import difference
+from pam_actuation.replay.difference import Difference, difference
 from pam_sim import load_rig
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import FIELD
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+    from pam_sim.run import Run
 
 MIN_DURATION_S = 0.1         # the start is read from half of it
 UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
@@ -41,29 +47,29 @@ class PlantReplay:
     """
 
     rig: str
-    time_s: dict
-    recorded: dict
-    simulated: dict
-    stamp_ns: dict
+    time_s: dict[str, FloatArray]
+    recorded: dict[str, FloatArray]
+    simulated: dict[str, FloatArray]
+    stamp_ns: dict[str, IntArray]
     start_ns: int
 
     @property
-    def differences(self):
+    def differences(self) -> list[Difference]:
         """Return one Difference a signal."""
         return [difference(signal, UNITS[signal], self.stamp_ns[signal], self.recorded[signal],
                            self.simulated[signal], self.start_ns) for signal in self.recorded]
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
         return {'rig': self.rig, 'rmse': {d.signal: d.rms for d in self.differences},
                 'signals': [d.to_dict() for d in self.differences]}
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return one line a signal, for people."""
         return [f'plant: {self.rig}, free run on the recorded valve signal (without sensor noise)',
                 *(one.line() for one in self.differences)]
 
-    def arrays(self):
+    def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name, for saving."""
         out = {}
         for signal in self.recorded:
@@ -73,7 +79,7 @@ class PlantReplay:
         return out
 
 
-def replay_plant(run):
+def replay_plant(run: 'Run') -> PlantReplay:
     """
     Run the model named in a recording's metadata on its valve signal.
 
@@ -96,7 +102,7 @@ def replay_plant(run):
         {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns)
 
 
-def _check(run, rig):
+def _check(run: 'Run', rig: 'Rig') -> None:
     """Raise InputError unless the run has the input of the rig and the signals of its start."""
     path = str(run.path)
     valve = recorded_valve(run)

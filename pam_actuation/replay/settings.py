@@ -15,14 +15,20 @@
 """Another tuning for a replay: a controller file, single changed numbers, or both."""
 
 import os
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.config import load_controller
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
+if TYPE_CHECKING:
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_sim.run import Run
 
-def changed_controller(run, wanted, accept_other_rig=False):
+
+def changed_controller(run: 'Run', wanted: list[str] | None,
+                       accept_other_rig: bool = False) -> 'CompiledController | None':
     """
     Return the controller that ``--set`` asks for, None if it asks for nothing.
 
@@ -71,7 +77,7 @@ def changed_controller(run, wanted, accept_other_rig=False):
         raise InputError(error.problem, f'--set {" ".join(changes)}') from None
 
 
-def _number(text):
+def _number(text: str) -> float | str:
     """Return the number in a text, or the text itself (some settings are words)."""
     try:
         return float(text)

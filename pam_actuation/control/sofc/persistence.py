@@ -25,7 +25,6 @@ import hashlib
 import json
 import math
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -245,7 +244,7 @@ def _stated(value: object) -> str:
     return f'{value:.10g}' if isinstance(value, float) else str(value)
 
 
-def save_rules(rules: RuleBase, path: Path | str) -> None:
+def save_rules(rules: RuleBase, path: str | os.PathLike[str]) -> None:
     """
     Write a rule base to a file: temporary file, flushed to disk, then renamed over.
 
@@ -263,7 +262,7 @@ def save_rules(rules: RuleBase, path: Path | str) -> None:
     write_text(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n', parents=False)
 
 
-def load_rules(path: Path | str, expected: RuleBase | None = None) -> RuleBase:
+def load_rules(path: str | os.PathLike[str], expected: RuleBase | None = None) -> RuleBase:
     """
     Return the rule base of a file.
 

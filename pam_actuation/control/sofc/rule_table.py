@@ -31,7 +31,7 @@ Automatica 15, 1979).
 
 from dataclasses import dataclass, field
 import hashlib
-from pathlib import Path
+import os
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -254,13 +254,13 @@ class RuleBase:
             self.scaling['reference_lower_m'], self.scaling['reference_upper_m'],
             self.feedforward.shape[1])
 
-    def save(self, path: Path | str) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write the rules to a file atomically; see ``persistence.save_rules``."""
         from pam_actuation.control.sofc.persistence import save_rules
         save_rules(self, path)
 
     @classmethod
-    def load(cls, path: Path, expected: 'RuleBase | None' = None) -> 'RuleBase':
+    def load(cls, path: str | os.PathLike[str], expected: 'RuleBase | None' = None) -> 'RuleBase':
         """Return the rules of a file, refused whole if they do not fit ``expected``."""
         from pam_actuation.control.sofc.persistence import load_rules
         return load_rules(path, expected)

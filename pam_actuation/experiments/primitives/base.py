@@ -14,9 +14,13 @@
 
 """What every primitive of an experiment has in common."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 import math
+from typing import ClassVar, TYPE_CHECKING
 
 
+@dataclass
 class Primitive:
     """
     A signal on 0 <= t <= duration_s.
@@ -28,16 +32,22 @@ class Primitive:
     not keys: they are filled in. A field with a default may be left out of the file.
     """
 
-    QUANTITIES = ()
-    DOMAINS = None            # names of the domains in which it makes sense, None: all
+    QUANTITIES: ClassVar[tuple[str, ...]] = ()
+    # names of the domains in which it makes sense, None: all
+    DOMAINS: ClassVar[tuple[str, ...] | None] = None
     SHUTS_VALVE = False       # True: a pair of high-speed valves is shut meanwhile
     JUMPS = False             # True: jumps are what it is for, at its start too
 
-    def at(self, t_s):
+    if TYPE_CHECKING:     # a field of some, calculated by others
+        @property
+        def duration_s(self) -> float:
+            """Return how long it lasts [s]."""
+
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return (value, rate per second) at the time t_s since the start."""
         raise NotImplementedError
 
-    def problem(self):
+    def problem(self) -> str:
         """
         Return what is wrong with the keys taken together, '' if nothing.
 
@@ -46,17 +56,17 @@ class Primitive:
         return ''
 
     @property
-    def end(self):
+    def end(self) -> float:
         """Value at the end; the next primitive starts here."""
         return self.at(self.duration_s)[0]
 
     @property
-    def periods(self):
+    def periods(self) -> tuple[float, int] | None:
         """Return (period in s, number) where this primitive repeats itself, else None."""
         return None
 
 
-def least_jerk(start, to, duration_s, t_s):
+def least_jerk(start: float, to: float, duration_s: float, t_s: float) -> tuple[float, float]:
     """
     Return value and rate on the fifth-order path of least jerk, at rest at both ends.
 
@@ -68,13 +78,15 @@ def least_jerk(start, to, duration_s, t_s):
     return value, span * 30.0 * s * s * (1.0 - s) ** 2 / duration_s
 
 
-def raised_cosine(center, amplitude, frequency_hz, t_s):
+def raised_cosine(center: float, amplitude: float, frequency_hz: float,
+                  t_s: float) -> tuple[float, float]:
     """Return value and rate of centre - amplitude cos(2 pi f t)."""
     w = 2.0 * math.pi * frequency_hz
     return (center - amplitude * math.cos(w * t_s), amplitude * w * math.sin(w * t_s))
 
 
-def along(points, rate, t_s):
+def along(points: Sequence[float], rate: float,
+          t_s: float) -> tuple[float, float]:
     """
     Return value and rate on a path through points at one constant speed.
 

@@ -32,7 +32,7 @@ class Chirp(Primitive):
     to_hz: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate of the chirp, starting at the lowest point."""
         slope = (self.to_hz - self.from_hz) / self.duration_s
         phase = 2.0 * math.pi * (self.from_hz * t_s + 0.5 * slope * t_s * t_s)

@@ -28,7 +28,7 @@ class Decay(Primitive):
     start: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the value wanted last, which is sent where the valve cannot be shut."""
         return self.start, 0.0
 

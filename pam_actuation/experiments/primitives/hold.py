@@ -26,7 +26,7 @@ class Hold(Primitive):
     start: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the held value and rate 0."""
         return self.start, 0.0
 

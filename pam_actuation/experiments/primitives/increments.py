@@ -31,11 +31,11 @@ class Increments(Primitive):
     hold_s: float
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all moves and holds together."""
         return int(self.steps) * (self.move_s + self.hold_s)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate: the path of least jerk in a move, rate 0 in a hold."""
         each = self.move_s + self.hold_s
         size = (self.to - self.start) / int(self.steps)

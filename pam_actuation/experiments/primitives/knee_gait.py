@@ -33,7 +33,7 @@ MEAN_DEG = 22.8
 HARMONICS_DEG = ((-3.8, -18.4), (-13.5, 8.3), (-0.4, 4.5), (0.2, 0.2), (-0.6, 0.6))
 
 
-def knee_flexion_deg(stride):
+def knee_flexion_deg(stride: float) -> tuple[float, float]:
     """Return knee flexion [degrees] and its rate per stride; 0 and 1 are heel contacts."""
     angle, rate = MEAN_DEG, 0.0
     for k, (c, s) in enumerate(HARMONICS_DEG, start=1):
@@ -43,7 +43,7 @@ def knee_flexion_deg(stride):
     return angle, rate
 
 
-def _straightest():
+def _straightest() -> float:
     """Return the place in the stride where the knee is straightest, by bisection of the rate."""
     below, above = 0.93, 0.999
     for _ in range(60):
@@ -76,23 +76,23 @@ class KneeGait(Primitive):
     frequency_hz: float
     cycles: int
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse what is no walking."""
         if not 0.5 <= self.frequency_hz <= 1.0:
             return f'frequency_hz is {self.frequency_hz:g}; walking is 0.5 to 1 Hz'
         return '' if self.low < self.high else 'low must be below high'
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all strides together."""
         return int(self.cycles) / self.frequency_hz
 
     @property
-    def periods(self):
+    def periods(self) -> tuple[float, int]:
         """Return (length of a stride in s, strides)."""
         return 1.0 / self.frequency_hz, int(self.cycles)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate."""
         angle, rate = knee_flexion_deg(BEGIN + t_s * self.frequency_hz)
         scale = (self.high - self.low) / (HIGHEST_DEG - LOWEST_DEG)

@@ -14,12 +14,17 @@
 
 """Find the primitives and build one from the keys of an experiment file."""
 
-from dataclasses import fields, MISSING
+from collections.abc import Callable, Mapping
+from dataclasses import Field, fields, MISSING
 import math
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 from pam_sim.errors import InputError
 from pam_sim.plugins import pick, plugin_files, plugin_module
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.primitives.base import Primitive
 
 _FOLDER = Path(__file__).parent
 _FILLED_IN = ('start', 'rest_value')
@@ -31,7 +36,7 @@ _LARGEST_COUNT = 1000
 _LARGEST_SEED = 2**32 - 1
 
 
-def _found():
+def _found() -> 'dict[str, type[Primitive]]':
     """Return name to class of all primitives there are."""
     files = plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make'))
     return {path.stem: plugin_module(
@@ -41,13 +46,14 @@ def _found():
 PRIMITIVES = _found()
 
 
-def keys_of(cls, suffix):
+def keys_of(cls: 'type[Primitive]', suffix: str) -> dict[str, Field[Any]]:
     """Return key in the file to dataclass field of a primitive, in the order of the class."""
     return {f'{f.name}_{suffix}' if f.name in cls.QUANTITIES else f.name: f for f in fields(cls)
             if f.init and f.name not in _FILLED_IN}
 
 
-def make_primitive(name, arguments, start, rest_value, suffix, where='', domain=None):
+def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_value: float,
+                   suffix: str, where: str = '', domain: str | None = None) -> 'Primitive':
     """
     Build a primitive from the keys of an experiment file.
 
@@ -78,7 +84,7 @@ def make_primitive(name, arguments, start, rest_value, suffix, where='', domain=
             f'{name} makes no sense in the domain {domain}; it does in '
             f'{", ".join(cls.DOMAINS)}', where)
     keys = keys_of(cls, suffix)
-    values = {}
+    values: dict[str, Any] = {}
     for key, value in dict(arguments or {}).items():
         if key not in keys:
             raise InputError(
@@ -91,14 +97,15 @@ def make_primitive(name, arguments, start, rest_value, suffix, where='', domain=
         raise InputError(f'{name} lacks {", ".join(missing)}', where)
     if 'rest_value' in cls.__dataclass_fields__:
         values['rest_value'] = rest_value
-    primitive = cls(start=start, **values)
+    make: Callable[..., Primitive] = cls
+    primitive = make(start=start, **values)
     problem = primitive.problem()
     if problem:
         raise InputError(f'{name}: {problem}', where)
     return primitive
 
 
-def _check(what, field, value, is_quantity, where):
+def _check(what: str, field: Field[Any], value: object, is_quantity: bool, where: str) -> None:
     """Raise InputError unless the value is a number in the range of its kind."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) \
             or not math.isfinite(value):
@@ -107,7 +114,7 @@ def _check(what, field, value, is_quantity, where):
         return
     unit = ''
     if field.name == 'seed':
-        lower, upper = 0, _LARGEST_SEED
+        lower, upper = 0.0, float(_LARGEST_SEED)
     else:
         lower, upper, unit = _LIMITS.get(
             field.name.rsplit('_', 1)[-1], (1 if field.type is int else 1e-3, _LARGEST_COUNT, ''))

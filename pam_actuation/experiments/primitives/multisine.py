@@ -34,11 +34,11 @@ class Multisine(Primitive):
     duration_s: float
     seed: int = 1
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse a band of frequencies in the wrong order."""
         return '' if self.min_hz < self.max_hz else 'min_hz must be below max_hz'
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Choose log-spaced frequencies and phases from the seed, scaled to the peak bound."""
         if self.problem():
             return
@@ -51,7 +51,7 @@ class Multisine(Primitive):
             wave += np.sin(w * t + phase)
         self._scale = self.amplitude / max(float(np.max(np.abs(wave))), 1e-9)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate, faded in and out over a second so that it starts at rest."""
         wave = self._scale * float(np.sin(self._w * t_s + self._phase).sum())
         rate = self._scale * float((self._w * np.cos(self._w * t_s + self._phase)).sum())

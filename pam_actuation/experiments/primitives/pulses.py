@@ -31,16 +31,16 @@ class Pulses(Primitive):
     every_s: float
     count: int
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse pulses that would run into each other."""
         return '' if self.width_s < self.every_s else 'width_s must be below every_s'
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all pulses and the pauses after them."""
         return self.every_s * int(self.count)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the value and rate 0; a pulse begins each interval."""
         inside = t_s < self.duration_s and t_s % self.every_s < self.width_s
         return self.start + (self.height if inside else 0.0), 0.0

@@ -28,7 +28,7 @@ class Ramp(Primitive):
     to: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate on the minimum-jerk path."""
         return least_jerk(self.start, self.to, self.duration_s, t_s)
 

@@ -32,7 +32,7 @@ class Rates(Primitive):
     rates: int
     cycles: int = 1
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse values and periods in the wrong order, and a single rate."""
         if not self.low < self.high:
             return 'low must be below high'
@@ -41,18 +41,18 @@ class Rates(Primitive):
         return '' if self.rates >= 2 else 'rates must be 2 or more'
 
     @property
-    def all_periods_s(self):
+    def all_periods_s(self) -> tuple[float, ...]:
         """Return the period of every rate [s], the slowest first."""
         ratio = self.fast_period_s / self.slow_period_s
         last = max(int(self.rates) - 1, 1)
         return tuple(self.slow_period_s * ratio ** (k / last) for k in range(int(self.rates)))
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all cycles at all rates together."""
         return int(self.cycles) * sum(self.all_periods_s)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate."""
         left, span = max(t_s, 0.0), self.high - self.low
         for period_s in self.all_periods_s:

@@ -27,7 +27,7 @@ class Rest(Primitive):
     rest_value: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the rest value and rate 0."""
         return self.rest_value, 0.0
 

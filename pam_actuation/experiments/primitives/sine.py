@@ -31,16 +31,16 @@ class Sine(Primitive):
     cycles: float
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all cycles together."""
         return self.cycles / self.frequency_hz
 
     @property
-    def periods(self):
+    def periods(self) -> tuple[float, int]:
         """Return (period in s, whole cycles)."""
         return 1.0 / self.frequency_hz, int(self.cycles)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return centre - amplitude cos(2 pi f t) and its rate."""
         return raised_cosine(self.center, self.amplitude, self.frequency_hz, t_s)
 

@@ -32,11 +32,11 @@ class Staircase(Primitive):
     hold_s: float
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all holds together."""
         return self.hold_s * (int(self.steps) + 1)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the value of the present stair and rate 0; high may be below low."""
         k = min(int(t_s / self.hold_s), int(self.steps))
         return self.low + (self.high - self.low) * k / int(self.steps), 0.0

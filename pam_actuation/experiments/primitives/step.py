@@ -29,7 +29,7 @@ class Step(Primitive):
     to: float
     duration_s: float
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return the new value and rate 0."""
         return self.to, 0.0
 

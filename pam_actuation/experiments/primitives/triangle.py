@@ -31,20 +31,20 @@ class Triangle(Primitive):
     cycles: float
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all cycles together."""
         return self.period_s * self.cycles
 
     @property
-    def periods(self):
+    def periods(self) -> tuple[float, int]:
         """Return (period in s, whole cycles)."""
         return self.period_s, int(self.cycles)
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse two values in the wrong order."""
         return '' if self.low < self.high else 'low must be below high'
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate of the triangle."""
         phase = (t_s / self.period_s) % 1.0
         if t_s >= self.duration_s:

@@ -32,7 +32,7 @@ class TriangleLoops(Primitive):
     period_s: float
     cycles: int = 1
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse loops that would not lie within the triangle."""
         if not self.low < self.high:
             return 'low must be below high'
@@ -42,7 +42,7 @@ class TriangleLoops(Primitive):
                     f'{longest:g}, the distance of two turning points')
         return ''
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Lay the path through all turning points of one cycle."""
         share = (self.high - self.low) / (self.loops + 1)
         path = [self.low]
@@ -56,26 +56,26 @@ class TriangleLoops(Primitive):
         self._path = [*path, self.low]
 
     @property
-    def rate(self):
+    def rate(self) -> float:
         """Speed on the whole path: that of the triangle without inner loops."""
         return 2.0 * (self.high - self.low) / self.period_s
 
     @property
-    def cycle_s(self):
+    def cycle_s(self) -> float:
         """Length of one cycle, inner loops included."""
         return self.period_s + 4.0 * int(self.loops) * self.depth / self.rate
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of all cycles together."""
         return self.cycle_s * int(self.cycles)
 
     @property
-    def periods(self):
+    def periods(self) -> tuple[float, int]:
         """Return (length of a cycle in s, cycles)."""
         return self.cycle_s, int(self.cycles)
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate."""
         if t_s >= self.duration_s:
             return self.low, 0.0

@@ -33,22 +33,22 @@ class TwoBands(Primitive):
     cycles: int
     move_s: float
 
-    def problem(self):
+    def problem(self) -> str:
         """Refuse bands in the wrong order."""
         return '' if self.low_center < self.high_center else (
             'low_center must be below high_center')
 
     @property
-    def band_s(self):
+    def band_s(self) -> float:
         """Length of a move and the cycles that follow."""
         return self.move_s + int(self.cycles) / self.frequency_hz
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Length of both bands."""
         return 2.0 * self.band_s
 
-    def at(self, t_s):
+    def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate; each band begins and ends at its lowest point."""
         lows = (self.low_center - self.amplitude, self.high_center - self.amplitude)
         second = t_s >= self.band_s
