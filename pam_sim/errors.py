@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable
 import difflib
+import os
 
 
 class InputError(ValueError):
@@ -29,14 +30,14 @@ class InputError(ValueError):
     ----------
     problem : str
         What is wrong, with the offending value and what is allowed.
-    where : str, optional
+    where : str or path, optional
         Place of the mistake: ``file:line``, parameter name or topic.
 
     """
 
-    def __init__(self, problem: str, where: str = '') -> None:
+    def __init__(self, problem: str, where: str | os.PathLike[str] = '') -> None:
         self.problem = problem
-        self.where = where
+        self.where = os.fspath(where)
         super().__init__(f'{where}: {problem}' if where else problem)
 
 

@@ -19,11 +19,12 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from pam_sim.files import StrPath
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 
 
-def independent_readers(bag):
+def independent_readers(bag: StrPath) -> dict[str, dict[str, int]]:
     """
     Return messages decoded per topic, by reader.
 
@@ -43,7 +44,7 @@ def independent_readers(bag):
 
     """
     bag = Path(bag)
-    out = {'rosbags': Counter()}
+    out: dict[str, Counter[str]] = {'rosbags': Counter()}
     with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
         for connection, _, raw in reader.messages():
             reader.deserialize(raw, connection.msgtype)
@@ -51,7 +52,7 @@ def independent_readers(bag):
     counts = out['mcap_ros2'] = Counter()
     for path in sorted(bag.glob('*.mcap')):
         with open(path, 'rb') as stream:
-            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-            for _, channel, _, _ in reader.iter_decoded_messages():
+            file = make_reader(stream, decoder_factories=[DecoderFactory()])
+            for _, channel, _, _ in file.iter_decoded_messages():
                 counts[channel.topic] += 1
     return {name: dict(counts) for name, counts in out.items()}

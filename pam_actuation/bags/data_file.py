@@ -14,10 +14,13 @@
 
 """One data file of a bag while it is written: stream, lock, topics and counts."""
 
+from collections.abc import Callable, Sequence
 import contextlib
 import functools
 import os
+from pathlib import Path
 import tempfile
+from typing import Any, BinaryIO
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.mcap_write import McapWriter
@@ -44,12 +47,14 @@ class DataFile:
 
     """
 
-    def __init__(self, path, begin):
+    def __init__(self, path: Path, begin: 'Callable[[DataFile], object]') -> None:
         self.path = path
         self.count = 0
-        self.start_ns = self.end_ns = None
+        self.start_ns: int | None = None
         self._synced = 0
-        self._schemas, self._channels = {}, {}
+        self.end_ns: int | None = None
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
         self._stream = open(path, 'xb', buffering=0)
         self._closing = contextlib.ExitStack()
         self._closing.enter_context(self._stream)
@@ -65,7 +70,7 @@ class DataFile:
             path.unlink()
             raise
 
-    def _open_index(self, folder):
+    def _open_index(self, folder: Path) -> BinaryIO | None:
         """Return a file without a name, so that a killed process leaves nothing."""
         try:
             index = tempfile.TemporaryFile(dir=folder, buffering=0)
@@ -74,7 +79,8 @@ class DataFile:
         self._closing.callback(_close_quietly, index)
         return index
 
-    def register(self, name, type_name, qos, type_hash):
+    def register(self, name: str, type_name: str, qos: Sequence[dict[str, Any]],
+                 type_hash: str) -> None:
         """Announce a topic with its definition."""
         if type_name not in self._schemas:
             self._schemas[type_name] = self.mcap.add_schema(
@@ -85,11 +91,11 @@ class DataFile:
                 'topic_type_hash': type_hash,
             })
 
-    def write(self, name, data, log_time_ns, publish_time_ns):
+    def write(self, name: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         """Append one message; KeyError for a topic that was not announced."""
         self.mcap.add_message(self._channels[name], log_time_ns, data, publish_time_ns)
         self.count += 1
-        if self.start_ns is None:
+        if self.start_ns is None or self.end_ns is None:
             self.start_ns = self.end_ns = log_time_ns
         elif log_time_ns > self.end_ns:
             self.end_ns = log_time_ns
@@ -97,29 +103,29 @@ class DataFile:
             self.start_ns = log_time_ns
 
     @property
-    def size(self):
+    def size(self) -> int:
         """Return the bytes written, those of the open chunk included."""
         return self.mcap.offset + self.mcap.pending
 
     @property
-    def facts(self):
+    def facts(self) -> layout.FileFacts:
         """Return what metadata.yaml says of the file."""
         return layout.FileFacts(self.path.name, self.start_ns, self.end_ns, self.count)
 
-    def handle_to_sync(self):
+    def handle_to_sync(self) -> int | None:
         """Return a file descriptor of its own for ``disk.sync``, None if nothing is new."""
         if self.mcap.offset == self._synced:
             return None
         self._synced = self.mcap.offset
         return os.dup(self._stream.fileno())
 
-    def finish(self):
+    def finish(self) -> None:
         """Write the index and close."""
         self.mcap.finish()
         disk.sync(self._stream.fileno())
         self._closing.close()
 
-    def cut(self):
+    def cut(self) -> dict[str, int]:
         """Take back what a failed write left behind; return messages in the file by topic."""
         with contextlib.suppress(OSError):
             self._truncate()
@@ -130,13 +136,13 @@ class DataFile:
         self.start_ns, self.end_ns = self.mcap.span_ns
         return {name: in_file.get(channel, 0) for name, channel in self._channels.items()}
 
-    def _truncate(self):
+    def _truncate(self) -> None:
         if self._stream.closed:
             return
         self._stream.truncate(self.mcap.offset)
         self._stream.seek(self.mcap.offset)
 
-    def abandon(self):
+    def abandon(self) -> None:
         """Close without an index."""
         with contextlib.suppress(OSError):
             self._truncate()
@@ -144,7 +150,7 @@ class DataFile:
             self._closing.close()
 
 
-def _close_quietly(stream):
+def _close_quietly(stream: BinaryIO) -> None:
     """Close a file of which nothing is needed any more."""
     with contextlib.suppress(OSError):
         stream.close()

@@ -15,21 +15,24 @@
 """What a recorder asks of the operating system: whole writes, a lock, data on the disk."""
 
 import os
+from typing import BinaryIO
+
+from pam_sim.files import StrPath
 
 try:
     import fcntl
 except ImportError:             # not on Windows: there only offline bags are written
-    fcntl = None
+    fcntl = None    # type: ignore[assignment]
 
 
-def write_all(stream, data):
+def write_all(stream: BinaryIO, data: bytes) -> None:
     """Write all bytes to an unbuffered stream; OSError when the file system refuses."""
     view = memoryview(data)
     while len(view):
         view = view[stream.write(view):]
 
 
-def lock(stream):
+def lock(stream: BinaryIO) -> bool:
     """
     Mark an open file as being written, until it is closed or its process ends.
 
@@ -46,12 +49,12 @@ def lock(stream):
     return True
 
 
-def sync(handle):
+def sync(handle: int) -> None:
     """Wait until what was written to a file descriptor is on the disk."""
     getattr(os, 'fdatasync', os.fsync)(handle)
 
 
-def sync_directory(directory):
+def sync_directory(directory: StrPath) -> None:
     """Bring the names in a directory onto the disk, where the system can."""
     if os.name != 'posix':
         return

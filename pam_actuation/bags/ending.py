@@ -20,7 +20,12 @@ Four texts of the ``pam_experiment`` record: ``planned_length_s`` from the start
 run is over. Recordings without them are told apart from those that came to their end.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from pam_actuation.messages import Status
+from pam_sim.run import Run
 
 PLANNED, REACHED, ENDED, BECAUSE = (
     'planned_length_s', 'reached_length_s', 'ended', 'ended_because')
@@ -55,12 +60,12 @@ class Ending:
     because: str = ''
 
     @property
-    def early(self):
+    def early(self) -> bool:
         """Return whether the run is known not to have come to its planned end."""
         return self.ended in EARLY
 
     @property
-    def sentence(self):
+    def sentence(self) -> str:
         """Return one sentence for people."""
         if self.planned_s is None and not self.ended:
             return 'Length planned: not recorded.'
@@ -73,14 +78,14 @@ class Ending:
             return f'Ran to its end: {planned} planned and reached.'
         return f'Planned: {planned}; how it ended is not recorded.'
 
-    def texts(self):
+    def texts(self) -> dict[str, str]:
         """Return the entries of the ``pam_experiment`` record that are known."""
         found = {PLANNED: _number(self.planned_s), REACHED: _number(self.reached_s),
                  ENDED: self.ended, BECAUSE: ' '.join(self.because.split())}
         return {key: text for key, text in found.items() if text}
 
 
-def ending_of(metadata):
+def ending_of(metadata: Mapping[str, str] | None) -> Ending:
     """Return the Ending that a ``pam_experiment`` record tells; entries of others are not used."""
     metadata = metadata or {}
     ended = metadata.get(ENDED, '')
@@ -89,7 +94,7 @@ def ending_of(metadata):
         ended if ended in EARLY or ended == COMPLETE else '', metadata.get(BECAUSE, ''))
 
 
-def early_sentences(runs):
+def early_sentences(runs: Iterable[Run]) -> list[str]:
     """Return a sentence on every run that is known to have stopped early, with its path."""
     found = [(run, ending_of(run.metadata)) for run in runs]
     return [f'{run.path}: {ending.sentence}' for run, ending in found if ending.early]
@@ -106,16 +111,17 @@ class EndWatch:
 
     """
 
-    def __init__(self, namespace):
+    def __init__(self, namespace: str) -> None:
         self._reference, self._driver = f'{namespace}/{REFERENCE}', f'{namespace}/{DRIVER}'
-        self._heard_ns = None           # the newest word of the reference while it plays
-        self._elapsed_s = None
+        # The newest word of the reference while it plays.
+        self._heard_ns: int | None = None
+        self._elapsed_s: float | None = None
         self._vented = ''
-        self._vented_s = None
+        self._vented_s: float | None = None
         self._failed = ''
         self._over = self._finished = False
 
-    def hear(self, statuses):
+    def hear(self, statuses: Iterable[Status]) -> None:
         """Take the statuses of one diagnostic message."""
         for status in statuses:
             if self._over:
@@ -125,7 +131,7 @@ class EndWatch:
             elif status.name == self._driver:
                 self._hear_driver(status)
 
-    def _hear_reference(self, status):
+    def _hear_reference(self, status: Status) -> None:
         elapsed_s = _seconds(dict(status.values).get('elapsed_s'))
         if status.message.startswith((PLAYING, FINISHED)):
             self._heard_ns, self._elapsed_s = status.stamp_ns, elapsed_s
@@ -135,7 +141,7 @@ class EndWatch:
             self._elapsed_s = elapsed_s or self._elapsed_s
             self._failed = status.message if status.level >= _LEVEL_ERROR else ''
 
-    def _hear_driver(self, status):
+    def _hear_driver(self, status: Status) -> None:
         if status.level < _LEVEL_ERROR:
             self._vented, self._vented_s = '', None
         elif self._heard_ns is not None and not self._vented:
@@ -143,7 +149,7 @@ class EndWatch:
             self._vented_s = max(
                 (self._elapsed_s or 0.0) + (status.stamp_ns - self._heard_ns) * 1e-9, 0.0)
 
-    def ending(self, planned_s, told=None):
+    def ending(self, planned_s: float | None, told: Ending | None = None) -> Ending:
         """
         Return the Ending of the run.
 
@@ -162,7 +168,7 @@ class EndWatch:
             return Ending(planned_s, reached_s or 0.0, told.ended, told.because)
         if self._heard_ns is None and told is None:
             return Ending(planned_s)                # nobody played an experiment
-        if self._vented:
+        if self._vented and self._vented_s is not None:
             return Ending(planned_s, min(self._vented_s, reached_s or self._vented_s), VENTED,
                           self._vented)
         if self._failed:
@@ -170,11 +176,11 @@ class EndWatch:
         return Ending(planned_s, reached_s, COMPLETE if self._finished else INTERRUPTED)
 
 
-def _number(value):
+def _number(value: float | None) -> str:
     return '' if value is None else f'{value:.3f}'
 
 
-def _seconds(text):
+def _seconds(text: Any) -> float | None:
     """Return a text as a length of time, None where it is none."""
     try:
         value = float(text)

@@ -14,6 +14,8 @@
 
 """What a bag says of rig, valve and seed, for people; what it does not say is not invented."""
 
+from collections.abc import Mapping
+
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
@@ -22,7 +24,7 @@ from pam_sim.rig_text import rig_title
 NOT_RECORDED = 'not recorded'
 
 
-def recorded_rig_title(metadata):
+def recorded_rig_title(metadata: Mapping[str, str] | None) -> str:
     """
     Return the name of the recorded rig with what it is made from, else 'not recorded'.
 
@@ -45,12 +47,12 @@ def recorded_rig_title(metadata):
         return _stated_name(content)
 
 
-def _stated_name(content):
+def _stated_name(content: str) -> str:
     """Return the name in the text of a rig that this version cannot read."""
     rows = dict(row.partition(':')[::2] for row in reversed(content.splitlines()))
     return (rows.get('name') or rows.get('rig') or NOT_RECORDED).strip()
 
 
-def recorded(metadata, key):
+def recorded(metadata: Mapping[str, str] | None, key: str) -> str:
     """Return a text of the record, 'not recorded' where it is missing."""
     return str((metadata or {}).get(key) or NOT_RECORDED)

@@ -20,25 +20,29 @@ Completeness is judged twice: by the recorder's own count, kept in the bag as
 node reports in /diagnostics as ``published.<full topic>``.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pam_actuation.bags import plausibility, series
-from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
-from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
 from pam_actuation.topics.table import OF_A_RUN, short_name
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 
 __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
 
@@ -61,17 +65,17 @@ class TopicInfo:
     name: str
     type_name: str
     count: int
-    rate_hz: float = None
-    max_gap_s: float = None
+    rate_hz: float | None = None
+    max_gap_s: float | None = None
     gaps: int = 0
-    stamp_jitter_s: float = None
+    stamp_jitter_s: float | None = None
     stamps_backward: int = 0
     stamps_repeated: int = 0
-    published: int = None
-    lost: int = None
-    dropped: int = None
-    missed_at_start: int = None
-    ranges: dict = field(default_factory=dict)
+    published: int | None = None
+    lost: int | None = None
+    dropped: int | None = None
+    missed_at_start: int | None = None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass
@@ -91,40 +95,40 @@ class BagInfo:
     start_ns: int
     duration_s: float
     message_count: int
-    namespaces: list
-    topics: list
-    metadata: dict
-    remarks: list
-    notes: list
+    namespaces: list[str]
+    topics: list[TopicInfo]
+    metadata: dict[str, str]
+    remarks: list[str]
+    notes: list[str]
     recovered: bool = False
 
     @property
-    def lost(self):
+    def lost(self) -> int:
         """Return the number of messages known to have been lost on the way."""
         return sum(topic.lost or 0 for topic in self.topics)
 
     @property
-    def dropped(self):
+    def dropped(self) -> int:
         """Return the number of messages the recorder received and did not write."""
         return sum(topic.dropped or 0 for topic in self.topics)
 
     @property
-    def missed_at_start(self):
+    def missed_at_start(self) -> int:
         """Return the number of messages sent before the recorder was connected."""
         return sum(topic.missed_at_start or 0 for topic in self.topics)
 
     @property
-    def missing(self):
+    def missing(self) -> bool:
         """Return whether messages are known to be missing."""
         return bool(self.recovered or self.lost or self.dropped or self.missed_at_start)
 
     @property
-    def ending(self):
+    def ending(self) -> Ending:
         """Return how far the run came and why it ended, an ``Ending``."""
         return ending_of(self.metadata)
 
     @property
-    def complete(self):
+    def complete(self) -> bool | None:
         """Return whether all published messages are in the bag, None if unknown."""
         if self.missing or self.ending.early:
             return False
@@ -134,18 +138,18 @@ class BagInfo:
         return True if rig and all(topic.lost is not None for topic in rig) else None
 
     @property
-    def has_findings(self):
+    def has_findings(self) -> bool:
         """Return whether something is missing, odd or implausible."""
         return self.complete is False or bool(self.remarks)
 
-    def topic(self, full_name):
+    def topic(self, full_name: str) -> TopicInfo:
         """Return the TopicInfo of a full name; InputError if the bag has no such topic."""
         for topic in self.topics:
             if topic.name == full_name:
                 return topic
         raise InputError(f'the bag has no topic {full_name}', self.path)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""
         return {
             **asdict(self), 'rig': recorded_rig_title(self.metadata),
@@ -154,7 +158,7 @@ class BagInfo:
             'ending': {**asdict(self.ending), 'sentence': self.ending.sentence}}
 
 
-def bag_info(path, recover=False):
+def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     """
     Look through a bag.
 
@@ -209,19 +213,20 @@ def bag_info(path, recover=False):
         notes=notes, recovered=bag.recovered or bool(recovery))
 
 
-def _size(path):
+def _size(path: Path) -> int:
     files = [path] if path.is_file() else [p for p in path.iterdir() if p.is_file()]
     return sum(file.stat().st_size for file in files)
 
 
-def _span(bag):
+def _span(bag: Bag) -> tuple[int, int]:
     times = [topic.log_time_ns for topic in bag.topics.values() if len(topic.log_time_ns)]
     if not times:
         return 0, 0
     return int(min(map(np.min, times))), int(max(map(np.max, times)))
 
 
-def _topic_info(topic, remarks):
+def _topic_info(topic: TopicData,
+                remarks: list[str]) -> tuple[TopicInfo, IntArray, dict[str, FloatArray]]:
     info = TopicInfo(topic.name, topic.type_name, len(topic.payloads))
     stamp_ns, values = _stamps_and_values(topic, remarks)
     if len(stamp_ns) > 1:
@@ -229,7 +234,7 @@ def _topic_info(topic, remarks):
         info.stamps_backward = int((steps < 0).sum())
         info.stamps_repeated = int((steps == 0).sum())
     if len(stamp_ns) > 2 and topic.name != '/diagnostics':
-        steps_s = np.diff(np.sort(stamp_ns)) * 1e-9
+        steps_s: FloatArray = np.multiply(np.diff(np.sort(stamp_ns)), 1e-9)
         usual_s = float(np.median(steps_s))
         span_s = float(steps_s.sum())
         info.rate_hz = len(steps_s) / span_s if span_s > 0 else None
@@ -243,7 +248,8 @@ def _topic_info(topic, remarks):
     return info, stamp_ns, values
 
 
-def _stamps_and_values(topic, remarks):
+def _stamps_and_values(topic: TopicData,
+                       remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
     """Return header stamps in file order (receive times if there are none) and values."""
     short = short_name(topic.name)
     if is_rig_topic(topic) and short in OF_A_RUN and OF_A_RUN[short].numeric is not None:
@@ -259,14 +265,14 @@ def _stamps_and_values(topic, remarks):
     return topic.log_time_ns, {}
 
 
-def _has_header(topic):
+def _has_header(topic: TopicData) -> bool:
     fields = typestore().fielddefs.get(topic.type_name)
     return bool(
         topic.encoding == 'cdr' and fields and fields[1]
         and fields[1][0][1][1] == 'std_msgs/msg/Header')
 
 
-def _published(bag):
+def _published(bag: Bag) -> PublishedCounts:
     """Return the PublishedCounts of a bag's diagnostics."""
     published = PublishedCounts()
     topic = bag.topics.get('/diagnostics')
@@ -276,8 +282,9 @@ def _published(bag):
     return published
 
 
-def _add_counts(info, topic, recording, published, sent_ns):
-    def recorded(key):
+def _add_counts(info: TopicInfo, topic: TopicData, recording: Mapping[str, str],
+                published: int | None, sent_ns: int) -> None:
+    def recorded(key: str) -> int | None:
         return count_of(recording.get(f'{topic.name}.{key}', ''))
 
     info.dropped = recorded('dropped')
@@ -291,7 +298,7 @@ def _add_counts(info, topic, recording, published, sent_ns):
         recorded('lost'), published, by_then, (info.dropped or 0) + (info.missed_at_start or 0))
 
 
-def _loss_remarks(info):
+def _loss_remarks(info: TopicInfo) -> list[str]:
     remarks = []
     if info.lost:
         of = '' if info.published is None else f' of {info.published} published'

@@ -14,10 +14,15 @@
 
 """The text of ``pam info`` for people: gauge kPa, mm, one line per topic."""
 
+from collections.abc import Iterator, Sequence
 import datetime
+from typing import TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded, recorded_rig_title
 from pam_sim.units import gauge_kpa
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.info import BagInfo, TopicInfo
 
 _DISPLAY = {
     # value name: (factor, unit, digits)
@@ -31,7 +36,7 @@ _DISPLAY = {
 _TABLE = ('topic', 'messages', 'rate', 'longest gap', 'jitter', 'published', 'lost', 'dropped')
 
 
-def render_text(info):
+def render_text(info: 'BagInfo') -> str:
     """Return the text of a BagInfo, lines of unlimited width, no trailing newline."""
     lines = [info.path, _headline(info)]
     lines += [f'{key}: {text}' for key, text in _facts(info).items()]
@@ -46,7 +51,7 @@ def render_text(info):
     return '\n'.join(lines)
 
 
-def _facts(info):
+def _facts(info: 'BagInfo') -> dict[str, str]:
     """Return what the bag says of its run; what it does not say is told as that."""
     return {
         'experiment_name': recorded(info.metadata, 'experiment_name'),
@@ -55,7 +60,7 @@ def _facts(info):
         'software_version': recorded(info.metadata, 'software_version')}
 
 
-def _headline(info):
+def _headline(info: 'BagInfo') -> str:
     parts = [
         f'{info.storage}', f'{info.size_bytes / 1e6:.2f} MB', f'{info.duration_s:.2f} s',
         f'{info.message_count} messages']
@@ -65,18 +70,18 @@ def _headline(info):
     return ', '.join(parts)
 
 
-def _row(topic):
+def _row(topic: 'TopicInfo') -> tuple[str, ...]:
     return (
         topic.name, str(topic.count), _number(topic.rate_hz, 1.0, ' Hz', 1),
         _number(topic.max_gap_s, 1e3, ' ms', 1), _number(topic.stamp_jitter_s, 1e3, ' ms', 2),
         _number(topic.published), _number(topic.lost), _number(topic.dropped))
 
 
-def _number(value, factor=1.0, unit='', digits=0):
+def _number(value: float | None, factor: float = 1.0, unit: str = '', digits: int = 0) -> str:
     return '-' if value is None else f'{factor * value:.{digits}f}{unit}'
 
 
-def _table(rows):
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return [
         '  '.join(
@@ -85,7 +90,7 @@ def _table(rows):
         for row in rows]
 
 
-def _range_lines(topic):
+def _range_lines(topic: 'TopicInfo') -> Iterator[str]:
     for name, (low, high) in topic.ranges.items():
         if name == 'pressure_pa':
             yield (
@@ -98,7 +103,7 @@ def _range_lines(topic):
                 f'{factor * high:.{digits}f} {unit}').rstrip()
 
 
-def _verdict(info):
+def _verdict(info: 'BagInfo') -> str:
     if info.complete:
         text = 'Complete: every message that was published is here.'
     elif not info.missing and info.ending.early:

@@ -18,11 +18,14 @@ The rosbag2 layout of ROS 2 Jazzy: types, hashes, QoS texts, metadata.yaml versi
 Message definitions and hashes: ``topics/definitions.py``. Nothing here needs ROS.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
+from typing import Any
 
 from pam_actuation.bags import disk
+from pam_sim.files import StrPath
 import yaml
 
 METADATA_VERSION = 9
@@ -42,12 +45,13 @@ class TopicFacts:
 
     name: str
     type_name: str
-    qos: tuple
+    qos: tuple[dict[str, Any], ...]
     type_hash: str
     count: int
 
 
-def qos_profile(depth=10, reliability='reliable', durability='volatile', history='keep_last'):
+def qos_profile(depth: int = 10, reliability: str = 'reliable', durability: str = 'volatile',
+                history: str = 'keep_last') -> dict[str, Any]:
     """Return one offered QoS profile as rosbag2 Jazzy writes it (policies as words)."""
     return {
         'history': history,
@@ -65,18 +69,18 @@ def qos_profile(depth=10, reliability='reliable', durability='volatile', history
 class _PlainDumper(yaml.SafeDumper):
     """Writes repeated values out in full, as rosbag2 does (no anchors)."""
 
-    def ignore_aliases(self, data):
+    def ignore_aliases(self, data: object) -> bool:
         return True
 
 
-def to_yaml(data):
+def to_yaml(data: object) -> str:
     """Return ``data`` as block-style YAML text in the given key order, without folding."""
     return yaml.dump(
         data, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False,
         allow_unicode=True, width=2**31)
 
 
-def from_yaml(text):
+def from_yaml(text: str) -> Any:
     """Return the content of YAML text of any origin; ValueError for what is none."""
     try:
         depth = 0
@@ -102,7 +106,8 @@ class FileFacts:
     count: int
 
 
-def bag_metadata(files, topics, custom_data=None):
+def bag_metadata(files: Sequence[FileFacts], topics: Sequence[TopicFacts],
+                 custom_data: Mapping[str, str] | None = None) -> dict[str, Any]:
     """
     Return the content of metadata.yaml (version 9) below its root key.
 
@@ -145,24 +150,25 @@ def bag_metadata(files, topics, custom_data=None):
     }
 
 
-def _times(start_ns, end_ns):
+def _times(start_ns: int | None, end_ns: int | None) -> dict[str, dict[str, int]]:
     """Return duration and start, as rosbag2 writes them also for what is empty."""
-    empty = start_ns is None
+    duration_ns, begin_ns = 0, NO_START_TIME_NS
+    if start_ns is not None and end_ns is not None:
+        duration_ns, begin_ns = end_ns - start_ns, start_ns
     return {
-        'duration': {'nanoseconds': 0 if empty else end_ns - start_ns},
-        'starting_time': {
-            'nanoseconds_since_epoch': NO_START_TIME_NS if empty else start_ns},
+        'duration': {'nanoseconds': duration_ns},
+        'starting_time': {'nanoseconds_since_epoch': begin_ns},
     }
 
 
-def _file_metadata(file):
+def _file_metadata(file: FileFacts) -> dict[str, Any]:
     times = _times(file.start_ns, file.end_ns)
     return {
         'path': file.name, 'starting_time': times['starting_time'],
         'duration': times['duration'], 'message_count': file.count}
 
 
-def write_metadata(directory, content):
+def write_metadata(directory: StrPath, content: Mapping[str, Any]) -> None:
     """Write metadata.yaml atomically and onto the disk."""
     directory = Path(directory)
     temporary = directory / f'.{METADATA_FILE}.{os.getpid()}'

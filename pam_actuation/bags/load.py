@@ -19,18 +19,21 @@ Any namespace, any rates, topics missing, bags of other recorders: what can be
 used is returned, what is odd is said in ``remarks``.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
 from pam_actuation.bags import renamed, series
-from pam_actuation.bags.plausibility import recorded_length_m, topic_findings
-from pam_actuation.bags.source import read_bag
-from pam_actuation.messages import VALVE_NAMES, valve_of
+from pam_actuation.bags.plausibility import Implausible, recorded_length_m, topic_findings
+from pam_actuation.bags.source import Bag, read_bag, TopicData
+from pam_actuation.messages import ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import KEPT, OF_A_RUN, RECORDED, short_name, TOLD
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 from pam_sim.run import Run, Series
 from pam_sim.units import unit_of
 
@@ -53,34 +56,35 @@ class RecordedRun(Run):
 
     """
 
-    reference_trajectories: tuple = ()
-    remarks: tuple = ()
+    reference_trajectories: tuple[ReferenceTrajectory, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
-    def valve(self):
+    def valve(self) -> str:
         """Return 'ppr' or 'hsv' by the valve signal, else by the metadata, else ''."""
         names = self.topics['valve_signal'].values if 'valve_signal' in self.topics else {}
         return valve_of(names) or self.metadata.get('valve', '')
 
     @cached_property
-    def findings(self):
+    def findings(self) -> tuple[Implausible, ...]:
         """Return what cannot be right in the values, a tuple of Implausible; looked for once."""
         length_m = cache(lambda: recorded_length_m(self.metadata))
         return tuple(found for short, series in self.topics.items() for found in topic_findings(
             f'{self.namespace}/{short}', series.values, length_m))
 
     @property
-    def implausible(self):
+    def implausible(self) -> tuple[str, ...]:
         """Return a sentence on everything in the values that cannot be right."""
         return tuple(found.sentence for found in self.findings)
 
     @property
-    def unusable(self):
+    def unusable(self) -> tuple[str, ...]:
         """Return those of them after which the values mean something else, a unit say."""
         return tuple(found.sentence for found in self.findings if found.unusable)
 
 
-def load_run(path, namespace=None, recover=False, topics=None):
+def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
+             topics: Mapping[str, object] | None = None) -> RecordedRun:
     """
     Load one muscle's run from a bag.
 
@@ -122,20 +126,21 @@ def load_run(path, namespace=None, recover=False, topics=None):
         chosen = _choose_namespace(bag, namespace)
     found = {**(topics_of(bag, chosen) if chosen is not None else {}), **given}
     remarks = list(bag.remarks)
-    topics, trajectories = {}, ()
+    series_of: dict[str, Series] = {}
+    trajectories: tuple[ReferenceTrajectory, ...] = ()
     for short, topic in found.items():
         if OF_A_RUN[short].numeric is None:
             trajectories = _trajectories(topic, remarks)
         else:
             one = read_series(short, topic, remarks)
             if len(one):
-                topics[short] = one
+                series_of[short] = one
     return RecordedRun(
-        topics=topics, metadata=bag.experiment, namespace=chosen or '', path=str(path),
+        topics=series_of, metadata=bag.experiment, namespace=chosen or '', path=str(path),
         reference_trajectories=trajectories, remarks=tuple(remarks))
 
 
-def topics_of(bag, namespace):
+def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
     """
     Return short name to TopicData of the readable rig topics in a namespace.
 
@@ -157,24 +162,24 @@ def topics_of(bag, namespace):
     return found
 
 
-def is_rig_topic(topic):
+def is_rig_topic(topic: TopicData) -> bool:
     """Return whether a TopicData has the name and the message type of a topic of the rig."""
     return _is_of_rig(topic.name, topic.type_name, topic.encoding)
 
 
-def is_read(name, type_name, encoding):
+def is_read(name: str, type_name: str, encoding: str) -> bool:
     """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
     return short_name(name) in OF_A_RUN and _is_of_rig(name, type_name, encoding)
 
 
-def _is_of_rig(name, type_name, encoding):
+def _is_of_rig(name: str, type_name: str, encoding: str) -> bool:
     row = RECORDED.get(short_name(name))
     return encoding == 'cdr' and row is not None and row.type_name == type_name
 
 
-def namespaces(bag):
+def namespaces(bag: Bag) -> dict[str, set[str]]:
     """Return the namespaces with messages of the rig: dict of namespace to set of short names."""
-    found = {}
+    found: dict[str, set[str]] = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
         if short in OF_A_RUN and is_rig_topic(topic) and len(topic.payloads):
@@ -182,7 +187,7 @@ def namespaces(bag):
     return found
 
 
-def _choose_namespace(bag, wanted):
+def _choose_namespace(bag: Bag, wanted: str | None) -> str:
     present = namespaces(bag)
     if wanted is not None:
         wanted = '/' + str(wanted).strip('/') if str(wanted).strip('/') else ''
@@ -205,11 +210,11 @@ def _choose_namespace(bag, wanted):
         f'{names}', bag.path)
 
 
-def _listed(names):
+def _listed(names: Iterable[str]) -> str:
     return ', '.join(name or '/' for name in sorted(names)) or 'none'
 
 
-def read_series(short, topic, remarks):
+def read_series(short: str, topic: TopicData, remarks: list[str]) -> Series:
     """Return the Series of a TopicData; what is odd is appended to ``remarks`` as sentences."""
     row = OF_A_RUN[short]
     stamp_ns, values, bad = series.table(short, topic.payloads)
@@ -243,7 +248,8 @@ def read_series(short, topic, remarks):
     return Series(stamp_ns, values, {name: unit_of(name) for name in values}, held=row.held)
 
 
-def _checked_stamps(stamp_ns, keep, topic, remarks):
+def _checked_stamps(stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
+                    remarks: list[str]) -> tuple[IntArray, BoolArray]:
     """Treat messages that nobody stamped: all of them by receive time, single ones left out."""
     unset = keep & (stamp_ns == 0)
     if int(unset.sum()) > 1 and not (stamp_ns[keep] != 0).any():
@@ -256,7 +262,8 @@ def _checked_stamps(stamp_ns, keep, topic, remarks):
     return stamp_ns, keep
 
 
-def _held(stamp_ns, values, name, remarks):
+def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
+          remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
     """Return the signal as a valve takes it: it ignores non-finite entries and holds the last."""
     known = np.ones(len(stamp_ns), dtype=bool)
     held = {}
@@ -272,7 +279,7 @@ def _held(stamp_ns, values, name, remarks):
     return stamp_ns[known], {key: column[known] for key, column in held.items()}
 
 
-def _remark_not_finite(values, name, remarks):
+def _remark_not_finite(values: Mapping[str, FloatArray], name: str, remarks: list[str]) -> None:
     for key, column in values.items():
         count = int((~np.isfinite(column)).sum())
         # A velocity that is never measured is the sensor's business, not an oddity.
@@ -280,7 +287,7 @@ def _remark_not_finite(values, name, remarks):
             remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 
 
-def _trajectories(topic, remarks):
+def _trajectories(topic: TopicData, remarks: list[str]) -> tuple[ReferenceTrajectory, ...]:
     messages, bad = [], 0
     for raw in topic.payloads:
         try:

@@ -31,12 +31,13 @@ COUNT_DIGITS = 18
 _MOST_KEPT = 10_000           # send times of a topic no node reports on
 
 
-def count_of(text):
+def count_of(text: str) -> int | None:
     """Return the number a text is, None where it is no number of messages."""
     return int(text) if text.isdecimal() and len(text) <= COUNT_DIGITS else None
 
 
-def missing_messages(unheard, published, held_by_then, accounted_for):
+def missing_messages(unheard: int | None, published: int | None, held_by_then: int,
+                     accounted_for: int) -> int | None:
     """
     Return how many messages never arrived, None where it cannot be known.
 
@@ -64,17 +65,19 @@ class PublishedCounts:
     Reports of several nodes on one topic add up; the latest report's time counts.
     """
 
-    def __init__(self):
-        self._last = {}         # topic -> status name -> (number, send time)
-        self._first = {}        # status name -> number of its first report on /diagnostics
+    def __init__(self) -> None:
+        # Topic -> status name -> (number, send time).
+        self._last: dict[str, dict[str, tuple[int, int]]] = {}
+        # Status name -> number of its first report on /diagnostics.
+        self._first: dict[str, int] = {}
 
-    def hear(self, payload, sent_ns):
+    def hear(self, payload: bytes, sent_ns: int) -> set[str]:
         """
         Take one serialized message of /diagnostics and its send time [ns].
 
         Returns the topics it reports on.
         """
-        topics = set()
+        topics: set[str] = set()
         try:
             statuses = decode('diagnostics', payload)
         except InputError:
@@ -89,7 +92,7 @@ class PublishedCounts:
                         self._first.setdefault(status.name, number)
         return topics
 
-    def missed_reports(self):
+    def missed_reports(self) -> int | None:
         """
         Return how many reports on /diagnostics came before the first one of their node.
 
@@ -99,7 +102,7 @@ class PublishedCounts:
             return None
         return sum(max(number - 1, 0) for number in self._first.values())
 
-    def of(self, topic):
+    def of(self, topic: str) -> tuple[int | None, int]:
         """Return (published, send time of the last report), (None, 0) where nobody reports."""
         last = self._last.get(topic)
         if not last:
@@ -110,28 +113,28 @@ class PublishedCounts:
 class SentTimes:
     """Counts, while recording, the messages sent up to a report that comes after them."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._before = 0
-        self._later = array('q')
+        self._later: array[int] = array('q')
         self._differ = self._reported = False
 
-    def add(self, sent_ns, received_ns):
+    def add(self, sent_ns: int, received_ns: int) -> None:
         """Take the send and receive time [ns] of one message."""
         self._differ = self._differ or sent_ns != received_ns
         self._later.append(sent_ns)
         if len(self._later) > _MOST_KEPT and not self._reported:
             self._keep(self._later[_MOST_KEPT // 2:])
 
-    def trim(self, reported_ns):
+    def trim(self, reported_ns: int) -> None:
         """Keep no times that a report at this time [ns] has settled."""
         self._reported = True
         self._keep(array('q', (sent for sent in self._later if sent > reported_ns)))
 
-    def _keep(self, later):
+    def _keep(self, later: 'array[int]') -> None:
         self._before += len(self._later) - len(later)
         self._later = later
 
-    def up_to(self, reported_ns):
+    def up_to(self, reported_ns: int) -> int:
         """Return how many were sent up to a report; all where send times are not known."""
         if not self._differ:
             return self._before + len(self._later)

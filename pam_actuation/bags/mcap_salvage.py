@@ -14,6 +14,8 @@
 
 """Walk over a damaged MCAP file and yield every record that is whole."""
 
+from collections.abc import Iterator
+import mmap
 import struct
 import zlib
 
@@ -27,6 +29,8 @@ _LENGTH = struct.Struct('<Q')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
 # No recorder makes chunks near this size; a damaged length must not fill the memory.
 LARGEST_CHUNK_BYTES = 2**30
+# Opcode, content, and the unpacked records of a chunk.
+Found = tuple[int, bytes, bytes | None]
 _TAKEN = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA)
 
 
@@ -45,14 +49,15 @@ class Walk:
 
     """
 
-    def __init__(self, data):
+    def __init__(self, data: bytes | mmap.mmap) -> None:
         self._data = data
-        self._channels, self._schemas = set(), {0}
+        self._channels: set[int] = set()
+        self._schemas = {0}
         self.bytes = 0
         self.inside = False
         self.finished = False
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Found]:
         """Yield the whole records in file order."""
         data, size = self._data, len(self._data)
         position = len(MAGIC) if size >= len(MAGIC) else size
@@ -76,7 +81,7 @@ class Walk:
                 self.lose(data[begin:end])  # nothing of ours has them: the former file is kept
             position = end
 
-    def _lost_from(self, position):
+    def _lost_from(self, position: int) -> None:
         """Count the rest; an unknown opcode means damage unless only zeros follow it."""
         rest = self._data[position:]
         self.bytes += len(rest)
@@ -84,7 +89,7 @@ class Walk:
             Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.HEADER)
         self.inside = self.inside or (not torn and bool(rest.strip(b'\0')))
 
-    def _chunk(self, content, is_last):
+    def _chunk(self, content: bytes, is_last: bool) -> Iterator[Found]:
         records = unpack(content)
         if records is None or not self._known(records):
             self.bytes += len(content)
@@ -92,7 +97,7 @@ class Walk:
             return
         yield Opcode.CHUNK, content, records
 
-    def _known(self, records):
+    def _known(self, records: bytes) -> bool:
         """Tell whether all records of a chunk fit together with what came before."""
         channels, schemas = set(self._channels), set(self._schemas)
         position, size = 0, len(records)
@@ -107,7 +112,7 @@ class Walk:
         self._channels, self._schemas = channels, schemas
         return True
 
-    def _single(self, opcode, content):
+    def _single(self, opcode: int, content: bytes) -> Iterator[Found]:
         try:
             if _fits(opcode, content, 0, self._channels, self._schemas):
                 yield opcode, content, None
@@ -116,13 +121,13 @@ class Walk:
             pass
         self.lose(content)
 
-    def lose(self, content):
+    def lose(self, content: bytes) -> None:
         """Count a record inside the file that cannot be taken over."""
         self.bytes += len(content)
         self.inside = True
 
 
-def _fits(opcode, data, begin, channels, schemas):
+def _fits(opcode: int, data: bytes, begin: int, channels: set[int], schemas: set[int]) -> bool:
     """Tell whether a record's numbers are known; remember those it announces."""
     if opcode == Opcode.MESSAGE:
         return _MESSAGE_HEAD.unpack_from(data, begin)[0] in channels
@@ -134,7 +139,7 @@ def _fits(opcode, data, begin, channels, schemas):
     return True
 
 
-def unpack(content):
+def unpack(content: bytes) -> bytes | None:
     """Return the records of a chunk; None if it is not whole."""
     try:
         _, _, size, crc = CHUNK_HEAD.unpack_from(content)
@@ -146,7 +151,8 @@ def unpack(content):
         if length != len(packed) or size > LARGEST_CHUNK_BYTES:
             return None
         if compression == b'zstd':
-            records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+            records: bytes | None = zstandard.ZstdDecompressor().decompress(
+                packed, max_output_size=size)
         elif compression == b'lz4':
             records = lz4.frame.decompress(packed)
         else:
@@ -158,13 +164,13 @@ def unpack(content):
     return records
 
 
-def message(content):
+def message(content: bytes) -> tuple[int, int, bytes, int, int]:
     """Return channel, log time [ns], data, publish time [ns] and sequence of a message."""
     channel, sequence, log_time_ns, publish_time_ns = _MESSAGE_HEAD.unpack_from(content)
     return channel, log_time_ns, content[_MESSAGE_HEAD.size:], publish_time_ns, sequence
 
 
-def header(data):
+def header(data: bytes | mmap.mmap) -> tuple[str, str]:
     """Return (profile, library) of a file's first record, ('', '') if it cannot be read."""
     try:
         opcode, _ = RECORD.unpack_from(data, len(MAGIC))
@@ -178,6 +184,7 @@ def header(data):
                 return '', ''
             texts.append(text.decode())
             position += _TEXT.size + length
-        return tuple(texts)
+        profile, library = texts
+        return profile, library
     except (struct.error, UnicodeDecodeError):
         return '', ''

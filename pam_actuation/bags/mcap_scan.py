@@ -20,16 +20,24 @@ unpacked and checked, and the messages come out as tables of bytes per channel.
 Memory is bounded by what the messages take. Format: https://mcap.dev/spec.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import io
 import os
 import struct
+from typing import BinaryIO, TYPE_CHECKING
 import zlib
 
 import lz4.frame
 import numpy as np
+from pam_sim.annotations import ByteArray
 import zstandard
 
+if TYPE_CHECKING:
+    from pam_actuation.bags.message_batch import MessageColumns
+
+# Whether to keep the messages of a channel, by topic, message type and encoding.
+Wanted = Callable[[str, str, str], bool]
 MAGIC = b'\x89MCAP0\r\n'
 # No writer makes chunks near this size; a chunk that claims more is damaged.
 MAX_CHUNK_BYTES = 2**30
@@ -47,7 +55,7 @@ _U64 = struct.Struct('<Q')
 class Damaged(Exception):
     """The file cannot be read beyond ``offset`` [bytes]."""
 
-    def __init__(self, problem, offset):
+    def __init__(self, problem: str, offset: int) -> None:
         self.problem = problem
         self.offset = offset
         super().__init__(f'{problem} at byte {offset}')
@@ -62,8 +70,8 @@ class Channel:
     message_encoding: str
     schema_encoding: str
     schema: str
-    metadata: dict
-    messages: object = None
+    metadata: dict[str, str]
+    messages: 'MessageColumns'
 
 
 @dataclass
@@ -72,18 +80,19 @@ class McapContent:
 
     profile: str = ''
     library: str = ''
-    channels: dict = field(default_factory=dict)
-    metadata: list = field(default_factory=list)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     finished: bool = False
-    damage: Damaged = None
+    damage: Damaged | None = None
 
     @property
-    def message_count(self):
+    def message_count(self) -> int:
         """Return the number of messages that were read."""
         return sum(len(channel.messages) for channel in self.channels.values())
 
 
-def scan(stream, wanted=None):
+def scan(stream: BinaryIO | bytes | bytearray | memoryview,
+         wanted: Wanted | None = None) -> McapContent:
     """
     Return the McapContent of a file.
 
@@ -117,14 +126,14 @@ def scan(stream, wanted=None):
     return content
 
 
-def _read(stream, position, size):
+def _read(stream: BinaryIO, position: int, size: int) -> bytes:
     stream.seek(position)
     return stream.read(size)
 
 
 class _Scanner:
 
-    def __init__(self, content, stream, wanted):
+    def __init__(self, content: McapContent, stream: BinaryIO, wanted: Wanted | None) -> None:
         # Imported late: a recorder reads bags only after a crash, the compiler is large.
         from pam_actuation.bags.message_batch import MessageBatch
         from pam_actuation.bags.record_walk import walk_messages
@@ -139,7 +148,7 @@ class _Scanner:
         self.schemas = {0: ('', '', '')}
         self.where = 0
 
-    def walk(self):
+    def walk(self) -> None:
         """Walk over the records of the file's data section."""
         position = len(MAGIC)
         while position < self.size:
@@ -162,20 +171,20 @@ class _Scanner:
             position = end
         raise Damaged('the end mark is missing', position)
 
-    def _check_end(self, position):
+    def _check_end(self, position: int) -> None:
         self.content.finished = (
             self.size >= position + len(MAGIC)
             and _read(self.stream, self.size - len(MAGIC), len(MAGIC)) == MAGIC)
         if not self.content.finished:
             raise Damaged('the end mark is missing', position)
 
-    def _understood(self, opcode, data):
+    def _understood(self, opcode: int, data: bytes) -> None:
         try:
             self._record(opcode, data)
         except (struct.error, UnicodeDecodeError, IndexError) as error:
             raise Damaged(f'a record makes no sense ({error})', self.where) from None
 
-    def _record(self, opcode, data):
+    def _record(self, opcode: int, data: bytes) -> None:
         if opcode == _CHUNK:
             self._chunk_records(self._unpacked(data))
         elif opcode == _SCHEMA:
@@ -189,7 +198,7 @@ class _Scanner:
             self.content.profile, begin = _text(data, 0)
             self.content.library = _text(data, begin)[0]
 
-    def _unpacked(self, data):
+    def _unpacked(self, data: bytes) -> bytes | memoryview:
         _, _, size, crc = _CHUNK_HEAD.unpack_from(data)
         compression, begin = _text(data, _CHUNK_HEAD.size)
         length = _U64.unpack_from(data, begin)[0]
@@ -207,7 +216,7 @@ class _Scanner:
             raise Damaged('a chunk fails its checksum', self.where)
         return records
 
-    def _decompressed(self, compression, packed, size):
+    def _decompressed(self, compression: str, packed: memoryview, size: int) -> bytes | memoryview:
         if compression == 'zstd':
             if zstandard.frame_content_size(packed) > size:
                 raise Damaged('a chunk fails its checksum', self.where)
@@ -219,7 +228,7 @@ class _Scanner:
             return packed
         raise Damaged(f'unknown compression {compression!r}', self.where)
 
-    def _chunk_records(self, data):
+    def _chunk_records(self, data: bytes | memoryview) -> None:
         view = np.frombuffer(data, dtype=np.uint8)
         position, size = 0, len(data)
         while position < size:
@@ -234,7 +243,7 @@ class _Scanner:
                 self._record(opcode, bytes(data[begin:end]))
             position = end
 
-    def _messages(self, view, position):
+    def _messages(self, view: ByteArray, position: int) -> int:
         """Take the messages that follow each other; return where anything else begins."""
         while True:
             count, end = self._walk_messages(view, position, self._positions)
@@ -245,7 +254,7 @@ class _Scanner:
                 raise Damaged('a message of an unknown channel', self.where)
             position = end
 
-    def _loose_messages(self, position, length):
+    def _loose_messages(self, position: int, length: int) -> int:
         """Take messages outside of chunks, a block of the file at a time."""
         block = _read(self.stream, position, max(_READ_BYTES, _RECORD.size + length))
         taken = self._messages(np.frombuffer(block, dtype=np.uint8), 0)
@@ -253,13 +262,13 @@ class _Scanner:
             raise Damaged('a message is shorter than its head', position)
         return position + taken
 
-    def _schema(self, data):
+    def _schema(self, data: bytes) -> None:
         key = _U16.unpack_from(data)[0]
         name, begin = _text(data, 2)
         encoding, begin = _text(data, begin)
         self.schemas[key] = (name, encoding, _text(data, begin)[0])
 
-    def _channel(self, data):
+    def _channel(self, data: bytes) -> None:
         key, schema = _U16.unpack_from(data)[0], _U16.unpack_from(data, 2)[0]
         topic, begin = _text(data, 4)
         encoding, begin = _text(data, begin)
@@ -275,7 +284,7 @@ class _Scanner:
                 key, self.wanted is None or self.wanted(topic, name, encoding)))
 
 
-def _text(data, begin):
+def _text(data: bytes, begin: int) -> tuple[str, int]:
     """Return (text, position behind it) of a length-prefixed string."""
     begin, end = begin + 4, begin + 4 + _U32.unpack_from(data, begin)[0]
     if end > len(data):
@@ -283,7 +292,7 @@ def _text(data, begin):
     return data[begin:end].decode(), end
 
 
-def _texts(data, begin):
+def _texts(data: bytes, begin: int) -> tuple[dict[str, str], int]:
     """Return (dict, position behind it) of a length-prefixed map of strings."""
     begin, end = begin + 4, begin + 4 + _U32.unpack_from(data, begin)[0]
     if end > len(data):

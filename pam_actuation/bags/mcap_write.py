@@ -21,8 +21,10 @@ needs a chunk to end by the clock, few microseconds per message, and recovery co
 chunks as they are. Format: https://mcap.dev/spec.
 """
 
+from collections.abc import Callable, Iterable, Mapping
 import io
 import struct
+from typing import Any, BinaryIO
 import zlib
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -72,31 +74,33 @@ class McapWriter:
 
     """
 
-    def __init__(self, write, profile='ros2', library='', chunk_bytes=CHUNK_BYTES, index=None):
+    def __init__(self, write: Callable[[bytes], object], profile: str = 'ros2', library: str = '',
+                 chunk_bytes: int = CHUNK_BYTES, index: BinaryIO | None = None) -> None:
         self._write_all = write
         self._chunk_bytes = chunk_bytes
         self._compressor = zstandard.ZstdCompressor()
         self.offset = 0
-        self._schemas = {}
-        self._channels = {}
-        self._counts = {}
-        self._chunk_index = io.BytesIO() if index is None else index
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._counts: dict[int, int] = {}
+        self._chunk_index: BinaryIO = io.BytesIO() if index is None else index
         self._chunk_index_bytes = self._chunk_count = 0
-        self._metadata = []
-        self._start_ns = self._end_ns = None
+        self._metadata: list[MetadataIndex] = []
+        self._start_ns: int | None = None
+        self._end_ns: int | None = None
         self._begin_chunk()
         self._write(MAGIC + _bytes(Header(profile=profile, library=library)))
 
-    def _write(self, data):
+    def _write(self, data: bytes) -> None:
         self._write_all(data)
         self.offset += len(data)
 
-    def _begin_chunk(self):
-        self._parts = []
+    def _begin_chunk(self) -> None:
+        self._parts: list[bytes] = []
         self.pending = 0
-        self._index = {}
+        self._index: dict[int, list[int]] = {}
 
-    def add_schema(self, name, encoding, data):
+    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Announce a message definition (bytes); returns its number."""
         schema = Schema(
             id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
@@ -104,7 +108,8 @@ class McapWriter:
         self._append(_bytes(schema))
         return schema.id
 
-    def add_channel(self, topic, schema, metadata, encoding='cdr'):
+    def add_channel(self, topic: str, schema: int, metadata: dict[str, str],
+                    encoding: str = 'cdr') -> int:
         """Announce a topic with the number of its definition; returns its number."""
         channel = Channel(
             id=len(self._channels) + 1, topic=topic, message_encoding=encoding,
@@ -113,11 +118,12 @@ class McapWriter:
         self._append(_bytes(channel))
         return channel.id
 
-    def _append(self, record):
+    def _append(self, record: bytes) -> None:
         self._parts.append(record)
         self.pending += len(record)
 
-    def add_message(self, channel, log_time_ns, data, publish_time_ns, sequence=0):
+    def add_message(self, channel: int, log_time_ns: int, data: bytes, publish_time_ns: int,
+                    sequence: int = 0) -> None:
         """Append one message to the open chunk."""
         size = len(data)
         self._parts += (
@@ -131,14 +137,14 @@ class McapWriter:
         if self.pending >= self._chunk_bytes:
             self.close_chunk()
 
-    def add_metadata(self, name, texts):
+    def add_metadata(self, name: str, texts: dict[str, str]) -> None:
         """Append a named record of texts, after the chunk before it."""
         self.close_chunk()
         record = _bytes(Metadata(name=name, metadata=texts))
         self._metadata.append(MetadataIndex(offset=self.offset, length=len(record), name=name))
         self._write(record)
 
-    def close_chunk(self):
+    def close_chunk(self) -> None:
         """Write the open chunk, with checksum and message index, in one piece."""
         if not self._parts:
             return
@@ -156,7 +162,7 @@ class McapWriter:
             _DATA_LENGTH.pack(len(packed)), packed))
         self._write_chunk(content, index)
 
-    def copy_chunk(self, content, records):
+    def copy_chunk(self, content: bytes, records: bytes) -> None:
         """
         Append a chunk of another file as it is.
 
@@ -169,7 +175,7 @@ class McapWriter:
 
         """
         self.close_chunk()
-        index = {}
+        index: dict[int, list[int]] = {}
         position = 0
         while position < len(records):
             opcode, length = RECORD.unpack_from(records, position)
@@ -182,7 +188,7 @@ class McapWriter:
             position = begin + length
         self._write_chunk(content, index)
 
-    def note(self, opcode, content):
+    def note(self, opcode: int, content: bytes) -> bool:
         """Remember a schema or channel of a copied part; return whether it can be read."""
         stream = ReadDataStream(io.BytesIO(content))
         try:
@@ -196,14 +202,14 @@ class McapWriter:
             return False
         return True
 
-    def copy_record(self, opcode, content):
+    def copy_record(self, opcode: int, content: bytes) -> bool:
         """Append a schema or channel of another file; return False for one that is damaged."""
         readable = self.note(opcode, content)
         if readable:
             self._append(RECORD.pack(opcode, len(content)) + content)
         return readable
 
-    def _write_chunk(self, content, index):
+    def _write_chunk(self, content: bytes, index: Mapping[int, list[int]]) -> None:
         chunk = RECORD.pack(Opcode.CHUNK, len(content)) + content
         start_ns, end_ns, size, _ = CHUNK_HEAD.unpack_from(content)
         compression, packed = _compression(content)
@@ -235,26 +241,26 @@ class McapWriter:
             self._end_ns = end_ns if self._end_ns is None else max(self._end_ns, end_ns)
 
     @property
-    def schemas(self):
+    def schemas(self) -> dict[int, Schema]:
         """Return the schemas by number."""
         return self._schemas
 
     @property
-    def channels(self):
+    def channels(self) -> dict[int, Channel]:
         """Return the channels by number."""
         return self._channels
 
     @property
-    def counts(self):
+    def counts(self) -> dict[int, int]:
         """Return the number of messages in closed chunks, by channel number."""
         return dict(self._counts)
 
     @property
-    def span_ns(self):
+    def span_ns(self) -> tuple[int | None, int | None]:
         """Return the first and last log time [ns] of closed chunks, (None, None) if none."""
         return self._start_ns, self._end_ns
 
-    def finish(self):
+    def finish(self) -> None:
         """Close the last chunk; write summary, footer and end mark."""
         self.close_chunk()
         self._write(_bytes(DataEnd(data_section_crc=0)))
@@ -279,11 +285,11 @@ class McapWriter:
             summary_start=start, summary_offset_start=offset_start, summary_crc=crc)
         self._write(body + _bytes(footer) + MAGIC)
 
-    def _all_chunks(self):
+    def _all_chunks(self) -> bytes:
         self._chunk_index.seek(0)
         return self._chunk_index.read(self._chunk_index_bytes)
 
-    def _statistics(self):
+    def _statistics(self) -> Statistics:
         return Statistics(
             attachment_count=0, channel_count=len(self._channels),
             channel_message_counts=dict(self._counts), chunk_count=self._chunk_count,
@@ -292,18 +298,19 @@ class McapWriter:
             schema_count=len(self._schemas))
 
 
-def _bytes(record):
+def _bytes(record: Any) -> bytes:
     """Return a record of the ``mcap`` package as bytes."""
     builder = RecordBuilder()
     record.write(builder)
-    return builder.end()
+    data: bytes = builder.end()     # type: ignore[no-untyped-call]
+    return data
 
 
-def _all_bytes(records):
+def _all_bytes(records: Iterable[Any]) -> bytes:
     return b''.join(map(_bytes, records))
 
 
-def _compression(content):
+def _compression(content: bytes) -> tuple[str, int]:
     """Return (name, packed size) of a chunk record."""
     begin = CHUNK_HEAD.size
     length = _TEXT_LENGTH.unpack_from(content, begin)[0]

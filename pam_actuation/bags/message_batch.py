@@ -22,6 +22,7 @@ they are gathered until sorting them is worth a few array operations.
 import numpy as np
 from pam_actuation.bags.payloads import alike, joined, Payloads
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES, windows
+from pam_sim.annotations import ByteArray, IntArray
 
 BATCH_BYTES = 4 * 1024 * 1024
 _KEYS = 2**16
@@ -34,26 +35,27 @@ class MessageColumns:
     Of a channel that is not ``kept`` only the number of messages is known.
     """
 
-    def __init__(self, kept=True):
+    def __init__(self, kept: bool = True) -> None:
         self._kept = kept
         self.payloads = Payloads()
-        self._log, self._publish = [], []
+        self._log: list[IntArray] = []
+        self._publish: list[IntArray] = []
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of messages."""
         return len(self.payloads)
 
     @property
-    def log_time_ns(self):
+    def log_time_ns(self) -> IntArray:
         """Return the receive times, ndarray of int64."""
         return joined(self._log)
 
     @property
-    def publish_time_ns(self):
+    def publish_time_ns(self) -> IntArray:
         """Return the send times, ndarray of int64."""
         return joined(self._publish)
 
-    def append(self, data, positions):
+    def append(self, data: ByteArray, positions: IntArray) -> None:
         """Append the message records of ``data`` that begin at ``positions``, shape (n,)."""
         if not self._kept:
             self.payloads.skip(len(positions))
@@ -71,21 +73,24 @@ class MessageColumns:
 class MessageBatch:
     """Messages on their way from the chunks to their channels."""
 
-    def __init__(self):
-        self._columns = {}
+    def __init__(self) -> None:
+        self._columns: dict[int, MessageColumns] = {}
         self._known = np.zeros(_KEYS, dtype=bool)
         self._clear()
 
-    def _clear(self):
-        self._data, self._positions, self._keys, self._size = [], [], [], 0
+    def _clear(self) -> None:
+        self._data: list[ByteArray] = []
+        self._positions: list[IntArray] = []
+        self._keys: list[IntArray] = []
+        self._size = 0
 
-    def add_channel(self, key, kept=True):
+    def add_channel(self, key: int, kept: bool = True) -> MessageColumns:
         """Accept messages of channel number ``key`` from now on; return its MessageColumns."""
         self._columns[key] = MessageColumns(kept)
         self._known[key] = True
         return self._columns[key]
 
-    def add(self, data, positions):
+    def add(self, data: ByteArray, positions: IntArray) -> int:
         """
         Take the message records of ``data`` that begin at ``positions``, shape (n,).
 
@@ -103,17 +108,17 @@ class MessageBatch:
                 self.flush()
         return taken
 
-    def flush(self):
+    def flush(self) -> None:
         """Hand everything taken so far to the channels."""
         if not self._data:
             return
-        data, positions, keys = map(joined, (self._data, self._positions, self._keys))
+        data, positions, keys = joined(self._data), joined(self._positions), joined(self._keys)
         self._clear()
         for key, places in alike(keys):
             self._columns[key].append(data, positions[places])
 
 
-def _rows(data, positions, record_length):
+def _rows(data: ByteArray, positions: IntArray, record_length: int) -> ByteArray:
     """Return payloads of messages with equally long records, shape (n, size) of uint8."""
     size = RECORD_BYTES + record_length - MESSAGE_BYTES
     if not size:

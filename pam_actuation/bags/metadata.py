@@ -15,6 +15,7 @@
 """What a bag says about its experiment: the ``pam_experiment`` record."""
 
 import importlib.metadata
+from typing import Any
 
 from pam_actuation.bags.ending import Ending
 from pam_sim.errors import InputError
@@ -30,7 +31,7 @@ UNITS = (
 VALVES = ('ppr', 'hsv')
 
 
-def software_version():
+def software_version() -> str:
     """Return the version of the installed package, 'unknown' in a bare source tree."""
     try:
         return importlib.metadata.version('pam_actuation')
@@ -38,8 +39,9 @@ def software_version():
         return 'unknown'
 
 
-def experiment_metadata(experiment=None, rig=None, controller=None, valve='', seed=None,
-                        experiment_name='', **more):
+def experiment_metadata(experiment: Any = None, rig: Any = None, controller: Any = None,
+                        valve: str = '', seed: int | None = None, experiment_name: str = '',
+                        **more: object) -> dict[str, str]:
     """
     Return the texts of the ``pam_experiment`` record.
 
@@ -82,7 +84,7 @@ def experiment_metadata(experiment=None, rig=None, controller=None, valve='', se
     return {key: text for key, text in texts.items() if text}
 
 
-def _yaml(thing):
+def _yaml(thing: Any) -> str:
     if thing is None:
         return ''
     return thing if isinstance(thing, str) else thing.to_yaml()

@@ -19,7 +19,14 @@ Messages of a topic nearly always have one length. Rows of equal length lie in
 one array, so that millions of messages are neither copied nor decoded one by one.
 """
 
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar
+
 import numpy as np
+import numpy.typing as npt
+from pam_sim.annotations import ByteArray, IntArray
+
+Number = TypeVar('Number', np.int64, np.uint8)
 
 
 class Payloads:
@@ -36,15 +43,15 @@ class Payloads:
 
     """
 
-    def __init__(self, messages=()):
-        self._parts = []
+    def __init__(self, messages: Sequence[bytes] = ()) -> None:
+        self._parts: list[tuple[int, IntArray | None, ByteArray]] = []
         self._count = 0
         lengths = np.array([len(raw) for raw in messages], dtype=np.int64)
         for size, places in alike(lengths):
             rows = np.frombuffer(b''.join([messages[i] for i in places]), dtype=np.uint8)
             self.append_rows(rows.reshape(len(places), size), places)
 
-    def append_rows(self, rows, indices=None):
+    def append_rows(self, rows: ByteArray, indices: IntArray | None = None) -> None:
         """
         Append messages of equal length.
 
@@ -59,18 +66,18 @@ class Payloads:
         self._parts.append((self._count, indices, rows))
         self._count += len(rows)
 
-    def skip(self, count):
+    def skip(self, count: int) -> None:
         """Count further messages whose bytes are not kept; they read as empty."""
         self._count += count
 
-    def extend(self, other):
+    def extend(self, other: 'Payloads') -> None:
         """Append all messages of another Payloads."""
         for first, indices, rows in other._parts:
             moved = None if indices is None else indices + self._count
             self._parts.append((first + self._count, moved, rows))
         self._count += len(other)
 
-    def tables(self):
+    def tables(self) -> Iterator[tuple[IntArray, ByteArray]]:
         """
         Iterate over tables of messages of one length: pairs (indices, rows).
 
@@ -81,11 +88,11 @@ class Payloads:
         for first, indices, rows in self._parts:
             yield np.arange(first, first + len(rows)) if indices is None else indices, rows
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of messages."""
         return self._count
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[bytes]:
         """Return an iterator over the messages as bytes."""
         messages = [b''] * self._count
         for indices, rows in self.tables():
@@ -94,18 +101,20 @@ class Payloads:
                 messages[index] = data[row * size:(row + 1) * size]
         return iter(messages)
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: Any) -> Any:
         """Return one message as bytes, or a list of them for a slice; copies all of them."""
         return list(self)[index]
 
-    def __eq__(self, other):
+    def __eq__(self, other: object) -> bool:
         """Return whether the messages are those of a list or another Payloads."""
+        if not isinstance(other, (Payloads, list)):
+            return NotImplemented
         return len(self) == len(other) and all(map(bytes.__eq__, self, other))
 
-    __hash__ = None
+    __hash__ = None     # type: ignore[assignment]
 
 
-def alike(numbers):
+def alike(numbers: IntArray) -> Iterator[tuple[int, IntArray]]:
     """
     Group equal numbers, such as the lengths of messages.
 
@@ -118,7 +127,7 @@ def alike(numbers):
             yield int(numbers[places[0]]), places
 
 
-def joined(parts):
+def joined(parts: list[npt.NDArray[Number]]) -> npt.NDArray[Number]:
     """Return the arrays of a list as one; the list is left with that one alone."""
     if len(parts) > 1:
         parts[:] = [np.concatenate(parts)]

@@ -21,6 +21,7 @@ the new one is whole. What is not part of the former bag is never deleted: a fol
 holds anything else is refused.
 """
 
+from collections.abc import Iterable
 import contextlib
 import os
 from pathlib import Path
@@ -28,7 +29,7 @@ import stat
 
 from pam_actuation.bags import disk, layout
 from pam_sim.errors import InputError
-from pam_sim.files import make_folder, reason, shown, try_to_write
+from pam_sim.files import make_folder, reason, shown, StrPath, try_to_write
 
 # Added to the name of a bag while it is written beside the one it replaces, when it ended
 # early and may not, and to the name of the former bag while they change places.
@@ -36,7 +37,7 @@ UNFINISHED, STOPPED, FORMER = '_unfinished', '_stopped', '_former'
 LONGEST_NAME_BYTES = 230      # files and folders of a bag add something to its name
 
 
-def check_bag_target(directory, overwrite=False):
+def check_bag_target(directory: StrPath, overwrite: bool = False) -> Path:
     """
     Look whether a bag can be written to a folder, before the run that fills it.
 
@@ -84,7 +85,7 @@ class BagPlace:
 
     """
 
-    def __init__(self, directory, overwrite=False):
+    def __init__(self, directory: StrPath, overwrite: bool = False) -> None:
         directory = check_bag_target(directory, overwrite)
         self.directory = self.folder = directory
         self._former = _bag_in(directory, overwrite)
@@ -93,7 +94,7 @@ class BagPlace:
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
         make_folder(self.folder)
 
-    def settle(self, whole=True):
+    def settle(self, whole: bool = True) -> Path:
         """
         Put a closed bag in its place; return its folder.
 
@@ -120,11 +121,11 @@ class BagPlace:
         self._former = []
         return self.directory
 
-    def _moved(self):
+    def _moved(self) -> None:
         self.folder, self._made = self.directory, [self.directory]
         disk.sync_directory(self.directory.parent)
 
-    def give_up(self, files):
+    def give_up(self, files: Iterable[Path]) -> None:
         """Remove the given files of a bag that came to nothing, and the folders made for it."""
         for path in files:
             with contextlib.suppress(OSError):
@@ -134,7 +135,7 @@ class BagPlace:
                 folder.rmdir()
 
 
-def _absolute(directory):
+def _absolute(directory: StrPath) -> Path:
     """Return the folder with the links on the way resolved; its own name may be no link."""
     text = os.fspath(directory)
     if not text.strip() or '\0' in text:
@@ -160,7 +161,7 @@ def _absolute(directory):
     return path
 
 
-def _bag_in(directory, overwrite):
+def _bag_in(directory: Path, overwrite: bool) -> list[str]:
     """Return the names of the files of the bag that may be replaced, [] for a free folder."""
     if not directory.is_dir():
         if directory.exists():
@@ -186,7 +187,7 @@ def _bag_in(directory, overwrite):
     return [name for name in ours if name in present]
 
 
-def _files_of_bag(directory):
+def _files_of_bag(directory: Path) -> list[str]:
     """Return the names of metadata.yaml and of the files it lists; InputError without a bag."""
     listed = None
     file = directory / layout.METADATA_FILE
@@ -204,14 +205,14 @@ def _files_of_bag(directory):
         and os.path.basename(name) == name and _is_regular(directory / name)]
 
 
-def _is_regular(path):
+def _is_regular(path: Path) -> bool:
     try:
         return stat.S_ISREG(os.lstat(path).st_mode)
     except OSError:
         return False
 
 
-def _free(directory, name):
+def _free(directory: Path, name: str) -> Path:
     """Return a path beside ``directory`` that nothing has yet: ``name``, else with a number."""
     path, number = directory.with_name(name), 1
     while os.path.lexists(path):

@@ -14,13 +14,23 @@
 
 """Sentences on what in a bag cannot be right, for people who look for the reason."""
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pam_actuation.topics.table import NEEDED, OF_A_RUN, RECORDED, short_name, USED
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
+if TYPE_CHECKING:
+    from pam_actuation.bags.info import TopicInfo
+    from pam_actuation.bags.source import TopicData
+
+Length = Callable[[], float]           # gives the length of the muscle at rest [m]
+# What judges the finite values of a column, their lowest and highest.
+Check = Callable[[FloatArray, float, float, Length], tuple[str, bool]]
 MIN_RATE_HZ = 100.0
 RATE_TOLERANCE = 0.98
 GAP_LIMIT_S = 0.05                     # half of what makes a measurement invalid
@@ -55,7 +65,7 @@ class Implausible:
     unusable: bool = False
 
 
-def recorded_length_m(metadata):
+def recorded_length_m(metadata: Mapping[str, str]) -> float:
     """Return the length of the muscle that a bag's rig tells [m], else that of a DMSP-5-300."""
     from pam_sim import load_rig
     from pam_sim.errors import InputError
@@ -65,7 +75,8 @@ def recorded_length_m(metadata):
         return MUSCLE_LENGTH_M
 
 
-def topic_remarks(topic, info, stamp_ns, values, length_m=None):
+def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
+                  values: Mapping[str, FloatArray], length_m: Length | None = None) -> list[str]:
     """
     Return sentences on one topic.
 
@@ -89,7 +100,8 @@ def topic_remarks(topic, info, stamp_ns, values, length_m=None):
     return remarks + [one.sentence for one in topic_findings(topic.name, values, length_m)]
 
 
-def topic_findings(topic, values, length_m=None):
+def topic_findings(topic: str, values: Mapping[str, FloatArray],
+                   length_m: Length | None = None) -> list[Implausible]:
     """Return what cannot be right in the values of a topic, a list of Implausible."""
     row = OF_A_RUN.get(short_name(topic))
     # Internals may be undefined, such as the time since the tick before the first.
@@ -102,7 +114,7 @@ def topic_findings(topic, values, length_m=None):
             for found in value_findings(topic, name, column, length_m)]
 
 
-def missing_topics(namespaces):
+def missing_topics(namespaces: Mapping[str, Collection[str]]) -> tuple[list[str], list[str]]:
     """
     Return (remarks, notes): sentences on topics that are not there.
 
@@ -125,7 +137,7 @@ def missing_topics(namespaces):
     return remarks, notes
 
 
-def _time_remarks(topic, info, stamp_ns):
+def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:
     remarks = []
     name, row = topic.name, RECORDED.get(short_name(topic.name))
     steady = row is not None and row.steady
@@ -137,7 +149,8 @@ def _time_remarks(topic, info, stamp_ns):
             RATE_TOLERANCE * MIN_RATE_HZ):
         remarks.append(
             f'{name}: {info.rate_hz:.1f} Hz is below {MIN_RATE_HZ:.0f} Hz.')
-    if info.gaps and steady and info.max_gap_s > GAP_LIMIT_S:
+    if info.gaps and steady and info.max_gap_s is not None and info.rate_hz is not None and (
+            info.max_gap_s > GAP_LIMIT_S):
         remarks.append(
             f'{name}: {info.gaps} gaps, the longest {1e3 * info.max_gap_s:.0f} ms at '
             f'{info.rate_hz:.0f} Hz.')
@@ -146,7 +159,7 @@ def _time_remarks(topic, info, stamp_ns):
     return remarks
 
 
-def _clock_remarks(name, delay_ns):
+def _clock_remarks(name: str, delay_ns: IntArray) -> list[str]:
     ahead = int((delay_ns < -FUTURE_LIMIT_NS).sum())
     if ahead:
         return [
@@ -160,7 +173,8 @@ def _clock_remarks(name, delay_ns):
     return []
 
 
-def value_findings(topic, name, column, length_m=None):
+def value_findings(topic: str, name: str, column: FloatArray,
+                   length_m: Length | None = None) -> list[Implausible]:
     """
     Return what cannot be right in one column of values, a list of Implausible.
 
@@ -199,17 +213,17 @@ def value_findings(topic, name, column, length_m=None):
     return found
 
 
-def _usual_length():
+def _usual_length() -> float:
     return MUSCLE_LENGTH_M
 
 
-def _unit(low, high, unit, likely, fix):
+def _unit(low: float, high: float, unit: str, likely: str, fix: str) -> tuple[str, bool]:
     """Return the sentence of a wrong unit; the numbers are told as they were read."""
     return (f'the values, {low:.4g} to {high:.4g}, cannot be {unit}: they are likely {likely}. '
             f'{fix}'), True
 
 
-def _pressure(finite, low, high, length_m):
+def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
     if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA:
         if high <= P_ATM_PA + MAX_GAUGE_PA:
             return '', False
@@ -236,13 +250,14 @@ def _pressure(finite, low, high, length_m):
             f'gauge.{hint}'), bool(hint)
 
 
-def _supply(finite, low, high, length_m):
+def _supply(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
     if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA and high <= MOST_SUPPLY_PA:
         return '', False
     return _pressure(finite, low, high, length_m)
 
 
-def _contraction(finite, low, high, length_m):
+def _contraction(finite: FloatArray, low: float, high: float,
+                 length_m: Length) -> tuple[str, bool]:
     if low >= -CONTRACTION_MARGIN_M and high <= LEAST_LIMIT_M:
         return '', False
     length = length_m()
@@ -263,13 +278,13 @@ def _contraction(finite, low, high, length_m):
             f'{1e3 * limit:.0f} mm (25 % of a {1e3 * length:.0f} mm muscle).{hint}'), False
 
 
-def _force(finite, low, high, length_m):
+def _force(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
     if max(-low, high) < MOST_N:
         return '', False
     return _unit(low, high, 'N', 'mN', 'Divide them by 1000; the topic is in N.')
 
 
-def _duty(finite, low, high, length_m):
+def _duty(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
     if low >= 0.0 and high <= 1.0:
         return '', False
     if low >= 0.0 and 1.5 < high <= 100.0:
@@ -277,7 +292,7 @@ def _duty(finite, low, high, length_m):
     return f'a duty from {low:.3g} to {high:.3g} leaves 0 to 1.', False
 
 
-def _voltage(finite, low, high, length_m):
+def _voltage(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
     if low >= 0.0 and high <= MAX_VOLTAGE:
         return '', False
     if low >= 0.0 and 1e2 < high <= 1e3 * MAX_VOLTAGE:
@@ -285,6 +300,7 @@ def _voltage(finite, low, high, length_m):
     return f'{low:.3g} to {high:.3g} V leaves 0 to 10 V.', False
 
 
-_CHECKS = {('supply_pressure', 'pressure_pa'): _supply, 'pressure_pa': _pressure,
-           'contraction_m': _contraction, 'force_n': _force, 'fill_duty': _duty,
-           'vent_duty': _duty, 'ppr_voltage': _voltage}
+_CHECKS: dict[str | tuple[str, str], Check] = {
+    ('supply_pressure', 'pressure_pa'): _supply, 'pressure_pa': _pressure,
+    'contraction_m': _contraction, 'force_n': _force, 'fill_duty': _duty, 'vent_duty': _duty,
+    'ppr_voltage': _voltage}

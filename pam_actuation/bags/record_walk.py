@@ -14,8 +14,12 @@
 
 """Find the messages among MCAP records: one compiled loop instead of a Python call each."""
 
+from typing import Any
+
 from numba import njit
 import numpy as np
+from pam_sim.annotations import ByteArray, IntArray
+from pam_sim.compiled import Compiler
 
 RECORD_BYTES = 9                       # opcode and length in front of every record
 MESSAGE_BYTES = RECORD_BYTES + 22      # and channel, sequence and two times of a message
@@ -26,8 +30,11 @@ MESSAGE_HEAD = np.dtype([
     ('log_time_ns', '<u8'), ('publish_time_ns', '<u8')])
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
-def walk_messages(data, begin, positions):
+_compiled: Compiler = njit(cache=True, error_model='numpy', nogil=True)
+
+
+@_compiled
+def walk_messages(data: ByteArray, begin: int, positions: IntArray) -> tuple[int, int]:
     """
     Walk over the message records that follow each other from ``begin`` on.
 
@@ -52,7 +59,7 @@ def walk_messages(data, begin, positions):
     position, count = begin, 0
     while (count < len(positions) and position + MESSAGE_BYTES <= len(data)
            and data[position] == MESSAGE_OPCODE):
-        length = np.int64(0)
+        length: Any = np.int64(0)
         for i in range(8):
             length |= np.int64(data[position + 1 + i]) << np.int64(8 * i)
         # A length with its highest bit set has become negative.
@@ -64,7 +71,7 @@ def walk_messages(data, begin, positions):
     return count, position
 
 
-def windows(data, size):
+def windows(data: ByteArray, size: int) -> 'np.ndarray[Any, np.dtype[np.void]]':
     """
     Return every run of ``size`` bytes of ``data`` as one item of bytes, without a copy.
 

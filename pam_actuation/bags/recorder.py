@@ -21,18 +21,23 @@ the disk cannot follow, the newest messages are dropped and counted.
 """
 
 from collections import deque
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field, replace
 import os
 import threading
 import time
+from typing import Any
 
 from pam_actuation.bags import disk
-from pam_actuation.bags.ending import ERROR
+from pam_actuation.bags.ending import Ending, ERROR
 from pam_actuation.bags.losses import (
     DIAGNOSTICS, missing_messages, PublishedCounts, SentTimes)
+from pam_actuation.bags.writer import BagWriter
 from pam_sim.errors import InputError
 
+# Topic, bytes, receive and send time [ns] of messages that wait for the disk.
+Batch = deque[tuple[str, bytes, int, int]]
 RECORDING_RECORD = 'pam_recording'
 WRITE_EVERY_S = 0.1         # the writer thread takes what has come, in few large portions
 WAKE_AT = 1000              # messages that wake it earlier
@@ -69,35 +74,35 @@ class RecordingSummary:
     """
 
     path: str
-    counts: dict = field(default_factory=dict)
+    counts: dict[str, TopicCounts] = field(default_factory=dict)
     write_error: str = ''
 
     @property
-    def received(self):
+    def received(self) -> int:
         """Return how many messages arrived on all topics."""
         return sum(counts.received for counts in self.counts.values())
 
     @property
-    def written(self):
+    def written(self) -> int:
         """Return how many messages are in the bag."""
         return sum(counts.written for counts in self.counts.values())
 
     @property
-    def dropped(self):
+    def dropped(self) -> int:
         """Return how many messages arrived but are not in the bag."""
         return sum(counts.dropped for counts in self.counts.values())
 
     @property
-    def lost(self):
+    def lost(self) -> int:
         """Return how many messages are known never to have arrived."""
         return sum(counts.lost or 0 for counts in self.counts.values())
 
     @property
-    def complete(self):
+    def complete(self) -> bool:
         """Return whether nothing is missing."""
         return not (self.write_error or self.dropped or self.lost)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the summary as plain data for JSON."""
         return {
             'path': self.path, 'complete': self.complete, 'write_error': self.write_error,
@@ -116,13 +121,13 @@ class SequenceCheck:
     publisher, and any other is the smallest possible gap.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.lost = 0
         self.missed_at_start = 0
         self.publishers = 0
-        self._expected = {}
+        self._expected: dict[Hashable, list[int]] = {}
 
-    def add(self, sequence, publisher=None):
+    def add(self, sequence: int, publisher: Hashable = None) -> None:
         """Take the sequence number of the next message of the topic."""
         expected = self._expected.setdefault(publisher, [])
         # The publisher heard last is tried first.
@@ -157,21 +162,22 @@ class RecorderCore:
 
     """
 
-    def __init__(self, writer, max_queued=20_000, flush_every_s=0.4):
+    def __init__(self, writer: BagWriter, max_queued: int = 20_000,
+                 flush_every_s: float = 0.4) -> None:
         if max_queued < 1:
             raise InputError(f'{max_queued} is below 1 message', 'max_queued')
         self._writer = writer
         self._max_queued = max_queued
         self._flush_every_s = flush_every_s
-        self._queue = deque()
+        self._queue: Batch = deque()
         self._wake = threading.Condition()       # guards the queue and the counts
         self._disk = threading.Lock()            # guards the writer; never taken inside _wake
-        self._counts = {}
-        self._checks = {}
+        self._counts: dict[str, TopicCounts] = {}
+        self._checks: dict[str, SequenceCheck] = {}
         self._published = PublishedCounts()
-        self._sent = {}
+        self._sent: dict[str, SentTimes] = {}
         self._closing = False
-        self._summary = None
+        self._summary: RecordingSummary | None = None
         self.write_error = ''
         self._thread = threading.Thread(target=self._run, name='bag_writer', daemon=True)
         self._thread.start()
@@ -179,7 +185,8 @@ class RecorderCore:
         self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
         self._syncing.start()
 
-    def add_topic(self, full_name, type_name, check_sequence=None, qos=None):
+    def add_topic(self, full_name: str, type_name: str, check_sequence: bool | None = None,
+                  qos: Sequence[dict[str, Any]] | None = None) -> None:
         """
         Announce a topic before its messages.
 
@@ -195,8 +202,9 @@ class RecorderCore:
             if watch:
                 self._checks.setdefault(full_name, SequenceCheck())
 
-    def receive(self, full_name, data, source_timestamp_ns, receive_timestamp_ns,
-                sequence=None, publisher=None):
+    def receive(self, full_name: str, data: bytes, source_timestamp_ns: int,
+                receive_timestamp_ns: int, sequence: int | None = None,
+                publisher: Hashable = None) -> bool:
         """
         Take one serialized message; returns False if it had to be dropped.
 
@@ -237,7 +245,8 @@ class RecorderCore:
                 self._wake.notify()
             return True
 
-    def receive_all(self, full_name, messages):
+    def receive_all(self, full_name: str,
+                    messages: Iterable[tuple[bytes, Mapping[str, Any]]]) -> int:
         """
         Take what arrived on one topic, in order.
 
@@ -263,22 +272,22 @@ class RecorderCore:
                 for data, info in messages)
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, TopicCounts]:
         """Return a copy of the counts of every topic, by full name."""
         with self._wake:
             return {name: TopicCounts(**asdict(counts)) for name, counts in self._counts.items()}
 
     @property
-    def queued(self):
+    def queued(self) -> int:
         """Return how many messages wait for the disk."""
         return len(self._queue)
 
-    def add_metadata(self, name, values):
+    def add_metadata(self, name: str, values: Mapping[str, object]) -> None:
         """Put a named record of texts into the bag."""
         with self._disk:
             self._writer.add_metadata(name, values)
 
-    def close(self, ending=None):
+    def close(self, ending: Ending | None = None) -> RecordingSummary:
         """
         Write what is queued, finish the bag and return the RecordingSummary.
 
@@ -312,14 +321,14 @@ class RecorderCore:
             str(self._writer.directory), self.counts, self.write_error)
         return self._summary
 
-    def _fail(self, error):
+    def _fail(self, error: Exception) -> None:
         if not self.write_error:
             reason = getattr(error, 'strerror', None) or error
             self.write_error = (
                 f'{self._writer.directory}: writing failed ({reason}); the bag ends early, free '
                 'some space or record elsewhere')
 
-    def _count_what_is_kept(self):
+    def _count_what_is_kept(self) -> None:
         """Take back what was half written; only what is in the file counts as written."""
         with contextlib.suppress(OSError):
             self._writer.cut()
@@ -329,7 +338,7 @@ class RecorderCore:
                 counts.written = kept.get(name, 0)
                 counts.dropped = counts.received - counts.written
 
-    def _count_what_never_came(self):
+    def _count_what_never_came(self) -> None:
         """Hold what arrived against what the nodes say they have published."""
         with self._wake:
             for name, counts in self._counts.items():
@@ -342,7 +351,7 @@ class RecorderCore:
                     counts.lost, published, by_then,
                     counts.dropped + (counts.missed_at_start or 0))
 
-    def _run(self):
+    def _run(self) -> None:
         flushed = time.monotonic()
         while True:
             with self._wake:
@@ -358,7 +367,7 @@ class RecorderCore:
                 flushed = now
             self._write(batch, flush)
 
-    def _sync(self):
+    def _sync(self) -> None:
         """Bring what was written onto the disk; a slow one must not hold up the writing."""
         while not self._ended.wait(self._flush_every_s):
             with self._disk:
@@ -371,9 +380,9 @@ class RecorderCore:
                 finally:
                     os.close(handle)
 
-    def _write(self, batch, flush):
-        written = {}
-        refused = {}
+    def _write(self, batch: Batch, flush: bool) -> None:
+        written: dict[str, int] = {}
+        refused: dict[str, int] = {}
         with self._disk:
             try:
                 while batch and not self.write_error:
@@ -395,7 +404,7 @@ class RecorderCore:
                 self._counts[name].dropped += number
 
 
-def _as_texts(counts, write_error):
+def _as_texts(counts: Mapping[str, TopicCounts], write_error: str) -> dict[str, str]:
     """Return the counts as flat texts: ``<topic>.received`` and so on."""
     texts = {
         f'{name}.{key}': 'unknown' if value is None else str(value)

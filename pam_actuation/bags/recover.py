@@ -20,12 +20,14 @@ indexes, the statistics and metadata.yaml are made anew. A file is replaced only
 its successor is complete and on the disk.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import io
 import mmap
 import os
 from pathlib import Path
 import struct
+from typing import Any
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -38,6 +40,7 @@ from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
 from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 
 RECOVERY_RECORD = 'pam_recovery'
 DAMAGED_SUFFIX = '.damaged'
@@ -66,18 +69,18 @@ class Recovery:
 
     path: str
     changed: bool
-    files: list
+    files: list[RecoveredFile]
 
     @property
-    def messages(self):
+    def messages(self) -> int:
         """Return how many messages the bag holds."""
         return sum(file.messages for file in self.files)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""
         return {**asdict(self), 'messages': self.messages}
 
-    def sentences(self):
+    def sentences(self) -> list[str]:
         """Return what was done, one sentence per line."""
         if not self.changed:
             return ['Nothing to repair: the bag is whole.']
@@ -91,7 +94,7 @@ class Recovery:
         return lines or [f'{layout.METADATA_FILE} rebuilt.']
 
 
-def recover_bag(path):
+def recover_bag(path: StrPath) -> Recovery:
     """
     Repair a bag where it lies; a whole bag is left untouched.
 
@@ -126,12 +129,12 @@ def recover_bag(path):
             'as it was, copy it where there is space and the right to write', path) from None
 
 
-def _by_number(path):
+def _by_number(path: Path) -> tuple[int, str]:
     digits = path.stem.rsplit('_', 1)[-1]
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 
-def _recover(path, files):
+def _recover(path: Path, files: Sequence[Path]) -> Recovery:
     contents, done = _Contents(), []
     for file in files:
         done.append(_recover_file(file, contents))
@@ -142,7 +145,7 @@ def _recover(path, files):
     return Recovery(str(path), changed, done)
 
 
-def _announced(path):
+def _announced(path: Path) -> object:
     """Return the number of messages metadata.yaml announces, None if it cannot be read."""
     try:
         text = (path / layout.METADATA_FILE).read_text(encoding='utf-8')
@@ -154,12 +157,12 @@ def _announced(path):
 class _Contents:
     """The topics and files seen so far, for metadata.yaml."""
 
-    def __init__(self):
-        self._files = []
-        self._topics = {}
-        self._experiment = {}
+    def __init__(self) -> None:
+        self._files: list[layout.FileFacts] = []
+        self._topics: dict[str, layout.TopicFacts] = {}
+        self._experiment: dict[str, str] = {}
 
-    def add(self, name, writer, records):
+    def add(self, name: str, writer: McapWriter, records: dict[str, dict[str, str]]) -> None:
         """Take over what a file holds, as its writer knows it."""
         counts = writer.counts
         self._files.append(layout.FileFacts(name, *writer.span_ns, sum(counts.values())))
@@ -172,12 +175,12 @@ class _Contents:
                 counts.get(number, 0) + (before.count if before else 0))
         self._experiment = records.get(EXPERIMENT_RECORD, self._experiment)
 
-    def metadata(self):
+    def metadata(self) -> dict[str, Any]:
         """Return the content of metadata.yaml."""
         return layout.bag_metadata(self._files, list(self._topics.values()), self._experiment)
 
 
-def _profiles(channel):
+def _profiles(channel: Any) -> tuple[dict[str, Any], ...]:
     try:
         profiles = layout.from_yaml(channel.metadata.get('offered_qos_profiles', '') or '[]')
         return tuple(dict(profile) for profile in profiles)
@@ -185,7 +188,7 @@ def _profiles(channel):
         return ()
 
 
-def _recover_file(file, contents):
+def _recover_file(file: Path, contents: '_Contents') -> RecoveredFile:
     with open(file, 'rb') as stream:
         if not disk.lock(stream):
             raise InputError('the file is still being recorded; end the recording first', file)
@@ -199,7 +202,7 @@ def _recover_file(file, contents):
             return _rebuild(file, data, contents)
 
 
-def _rebuild(file, data, contents):
+def _rebuild(file: Path, data: bytes | mmap.mmap, contents: '_Contents') -> RecoveredFile:
     temporary = file.with_name(f'.{file.name}.{os.getpid()}')
     try:
         with open(temporary, 'xb', buffering=0) as stream:
@@ -228,12 +231,14 @@ def _rebuild(file, data, contents):
         temporary.unlink(missing_ok=True)
 
 
-def _copy(data, writer):
+def _copy(
+        data: bytes | mmap.mmap,
+        writer: McapWriter) -> tuple[dict[str, dict[str, str]], mcap_salvage.Walk]:
     """Copy what is whole; returns the named records of texts and what was lost."""
     named = {}
     walk = mcap_salvage.Walk(data)
     for opcode, content, records in walk:
-        if opcode == Opcode.CHUNK:
+        if records is not None:             # a chunk
             writer.copy_chunk(content, records)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             if not writer.copy_record(opcode, content):
@@ -252,7 +257,7 @@ def _copy(data, writer):
     return named, walk
 
 
-def _is_indexed(file, messages):
+def _is_indexed(file: Path, messages: int) -> bool:
     """Tell whether the file's own index is there and counts the same messages."""
     try:
         with open(file, 'rb') as stream:
@@ -266,7 +271,7 @@ def _is_indexed(file, messages):
         len(summary.chunk_indexes) == chunks and (chunks > 0 or not messages))
 
 
-def _keep_former(file):
+def _keep_former(file: Path) -> str:
     """Give a file that is damaged inside a second name, so that nothing is thrown away."""
     kept = file.with_name(file.name + DAMAGED_SUFFIX)
     number = 1

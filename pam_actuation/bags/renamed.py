@@ -14,14 +14,20 @@
 
 """Topics of a bag that have other names than those of this project."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 from pam_actuation.topics.table import OF_A_RUN
 from pam_sim.errors import did_you_mean, InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.source import Bag, TopicData
 
 # What a run can hold, by the names of this project.
 NAMES = tuple(OF_A_RUN)
 
 
-def checked(topics):
+def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
     """
     Return {own name: name in the bag, beginning with a slash} of what a user gave.
 
@@ -31,7 +37,7 @@ def checked(topics):
         A name that is none of this project, a topic that is no text, or one given twice.
 
     """
-    found = {}
+    found: dict[str, str] = {}
     for short, name in (topics or {}).items():
         if short not in NAMES:
             raise InputError(f'`{short}` is no topic of a run{did_you_mean(short, NAMES)}; '
@@ -46,7 +52,7 @@ def checked(topics):
     return found
 
 
-def topics_by_name(bag, wanted):
+def topics_by_name(bag: 'Bag', wanted: Mapping[str, str]) -> dict[str, 'TopicData']:
     """
     Return {own name: TopicData} of the topics that ``wanted`` names in a bag.
 

@@ -20,18 +20,26 @@ The layout is worked out once and all messages that have the same bytes in the
 deciding places are read together as columns of one array.
 """
 
+from collections.abc import Collection, Sequence
+from typing import Any
+
 import numpy as np
 from pam_actuation.bags.payloads import Payloads
 from pam_actuation.topics import cdr
 from pam_actuation.topics.codec import UNREADABLE
+from pam_actuation.topics.contents import Numeric
 from pam_actuation.topics.definitions import little_endian
 from pam_actuation.topics.table import topic_of
+from pam_sim.annotations import BoolArray, ByteArray, FloatArray, IntArray
 
+Messages = Payloads | Sequence[bytes]
 # Layouts of equal length that are looked for together; what is left is read one by one.
 _MAX_LAYOUTS = 8
 
 
-def table(short, payloads, only=None):
+def table(
+        short: str, messages: Messages,
+        only: Collection[str] | None = None) -> tuple[IntArray, dict[str, FloatArray], BoolArray]:
     """
     Return (stamps, values, bad) of the messages of one topic.
 
@@ -39,7 +47,7 @@ def table(short, payloads, only=None):
     ----------
     short : str
         Short name of a topic that carries numbers.
-    payloads : Payloads or list of bytes
+    messages : Payloads or list of bytes
         CDR bytes, N messages.
     only : collection of str, optional
         Names of the values wanted, of topics with named entries; by default all.
@@ -54,12 +62,13 @@ def table(short, payloads, only=None):
         Messages that are not of the topic's type.
 
     """
-    payloads = _payloads(payloads)
+    payloads = _payloads(messages)
     content = topic_of(short).numeric
+    assert content is not None
     count = len(payloads)
     stamp_ns = np.zeros(count, dtype=np.int64)
     bad = np.zeros(count, dtype=bool)
-    values = {name: np.full(count, np.nan) for name in content.always}
+    values: dict[str, FloatArray] = {name: np.full(count, np.nan) for name in content.always}
     for indices, rows in payloads.tables():
         for _ in range(_MAX_LAYOUTS):
             if len(indices):
@@ -70,13 +79,13 @@ def table(short, payloads, only=None):
     return stamp_ns, values, bad
 
 
-def stamps(payloads):
+def stamps(messages: Messages) -> IntArray:
     """
     Return ``header.stamp`` [ns] of N messages of any stamped type, shape (N,).
 
     Raises CdrError where one is too short or not little-endian.
     """
-    payloads = _payloads(payloads)
+    payloads = _payloads(messages)
     stamp_ns = np.zeros(len(payloads), dtype=np.int64)
     for indices, rows in payloads.tables():
         cdr.stamp_of(rows[0].tobytes())
@@ -86,11 +95,13 @@ def stamps(payloads):
     return stamp_ns
 
 
-def _payloads(messages):
+def _payloads(messages: Messages) -> Payloads:
     return messages if isinstance(messages, Payloads) else Payloads(messages)
 
 
-def _read_alike(content, indices, rows, stamp_ns, values, bad, only):
+def _read_alike(content: Numeric, indices: IntArray, rows: ByteArray, stamp_ns: IntArray,
+                values: dict[str, FloatArray], bad: BoolArray,
+                only: Collection[str] | None) -> tuple[IntArray, ByteArray]:
     """Read the messages that have the layout of the first one; return the others."""
     first = rows[0].tobytes()
     try:
@@ -115,7 +126,8 @@ def _read_alike(content, indices, rows, stamp_ns, values, bad, only):
     return indices[~alike], rows[~alike]
 
 
-def _fill(layout, indices, rows, stamp_ns, values):
+def _fill(layout: cdr.Layout, indices: IntArray, rows: ByteArray, stamp_ns: IntArray,
+          values: dict[str, FloatArray]) -> None:
     """Copy the numbers of messages of one layout to their places."""
     stamp_ns[indices] = _stamp_column(rows)
     for name, offset in layout.columns.items():
@@ -125,7 +137,7 @@ def _fill(layout, indices, rows, stamp_ns, values):
             values[name][indices] = _column(rows, offset, '<f8')
 
 
-def _alike(rows, fixed):
+def _alike(rows: ByteArray, fixed: Sequence[tuple[int, int]]) -> BoolArray:
     """Return which rows have the bytes of the first one in the ranges ``fixed``, shape (n,)."""
     alike = np.ones(len(rows), dtype=bool)
     for begin, end in fixed:
@@ -138,10 +150,10 @@ def _alike(rows, fixed):
     return alike
 
 
-def _stamp_column(rows):
+def _stamp_column(rows: ByteArray) -> IntArray:
     return _column(rows, 4, '<i4').astype(np.int64) * cdr.NS_PER_S + _column(rows, 8, '<u4')
 
 
-def _column(rows, offset, kind):
+def _column(rows: ByteArray, offset: int, kind: str) -> Any:
     """Return the numbers at one offset of every row as a view, shape (n,)."""
     return np.ndarray(len(rows), kind, rows, offset, strides=rows.strides[:1])

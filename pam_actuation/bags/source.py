@@ -20,25 +20,31 @@ All of it is read into memory as bytes per topic; decoding is the business of
 that rosbag2 writes through the ``rosbags`` package.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pam_actuation.bags import layout
-from pam_actuation.bags.mcap_scan import MAGIC, scan
+from pam_actuation.bags.mcap_scan import Damaged, MAGIC, McapContent, scan
+from pam_actuation.bags.message_batch import MessageColumns
 from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
+from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
-from pam_sim.files import refuse_pipe
+from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.short_repr import short_repr
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
+# Whether to keep the messages of a topic, by its name, message type and encoding.
+Wanted = Callable[[str, str, str], bool]
 _LONGEST_REASON = 300
 _RECOVER = 'or read that beginning with the option recover'
 
 
-def _no_times():
+def _no_times() -> IntArray:
     return np.zeros(0, dtype=np.int64)
 
 
@@ -51,8 +57,8 @@ class TopicData:
     type_name: str
     encoding: str = 'cdr'
     payloads: Payloads = field(default_factory=Payloads)
-    log_time_ns: np.ndarray = field(default_factory=_no_times)
-    publish_time_ns: np.ndarray = field(default_factory=_no_times)
+    log_time_ns: IntArray = field(default_factory=_no_times)
+    publish_time_ns: IntArray = field(default_factory=_no_times)
 
 
 @dataclass
@@ -67,23 +73,23 @@ class Bag:
 
     path: Path
     storage: str
-    topics: dict = field(default_factory=dict)
-    records: dict = field(default_factory=dict)
-    remarks: list = field(default_factory=list)
+    topics: dict[str, TopicData] = field(default_factory=dict)
+    records: dict[str, dict[str, str]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
     recovered: bool = False
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """Return the number of messages per full topic name."""
         return {name: len(topic.payloads) for name, topic in self.topics.items()}
 
     @property
-    def experiment(self):
+    def experiment(self) -> dict[str, str]:
         """Return the ``pam_experiment`` record; empty where the bag has none."""
         return dict(self.records.get(EXPERIMENT_RECORD, {}))
 
 
-def read_bag(path, recover=False, wanted=None):
+def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None) -> Bag:
     """
     Read a bag into memory.
 
@@ -125,7 +131,7 @@ def read_bag(path, recover=False, wanted=None):
         'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
 
 
-def _read_directory(path, recover, wanted):
+def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
     facts = _directory_facts(path)
     if facts is None:
         files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
@@ -161,7 +167,7 @@ def _read_directory(path, recover, wanted):
     return bag
 
 
-def _directory_facts(path):
+def _directory_facts(path: Path) -> dict[str, Any] | None:
     """Return what metadata.yaml says, None where there is no such file."""
     file = path / layout.METADATA_FILE
     if not file.is_file():
@@ -181,21 +187,21 @@ def _directory_facts(path):
         'without it', file)
 
 
-def _is_file_name(name):
+def _is_file_name(name: object) -> bool:
     return isinstance(name, str) and 0 < len(name) < 4096 and name.isprintable()
 
 
-def _by_number(path):
+def _by_number(path: Path) -> tuple[int, str]:
     """Return a sort key: run_2 before run_10."""
     digits = path.stem.rsplit('_', 1)[-1]
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 
-def _read_mcap(path, files, recover, wanted):
+def _read_mcap(path: Path, files: Sequence[Path], recover: bool, wanted: Wanted | None) -> Bag:
     bag = Bag(path=path, storage='mcap')
     keep = None if wanted is None else (
         lambda topic, type_name, encoding: wanted(topic, _full_type_name(type_name), encoding))
-    pieces = {}
+    pieces: dict[str, list[MessageColumns]] = {}
     for file in files:
         with open(file, 'rb') as stream:
             _refuse_foreign(stream.read(len(MAGIC)), file)
@@ -205,7 +211,8 @@ def _read_mcap(path, files, recover, wanted):
                 f'{content.message_count} messages before that can still be read')
             if not content.message_count or not recover:
                 raise InputError(
-                    _damage_sentence(content, file.stat().st_size, readable), file)
+                    _damage_sentence(content.damage, content.message_count,
+                                     file.stat().st_size, readable), file)
             bag.recovered = True
             bag.remarks.append(
                 f'{file.name} ended early or is damaged ({content.damage}); {readable}.')
@@ -215,7 +222,7 @@ def _read_mcap(path, files, recover, wanted):
     return bag
 
 
-def _refuse_foreign(begin, file):
+def _refuse_foreign(begin: bytes, file: Path) -> None:
     if not begin:
         raise InputError('the file is empty; record again or give another bag', file)
     if not MAGIC.startswith(begin):
@@ -224,17 +231,18 @@ def _refuse_foreign(begin, file):
             file)
 
 
-def _damage_sentence(content, size, readable):
-    if not content.message_count:
+def _damage_sentence(damage: Damaged, count: int, size: int, readable: str) -> str:
+    if not count:
         readable = 'no message can be read: give another bag'
     else:
         readable += f': record again, {_RECOVER}'
-    if content.damage.problem.startswith(('the file ends', 'the end mark')):
+    if damage.problem.startswith(('the file ends', 'the end mark')):
         return f'the recording ended early (no end mark after {size} bytes); {readable}'
-    return f'the file is damaged ({content.damage}); {readable}'
+    return f'the file is damaged ({damage}); {readable}'
 
 
-def _add_content(bag, content, pieces):
+def _add_content(bag: Bag, content: McapContent,
+                 pieces: dict[str, list['MessageColumns']]) -> None:
     """Note a file's topics in the bag and their messages in ``pieces``, by topic."""
     bag.records.update(content.metadata)
     for channel in content.channels.values():
@@ -249,28 +257,30 @@ def _add_content(bag, content, pieces):
         pieces.setdefault(channel.topic, []).append(channel.messages)
 
 
-def _join(topic, pieces):
+def _join(topic: TopicData, pieces: Sequence['MessageColumns']) -> None:
     for messages in pieces:
         topic.payloads.extend(messages.payloads)
     topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])
     topic.publish_time_ns = joined([messages.publish_time_ns for messages in pieces])
 
 
-def _full_type_name(name):
+def _full_type_name(name: str) -> str:
     """Return package/msg/Name also for the short package/Name that some writers use."""
     package, _, rest = name.partition('/')
     return f'{package}/msg/{rest}' if rest and '/' not in rest else name
 
 
-def _read_with_rosbags(path, opened, wanted):
+def _read_with_rosbags(path: Path, opened: Path, wanted: Wanted | None) -> Bag:
     bag = Bag(path=path, storage='sqlite3')
     try:
         with Reader(opened) as reader:
             for connection in reader.connections:
                 bag.topics.setdefault(
                     connection.topic, TopicData(connection.topic, connection.msgtype))
-            raws, times = ({name: [] for name in bag.topics} for _ in range(2))
-            read, counted = [], []
+            raws: dict[str, list[bytes]] = {name: [] for name in bag.topics}
+            times: dict[str, list[int]] = {name: [] for name in bag.topics}
+            read: list[Any] = []
+            counted: list[Any] = []
             for connection in reader.connections:
                 topic = bag.topics[connection.topic]
                 if connection.msgtype == topic.type_name:
@@ -298,13 +308,13 @@ def _read_with_rosbags(path, opened, wanted):
     return bag
 
 
-def _short(error):
+def _short(error: object) -> str:
     """Return the text of a library's error as part of one sentence."""
     text = ' '.join(str(error).split())
     return text if len(text) < _LONGEST_REASON else f'{text[:_LONGEST_REASON]} …'
 
 
-def _add_custom_data(bag, custom):
+def _add_custom_data(bag: Bag, custom: object) -> None:
     """Take the experiment from metadata.yaml where the file itself has no record of it."""
     if isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
         texts = {

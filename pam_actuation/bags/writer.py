@@ -21,13 +21,17 @@ records. With a limit of size or time ``run_1.mcap`` and so on follow, each a co
 file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
+from collections.abc import Mapping, Sequence
 import contextlib
+from pathlib import Path
+from typing import Any, Self
 
 from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
 from pam_actuation.bags.place import BagPlace
 from pam_actuation.topics.definitions import type_hash
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 
 # Every file holds the metadata of the experiment; a smaller limit would be full of it.
 SMALLEST_FILE_BYTES = 100_000
@@ -66,27 +70,34 @@ class BagWriter:
 
     """
 
-    def __init__(self, directory, metadata=None, overwrite=False, max_file_bytes=0,
-                 max_file_s=0.0):
+    def __init__(self, directory: StrPath, metadata: Mapping[str, Any] | None = None,
+                 overwrite: bool = False, max_file_bytes: int = 0,
+                 max_file_s: float = 0.0) -> None:
         check_limits(max_file_bytes, max_file_s)
         self._place = BagPlace(directory, overwrite)
         self.directory = self._place.directory
         self._records = _records(metadata or {})
         self._limit_bytes = max_file_bytes or float('inf')
         self._limit_ns = round(max_file_s * 1e9) or float('inf')
-        self._topics = {}
-        self._finished = []
-        self._in_former_files = {}
+        self._topics: dict[str, dict[str, Any]] = {}
+        self._finished: list[layout.FileFacts] = []
+        self._in_former_files: dict[str, int] = {}
         self._closed = self.finished = False
         self._whole = True
-        self._current = None
+        self._current: DataFile | None = None
         try:
             self._current = self._next_file()
         except OSError:
             self._place.give_up([])
             raise
 
-    def _next_file(self):
+    @property
+    def _open(self) -> DataFile:
+        """Return the file that is being written."""
+        assert self._current is not None, 'the bag is closed'
+        return self._current
+
+    def _next_file(self) -> DataFile:
         """Begin the next file: header, metadata, all topics so far."""
         number = len(self._finished) + (self._current is not None)
         made = DataFile(
@@ -94,14 +105,14 @@ class BagWriter:
         disk.sync_directory(self._place.folder)
         return made
 
-    def _begin(self, file):
+    def _begin(self, file: DataFile) -> None:
         self._write_rosbag2_record(file)
         for name, texts in self._records.items():
             file.mcap.add_metadata(name, texts)
         for name, facts in self._topics.items():
             file.register(name, facts['type'], facts['qos'], facts['hash'])
 
-    def _split(self):
+    def _split(self) -> None:
         # The next file first: where it cannot be made, the present one can still be finished.
         following = self._next_file()
         self._finish_file()
@@ -109,23 +120,24 @@ class BagWriter:
         self._in_former_files = self.counts
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """Return the messages written so far, by full topic name."""
         return {name: facts['count'] for name, facts in self._topics.items()}
 
     @property
-    def files(self):
+    def files(self) -> list[Path]:
         """Return the paths of all files of the bag, in order."""
         names = [facts.name for facts in self._finished]
         names += [] if self._current is None else [self._current.path.name]
         return [self._place.folder / name for name in names]
 
     @property
-    def file(self):
+    def file(self) -> Path:
         """Return the path of the newest file."""
         return self.files[-1]
 
-    def add_topic(self, full_name, type_name, qos=None):
+    def add_topic(self, full_name: str, type_name: str,
+                  qos: Sequence[dict[str, Any]] | None = None) -> None:
         """
         Announce a topic; a second call with the same type changes nothing.
 
@@ -146,36 +158,38 @@ class BagWriter:
             'type': type_name, 'qos': tuple(profiles), 'hash': type_hash(type_name),
             'count': 0}
         facts = self._topics[full_name]
-        self._current.register(full_name, type_name, facts['qos'], facts['hash'])
+        self._open.register(full_name, type_name, facts['qos'], facts['hash'])
 
-    def write(self, full_name, cdr_bytes, log_time_ns, publish_time_ns):
+    def write(self, full_name: str, cdr_bytes: bytes, log_time_ns: int,
+              publish_time_ns: int) -> None:
         """
         Append one message: receive time and send time [ns]; KeyError for an unknown topic.
 
         Raises OSError when the file system refuses; what was written before stays.
         """
-        file = self._current
-        if file.count and (log_time_ns - file.start_ns >= self._limit_ns
-                           or file.size >= self._limit_bytes):
+        file = self._open
+        if file.start_ns is not None and (log_time_ns - file.start_ns >= self._limit_ns
+                                          or file.size >= self._limit_bytes):
             self._split()
-        self._current.write(full_name, cdr_bytes, log_time_ns, publish_time_ns)
+            file = self._open
+        file.write(full_name, cdr_bytes, log_time_ns, publish_time_ns)
         self._topics[full_name]['count'] += 1
 
-    def add_metadata(self, name, values):
+    def add_metadata(self, name: str, values: Mapping[str, object]) -> None:
         """Append a named metadata record of texts."""
-        self._current.mcap.add_metadata(name, _texts(values))
+        self._open.mcap.add_metadata(name, _texts(values))
 
-    def add_to_experiment(self, texts):
+    def add_to_experiment(self, texts: Mapping[str, object]) -> None:
         """Add to the ``pam_experiment`` record: it is written anew, readers take the last."""
         self._records[EXPERIMENT_RECORD] = {
             **self._records.get(EXPERIMENT_RECORD, {}), **_texts(texts)}
         self.add_metadata(EXPERIMENT_RECORD, self._records[EXPERIMENT_RECORD])
 
-    def flush(self):
+    def flush(self) -> None:
         """Close the open chunk, so that all messages written survive the end of the process."""
-        self._current.mcap.close_chunk()
+        self._open.mcap.close_chunk()
 
-    def handle_to_sync(self):
+    def handle_to_sync(self) -> int | None:
         """
         Return a file descriptor for ``disk.sync``, None if nothing was written since the last.
 
@@ -184,11 +198,11 @@ class BagWriter:
         """
         return None if self._current is None else self._current.handle_to_sync()
 
-    def replace_nothing(self):
+    def replace_nothing(self) -> None:
         """Leave a former bag where it is: this one, not whole, gets another ``directory``."""
         self._whole = False
 
-    def close(self):
+    def close(self) -> None:
         """Finish the index and metadata.yaml, put the bag in its place; once."""
         if self._closed:
             return
@@ -202,13 +216,13 @@ class BagWriter:
             raise
         self._closed = self.finished = True
 
-    def _finish_file(self):
-        self._write_rosbag2_record(self._current)
-        self._current.finish()
-        self._finished.append(self._current.facts)
+    def _finish_file(self) -> None:
+        self._write_rosbag2_record(self._open)
+        self._open.finish()
+        self._finished.append(self._open.facts)
         self._current = None
 
-    def cut(self):
+    def cut(self) -> None:
         """
         After a write error: take back what is half written and count what is in the bag.
 
@@ -221,19 +235,19 @@ class BagWriter:
         for name, facts in self._topics.items():
             facts['count'] = self._in_former_files.get(name, 0) + in_file.get(name, 0)
 
-    def abandon(self):
+    def abandon(self) -> None:
         """Close the file without an index, after a write error; what is in it stays readable."""
         if not self._closed:
             self._release()
             with contextlib.suppress(OSError):
                 self.directory = self._place.settle(whole=False)
 
-    def _release(self):
+    def _release(self) -> None:
         if self._current is not None:
             self._current.abandon()
         self._closed = True
 
-    def discard(self):
+    def discard(self) -> None:
         """Give a bag up that is not ``finished``: remove what was written, and nothing else."""
         if self.finished:
             return
@@ -241,15 +255,15 @@ class BagWriter:
         self._release()
         self._place.give_up([*files, self._place.folder / layout.METADATA_FILE])
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         """Return the writer itself."""
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """Close the bag, whatever happened: what was written stays readable."""
         self.close()
 
-    def _bag_metadata(self, begun=None):
+    def _bag_metadata(self, begun: DataFile | None = None) -> dict[str, Any]:
         topics = [
             layout.TopicFacts(name, facts['type'], facts['qos'], facts['hash'], facts['count'])
             for name, facts in self._topics.items()]
@@ -260,14 +274,14 @@ class BagWriter:
             files.append(begun.facts)
         return layout.bag_metadata(files, topics, self._records.get(EXPERIMENT_RECORD))
 
-    def _write_rosbag2_record(self, file):
+    def _write_rosbag2_record(self, file: DataFile) -> None:
         # Written at open and at close, as rosbag2 does; readers take the last one.
         metadata = self._bag_metadata(file if file is not self._current else None)
         file.mcap.add_metadata(
             ROSBAG2_RECORD, {'serialized_metadata': layout.to_yaml(metadata)})
 
 
-def check_limits(max_file_bytes, max_file_s):
+def check_limits(max_file_bytes: int, max_file_s: float) -> None:
     """Raise InputError for limits of a file that are neither 0 nor large enough."""
     if max_file_bytes != 0 and max_file_bytes < SMALLEST_FILE_BYTES:
         raise InputError(
@@ -279,11 +293,11 @@ def check_limits(max_file_bytes, max_file_s):
             'longest file duration')
 
 
-def _texts(values):
+def _texts(values: Mapping[Any, object]) -> dict[str, str]:
     return {str(key): str(value) for key, value in values.items()}
 
 
-def _records(metadata):
+def _records(metadata: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Return record name to texts; texts without a record's name are the experiment's."""
     records = {
         name: _texts(values) for name, values in metadata.items() if isinstance(values, dict)}

@@ -33,7 +33,7 @@ from pam_actuation.loops.bus import Bus
 from pam_actuation.messages import Message
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import OF_A_RUN
-from pam_sim.annotations import IntArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.run import Run
 
@@ -62,7 +62,7 @@ class RecordedTopic:
         numeric = OF_A_RUN[short].numeric
         if numeric is None:
             self._messages = [decode(short, raw) for raw in topic.payloads]
-            self._columns = {}
+            self._columns: dict[str, FloatArray] = {}
             stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
         else:
             stamp_ns, self._columns, bad = series.table(short, topic.payloads, ONLY.get(short))
