@@ -23,6 +23,7 @@ import time
 import numpy as np
 from pam_sim.joint import kernel, layout, load_joint
 from pam_sim.joint.simulate import input_array
+from pam_sim.records import size_of
 from pam_sim.rollout import layout as muscle
 
 STEPS = 10_000
@@ -41,8 +42,8 @@ def signals_for(valve):
 def seconds_per_step(joint, valve):
     """Return the shortest time of one step [s] over REPEATS rollouts."""
     inputs = input_array(joint, *signals_for(valve))
-    rows = [np.empty((STEPS + 1, size)) for size in (
-        layout.OUT_SIZE, muscle.OUT_SIZE, muscle.OUT_SIZE)]
+    rows = [np.empty((STEPS + 1, size_of(one))) for one in (
+        layout.OUTPUT, muscle.OUTPUT, muscle.OUTPUT)]
     plant = joint.plant(initial_angle_rad=0.0)
     best = np.inf
     for _ in range(REPEATS):

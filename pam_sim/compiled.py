@@ -25,6 +25,7 @@ source, another number, compiled anew.
 """
 
 from collections.abc import Callable
+import functools
 import hashlib
 import inspect
 from pathlib import Path
@@ -72,10 +73,11 @@ def interpreted(function: Callable[P, R]) -> Callable[P, R]:
 
 def named_arguments(function: Callable[..., Any]) -> tuple[str, ...]:
     """Return the names of the arguments of a compiled function."""
-    return tuple(inspect.signature(interpreted(function)).parameters)
+    code = interpreted(function).__code__
+    return code.co_varnames[:code.co_argcount]
 
 
-def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], list[str]]:
+def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], list[str]]:
     """
     Return what compiled code is built from.
 
@@ -111,8 +113,12 @@ def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], 
         for name, value in {**found.globals, **found.nonlocals}.items():
             if _is_compiled(value):
                 waiting.append(value)
-            elif isinstance(value, (bool, int, float, str, np.dtype)):
+            elif isinstance(value, np.dtype):
+                constants.add(f'{name} = {_text(value)}')
+            elif isinstance(value, (bool, int, float, str)):
                 constants.add(f'{name} = {value!r}')
+            elif inspect.isfunction(value) and value.__module__.startswith('pam_'):
+                files.add(_file_of(value))      # compiled in a way of its own, as records.part
             elif isinstance(value, types.ModuleType) and value.__name__.startswith('pam_'):
                 files.add(_file_of(value))
                 used = (getattr(value, name, None) for name in function.__code__.co_names)
@@ -120,7 +126,7 @@ def sources(*parts: Compiled[..., Any] | types.ModuleType) -> tuple[list[Path], 
     return sorted(files), sorted(constants)
 
 
-def source_key(*parts: Compiled[..., Any] | types.ModuleType) -> int:
+def source_key(*parts: Callable[..., Any] | types.ModuleType) -> int:
     """Return a number made of all that ``sources`` finds, for code stored on disk."""
     files, constants = sources(*parts)
     digest = hashlib.sha256(Path(__file__).read_bytes())
@@ -128,6 +134,12 @@ def source_key(*parts: Compiled[..., Any] | types.ModuleType) -> int:
         digest.update(file.name.encode() + file.read_bytes())
     digest.update('\n'.join(constants).encode())
     return int(digest.hexdigest()[:12], 16)
+
+
+@functools.cache
+def _text(dtype: np.dtype[Any]) -> str:
+    """Return the text of a record: some are large, and many functions use them."""
+    return repr(dtype)
 
 
 def _file_of(part: types.ModuleType | Callable[..., Any]) -> Path:

@@ -23,6 +23,7 @@ same with ``fields``. An inserted field moves its neighbours in memory and nowhe
 
 from collections.abc import Mapping
 import functools
+import itertools
 import types
 from typing import Any
 
@@ -107,9 +108,8 @@ def cells(array: FloatArray, dtype: np.dtype[Any]) -> Any:
     is an array, a record within it a namespace, an array of records a tuple of namespaces.
     """
     seen = types.SimpleNamespace()
-    for name in dtype.names or ():
-        inner, begin = _field(dtype, name)
-        setattr(seen, name, _cell(array[begin:begin + size_of(inner)], inner))
+    for name, (begin, end) in _spans(dtype).items():
+        setattr(seen, name, _cell(array[begin:end], dtype[name]))
     return seen
 
 
@@ -158,20 +158,24 @@ def put(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
         A field is missing, or there is none of a name.
 
     """
-    spans, numbers = _spans(dtype)
-    if values.keys() != spans.keys():
-        raise ValueError(
-            f'fields {sorted(values.keys() ^ spans.keys())} are missing or unknown')
-    # At once what begins the record as numbers alone: rigs are packed often.
-    array[place:place + len(numbers)] = [values[name] for name in numbers]
-    if len(numbers) < len(spans):
-        put_some(array, dtype, {name: values[name] for name in list(spans)[len(numbers):]}, place)
+    # Rigs are packed often: at once what begins the record as numbers alone.
+    leading, others, count = _order(dtype)
+    try:
+        numbers = [values[name] for name in leading]
+        if len(values) != count:
+            raise KeyError
+        array[place:place + len(numbers)] = numbers
+        if others:
+            put_some(array, dtype, {name: values[name] for name in others}, place)
+    except KeyError:
+        unlike = sorted({*values}.symmetric_difference(dtype.names or ()))
+        raise ValueError(f'fields {unlike} are missing or unknown') from None
 
 
 def put_some(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
              place: int = 0) -> None:
     """Write the fields a mapping names into an array, from ``place`` on; others stay."""
-    spans, _ = _spans(dtype)
+    spans = _spans(dtype)
     for name, value in values.items():
         begin, end = spans[name]
         if end == begin + 1:
@@ -182,15 +186,21 @@ def put_some(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
 
 
 @functools.cache
-def _spans(dtype: np.dtype[Any]) -> tuple[dict[str, tuple[int, int]], list[str]]:
-    """Return the numbers before and with each field, and the first fields that are numbers."""
+def _spans(dtype: np.dtype[Any]) -> dict[str, tuple[int, int]]:
+    """Return how many numbers stand before each field, and how many with it."""
     found = {}
     for name in dtype.names or ():
         inner, begin = _field(dtype, name)
         found[name] = begin, begin + size_of(inner)
-    sizes = [end - begin for begin, end in found.values()]
-    leading = next((k for k, size in enumerate(sizes) if size != 1), len(sizes))
-    return found, list(found)[:leading]
+    return found
+
+
+@functools.cache
+def _order(dtype: np.dtype[Any]) -> tuple[list[str], list[str], int]:
+    """Return the first fields, as far as they are numbers, the others, and how many all are."""
+    names = list(dtype.names or ())
+    leading = list(itertools.takewhile(lambda name: dtype[name] == np.float64, names))
+    return leading, names[len(leading):], len(names)
 
 
 def _field(dtype: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:

@@ -22,18 +22,12 @@ controller on it. The same compiled steps as in the live nodes are used
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-import functools
 import math
-from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from pam_actuation.control.lqi import lqi_step
-from pam_actuation.control.pid import pid_step
-from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning.loop_module import load_loops
 from pam_actuation.tuning.loop_parts import DISTURBANCE
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
@@ -51,14 +45,6 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 Course = Callable[[float], float]        # of the time [s]
-
-
-@functools.cache
-def compiled_rollouts() -> ModuleType:
-    """Return the module with a rollout per kind of controller, compiled for this kernel."""
-    return load_loops(
-        'pam_closed_loop', 'rollout_template.py',
-        (sofc_step, pid_step, lqi_step))
 
 
 @short_repr
@@ -231,15 +217,15 @@ class ClosedLoop(MuscleLoop):
 
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
-        """Return a ``LOG`` of ``rollout_template`` for every tick, shape (ticks,)."""
-        module = compiled_rollouts()
+        """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
+        from pam_actuation.tuning import rollouts       # brings the compiler with it
         controller.pause()
-        log = np.empty(self.ticks * size_of(module.LOG))
-        rollout = getattr(module, f'{controller.kind}_rollout')
+        log = np.empty(self.ticks * size_of(rollouts.LOG))
+        rollout = getattr(rollouts, f'{controller.kind}_rollout')
         rollout(
             self._fresh_plant(), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
             self._noise, self._quantum, self._disturbance,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.compiled_arguments(), controller.input_array, log)
-        return log.view(module.LOG)
+        return log.view(rollouts.LOG)

@@ -26,7 +26,6 @@ from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
 from pam_actuation.tuning.closed_loop import Course, MuscleLoop
 from pam_actuation.tuning.loop_setup import learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
-from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.records import size_of
@@ -121,19 +120,19 @@ class ForceLoop(MuscleLoop):
             self.experiment.cycles)
 
     def run_raw(self, controller: 'ForceController', learn: Learns = True) -> npt.NDArray[np.void]:
-        """Return a ``FORCE_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
+        """Return a ``FORCE_LOG`` of ``mode_rollouts`` for every tick, shape (ticks,)."""
         check_controller(controller, FORCE, self.rate_hz)
-        module = compiled_modes()
+        from pam_actuation.tuning import mode_rollouts      # brings the compiler with it
         controller.pause()
-        log = np.empty(self.ticks * size_of(module.FORCE_LOG))
+        log = np.empty(self.ticks * size_of(mode_rollouts.FORCE_LOG))
         mode, law = controller.compiled_arguments()
-        module.force_rollout(
+        mode_rollouts.force_rollout(
             self._fresh_plant(self._start_m), self.hsv, self._driver.fresh(),
             self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
             self._noise, self._quantum, self._way_m,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode,
             controller.static_inverse, law, controller.law.input_array, log)
-        return log.view(module.FORCE_LOG)
+        return log.view(mode_rollouts.FORCE_LOG)
 
 
 def _made_of(rig: 'Rig', experiment: 'Experiment', contraction_m: Course | float | None,

@@ -32,7 +32,6 @@ from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
-from pam_actuation.tuning.modes_module import compiled_modes
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 
@@ -144,18 +143,18 @@ class JointLoop:
             self.experiment.cycles)
 
     def run_raw(self, controller: 'JointController', learn: Learns = True) -> npt.NDArray[np.void]:
-        """Return a ``JOINT_LOG`` of ``modes_template`` for every tick, shape (ticks,)."""
+        """Return a ``JOINT_LOG`` of ``mode_rollouts`` for every tick, shape (ticks,)."""
         check_controller(controller, JOINT, self.rate_hz)
-        module = compiled_modes()
+        from pam_actuation.tuning import mode_rollouts      # brings the compiler with it
         controller.pause()
         self._plant.reset()
-        log = np.empty(self.ticks * size_of(module.JOINT_LOG))
+        log = np.empty(self.ticks * size_of(mode_rollouts.JOINT_LOG))
         mode, law = controller.compiled_arguments()
-        module.joint_rollout(
+        mode_rollouts.joint_rollout(
             self._plant.arrays, tuple(driver.hsv for driver in self._drivers),
             tuple(driver.fresh() for driver in self._drivers), self._timing,
             controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
             controller.law.input_array, log)
-        return log.view(module.JOINT_LOG)
+        return log.view(mode_rollouts.JOINT_LOG)

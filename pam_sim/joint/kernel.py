@@ -12,25 +12,62 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compiled step of the joint, made anew whenever the muscle's kernel is another one."""
+"""The compiled entry points of the joint."""
 
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
-from pam_sim.compiled import source_key
-from pam_sim.generated import generated_module
-from pam_sim.joint import layout
-from pam_sim.rollout import kernel
-
-_FOLDER = Path(__file__).parent
-
-
-def _load():
-    source = (_FOLDER / 'step_template.py').read_text(encoding='utf-8')
-    return generated_module(
-        'pam_joint_kernel', f'# Of sources {source_key(kernel, layout):x}.\n{source}')
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import allocating_entry_point, entry_point, source_key
+from pam_sim.joint import step as steps
+from pam_sim.joint.step import Arrays
 
 
-_module = _load()
-joint_step = _module.joint_step
-joint_look = _module.joint_look
-joint_rollout = _module.joint_rollout
+def _entries(key: int) -> tuple[Callable[..., Any], ...]:
+    """Return the entry points as units of compiled code, stored under ``key``."""
+    @entry_point
+    def joint_step(joint: Arrays, flexor: Arrays, extensor: Arrays) -> None:
+        """
+        Advance the joint by one step and fill the three output rows.
+
+        Parameters
+        ----------
+        joint : tuple of float64 arrays
+            inp, state, par, out of :mod:`pam_sim.joint.layout`.
+        flexor, extensor : tuple of float64 arrays
+            state, par, inp, out of :mod:`pam_sim.rollout.layout`.
+
+        """
+        if key >= 0:        # always; makes the key part of what is stored
+            steps.joint_step_body(joint, flexor, extensor)
+
+    @entry_point
+    def joint_look(joint: Arrays, flexor: Arrays, extensor: Arrays) -> None:
+        """Take the forces from the muscles and fill the output rows without a step."""
+        if key >= 0:
+            steps.joint_look_body(joint, flexor, extensor)
+
+    @allocating_entry_point
+    def joint_rollout(inputs: FloatArray, joint: Arrays, flexor: Arrays, extensor: Arrays,
+                      joint_rows: FloatArray, flexor_rows: FloatArray,
+                      extensor_rows: FloatArray) -> None:
+        """Step through ``inputs``, N rows of ``INPUT``; the rows have N + 1 lines, 0 the start."""
+        if key < 0:
+            return
+        inp, _, _, out = joint
+        _, _, _, flexor_out = flexor
+        _, _, _, extensor_out = extensor
+        for i in range(inputs.shape[0] + 1):
+            inp[:] = inputs[max(i - 1, 0)]
+            if i > 0:
+                joint_step(joint, flexor, extensor)
+            else:
+                joint_look(joint, flexor, extensor)
+            joint_rows[i] = out
+            flexor_rows[i] = flexor_out
+            extensor_rows[i] = extensor_out
+
+    return joint_step, joint_look, joint_rollout
+
+
+joint_step, joint_look, joint_rollout = _entries(source_key(steps))

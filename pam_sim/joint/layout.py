@@ -13,50 +13,54 @@
 # limitations under the License.
 
 """
-Index constants of the arrays of the joint step, as ``pam_sim.rollout.layout`` for a muscle.
+Records of the four arrays of the joint step, as ``pam_sim.rollout.layout`` has for a muscle.
 
 All float64, SI. Torques and angles: flexion positive.
 """
 
-# -- inputs, held during one step ---------------------------------------------------------
-IN_FLEXOR_0 = 0             # valve signals, as INP_SIGNAL_0 and _1 of the muscle
-IN_FLEXOR_1 = 1
-IN_EXTENSOR_0 = 2
-IN_EXTENSOR_1 = 3
-IN_TORQUE = 4               # N m, external
-IN_SIZE = 5
+from pam_sim.records import record
 
-# -- outputs after the step ------------------------------------------------------------------
-OUT_TIME = 0                # s since the start
-OUT_ANGLE = 1               # rad
-OUT_VELOCITY = 2            # rad/s
-OUT_ACCELERATION = 3        # rad/s^2
-OUT_TORQUE = 4              # N m of both tendons
-OUT_SIZE = 5
+# Held during one step.
+INPUT = record(
+    'flexor_signal_0',              # as the inputs of the muscle
+    'flexor_signal_1',
+    'extensor_signal_0',
+    'extensor_signal_1',
+    'torque_n_m',                   # external
+)
 
-# -- state ---------------------------------------------------------------------------------
-S_STEPS = 0
-S_ANGLE = 1                 # rad
-S_VELOCITY = 2              # rad/s
-S_FLEXOR_FORCE = 3          # N, without dry friction
-S_FLEXOR_DRY = 4            # N, level of dry friction
-S_EXTENSOR_FORCE = 5
-S_EXTENSOR_DRY = 6
-STATE_SIZE = 7
+# After the step.
+OUTPUT = record(
+    'time_s',                       # since the start
+    'angle_rad',
+    'velocity_rad_per_s',
+    'acceleration_rad_per_s2',
+    'torque_n_m',                   # of both tendons
+)
 
-# -- parameters ------------------------------------------------------------------------------
-PAR_DT = 0                  # s, one step
-PAR_SUBSTEPS = 1            # coupling steps in it
-PAR_SUBSTEP = 2             # s
-PAR_FLEXOR_RADIUS = 3       # m
-PAR_EXTENSOR_RADIUS = 4     # m
-PAR_FLEXOR_ZERO = 5         # m, contraction at angle 0
-PAR_EXTENSOR_ZERO = 6       # m
-PAR_WEIGHT_TORQUE = 7       # N m, m g l
-PAR_INVERSE_INERTIA = 8     # 1/(kg m^2)
-PAR_DAMPING = 9             # N m s
-PAR_FRICTION = 10           # N m
-PAR_LOWER = 11              # rad, the nearer of end stop and stretched braid
-PAR_UPPER = 12              # rad
-PAR_HANGING = 13            # rad
-PAR_SIZE = 14
+STATE = record(
+    'steps',                        # done
+    'angle_rad',
+    'velocity_rad_per_s',
+    'flexor_force_n',               # without dry friction
+    'flexor_dry_n',                 # level of dry friction
+    'extensor_force_n',
+    'extensor_dry_n',
+)
+
+PARAMETERS = record(
+    'dt_s',                         # one step
+    'substeps',                     # coupling steps in it
+    'substep_s',
+    'flexor_radius_m',
+    'extensor_radius_m',
+    'flexor_zero_m',                # contraction at angle 0
+    'extensor_zero_m',
+    'weight_torque_n_m',            # m g l
+    'inverse_inertia_per_kg_m2',
+    'damping_n_m_s',
+    'friction_n_m',
+    'lower_rad',                    # the nearer of end stop and stretched braid
+    'upper_rad',
+    'hanging_rad',
+)

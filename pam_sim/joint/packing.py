@@ -17,11 +17,11 @@
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import layout
 from pam_sim.joint.statics import static_angle
+from pam_sim.records import fields, values_of, zeros
 from pam_sim.rollout import layout as muscle
 from pam_sim.units import P_ATM_PA
 
@@ -81,12 +81,14 @@ def pack_joint(
         if not least <= number <= most:
             raise InputError(f'`{name}` is {number:g}; allowed {least:g} to {most:g} {unit}')
     substeps = _substeps(joint, dt_s)
-    state = np.zeros(layout.STATE_SIZE)
-    state[layout.S_ANGLE] = initial_angle_rad
-    state[layout.S_VELOCITY] = initial_velocity_rad_per_s
+    state = zeros(layout.STATE)
+    start = fields(state, layout.STATE)
+    start.angle_rad = initial_angle_rad
+    start.velocity_rad_per_s = initial_velocity_rad_per_s
     sides = [
         {'dt_s': dt_s / substeps, 'initial_pressure_pa': pressure,
-         'initial_contraction_m': min(max(contraction, 0.0), par[muscle.PAR_MAX_CONTRACTION])}
+         'initial_contraction_m': min(
+             max(contraction, 0.0), fields(par, muscle.PARAMETERS).max_contraction_m)}
         for pressure, contraction, (_, par) in zip(
             pressures, joint.contractions_m(initial_angle_rad), packed)]
     return state, _par(joint, dt_s, substeps), sides[0], sides[1]
@@ -115,22 +117,20 @@ def _substeps(joint: 'JointRig', dt_s: float) -> int:
 def _par(joint: 'JointRig', dt_s: float, substeps: int) -> FloatArray:
     value = joint.parameters
     lower, upper = joint.range_rad
-    par = np.zeros(layout.PAR_SIZE)
-    for index, number in (
-            (layout.PAR_DT, dt_s),
-            (layout.PAR_SUBSTEPS, substeps),
-            (layout.PAR_SUBSTEP, dt_s / substeps),
-            (layout.PAR_FLEXOR_RADIUS, value['flexor_radius_m']),
-            (layout.PAR_EXTENSOR_RADIUS, value['extensor_radius_m']),
-            (layout.PAR_FLEXOR_ZERO, value['flexor_contraction_at_zero_m']),
-            (layout.PAR_EXTENSOR_ZERO, value['extensor_contraction_at_zero_m']),
-            (layout.PAR_WEIGHT_TORQUE, value['limb_mass_kg'] * value['gravity_m_per_s2']
-             * value['centre_of_mass_m']),
-            (layout.PAR_INVERSE_INERTIA, 1.0 / value['inertia_kg_m2']),
-            (layout.PAR_DAMPING, value['damping_n_m_s']),
-            (layout.PAR_FRICTION, value['friction_n_m']),
-            (layout.PAR_LOWER, lower),
-            (layout.PAR_UPPER, upper),
-            (layout.PAR_HANGING, value['hanging_angle_rad'])):
-        par[index] = number
-    return par
+    return values_of(layout.PARAMETERS, {
+        'dt_s': dt_s,
+        'substeps': substeps,
+        'substep_s': dt_s / substeps,
+        'flexor_radius_m': value['flexor_radius_m'],
+        'extensor_radius_m': value['extensor_radius_m'],
+        'flexor_zero_m': value['flexor_contraction_at_zero_m'],
+        'extensor_zero_m': value['extensor_contraction_at_zero_m'],
+        'weight_torque_n_m': value['limb_mass_kg'] * value['gravity_m_per_s2']
+        * value['centre_of_mass_m'],
+        'inverse_inertia_per_kg_m2': 1.0 / value['inertia_kg_m2'],
+        'damping_n_m_s': value['damping_n_m_s'],
+        'friction_n_m': value['friction_n_m'],
+        'lower_rad': lower,
+        'upper_rad': upper,
+        'hanging_rad': value['hanging_angle_rad'],
+    })

@@ -15,6 +15,8 @@
 """The joint as a live object: one step at a time, the compiled step of the rollout."""
 
 from collections.abc import Iterable, Sequence
+import itertools
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +24,12 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
+from pam_sim.joint.step import Arrays
 from pam_sim.plant import Plant
+from pam_sim.records import cells, zeros
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
-
-
-Arrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 class JointMuscle(Plant):
@@ -71,8 +72,11 @@ class JointPlant:
         self.joint = joint
         self.dt_s = float(dt_s)
         self._initial = initial
-        self._inp = np.zeros(layout.IN_SIZE)
-        self._out = np.zeros(layout.OUT_SIZE)
+        self._inp, self._out = zeros(layout.INPUT), zeros(layout.OUTPUT)
+        self._now = cells(self._out, layout.OUTPUT)
+        self._given = given = cells(self._inp, layout.INPUT)
+        self._signals = ((given.flexor_signal_0, given.flexor_signal_1),
+                         (given.extensor_signal_0, given.extensor_signal_1))
         self._start, self.par, flexor, extensor = pack_joint(joint, self.dt_s, **initial)
         self.flexor = JointMuscle(joint.flexor, seed, **flexor)
         self.extensor = JointMuscle(joint.extensor, int(seed) + 1, **extensor)
@@ -112,22 +116,23 @@ class JointPlant:
             or computed.
 
         """
-        inp = self._inp.copy()
-        for first, signal, side in ((layout.IN_FLEXOR_0, flexor_signal, 'flexor'),
-                                    (layout.IN_EXTENSOR_0, extensor_signal, 'extensor')):
+        sent = []
+        for side, signal in (('flexor', flexor_signal), ('extensor', extensor_signal)):
             values = tuple(signal) if isinstance(signal, Iterable) else (signal,)
             rig = getattr(self.joint, side)
             wanted = len(rig.signal_names)
             if len(values) != wanted:
                 raise InputError(f'valve `{rig.valve}` takes {wanted} numbers, got {len(values)}',
                                  f'{side}_signal')
-            inp[first:first + wanted] = values
-        inp[layout.IN_TORQUE] = external_torque_n_m
-        if not np.isfinite(inp).all():
+            sent.append(values)
+        if not all(map(math.isfinite, (*itertools.chain(*sent), external_torque_n_m))):
             raise InputError('is not finite', 'valve signal or external torque')
-        self._inp[:] = inp
+        for places, values in zip(self._signals, sent):
+            for place, value in zip(places, values):
+                place[...] = value
+        self._given.torque_n_m[...] = external_torque_n_m
         kernel.joint_step(*self.arrays)
-        if not all(np.isfinite(side[-1]).all() for side in self.arrays):
+        if not all(np.isfinite(out).all() for *_, out in self.arrays):
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no joint that can be stepped',
                              f'joint {self.joint.name}')
@@ -135,24 +140,24 @@ class JointPlant:
     @property
     def time_s(self) -> float:
         """Time since the start, s."""
-        return float(self._out[layout.OUT_TIME])
+        return self._now.time_s.item()
 
     @property
     def angle_rad(self) -> float:
         """Joint angle, flexion positive, rad."""
-        return float(self._out[layout.OUT_ANGLE])
+        return self._now.angle_rad.item()
 
     @property
     def velocity_rad_per_s(self) -> float:
         """Joint velocity, rad/s."""
-        return float(self._out[layout.OUT_VELOCITY])
+        return self._now.velocity_rad_per_s.item()
 
     @property
     def torque_n_m(self) -> float:
         """Torque of both tendons, N m."""
-        return float(self._out[layout.OUT_TORQUE])
+        return self._now.torque_n_m.item()
 
     @property
     def outputs(self) -> FloatArray:
-        """All outputs of the joint after the last step (copy), by ``layout.OUT_*``."""
+        """All outputs of the joint after the last step (copy), a record ``layout.OUTPUT``."""
         return self._out.copy()

@@ -15,11 +15,12 @@
 """What a simulation of a joint returns."""
 
 from pam_sim.annotations import FloatArray
-from pam_sim.joint import layout
+from pam_sim.joint.layout import OUTPUT
 from pam_sim.joint.parameters import SIDES
+from pam_sim.records import columns
 from pam_sim.response import brief_span, Response
 
-OWN = ('time_s', 'angle_rad', 'velocity_rad_per_s', 'acceleration_rad_per_s2', 'torque_n_m')
+OWN = OUTPUT.names or ()
 
 
 class JointResponse:
@@ -43,11 +44,12 @@ class JointResponse:
         self.outputs = outputs
         self.flexor = Response(flexor)
         self.extensor = Response(extensor)
-        self.time_s = outputs[:, layout.OUT_TIME]
-        self.angle_rad = outputs[:, layout.OUT_ANGLE]
-        self.velocity_rad_per_s = outputs[:, layout.OUT_VELOCITY]
-        self.acceleration_rad_per_s2 = outputs[:, layout.OUT_ACCELERATION]
-        self.torque_n_m = outputs[:, layout.OUT_TORQUE]
+        seen = columns(outputs, OUTPUT)
+        self.time_s = seen['time_s']
+        self.angle_rad = seen['angle_rad']
+        self.velocity_rad_per_s = seen['velocity_rad_per_s']
+        self.acceleration_rad_per_s2 = seen['acceleration_rad_per_s2']
+        self.torque_n_m = seen['torque_n_m']
 
     def __len__(self) -> int:
         """Return the number of samples, N + 1."""

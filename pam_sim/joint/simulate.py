@@ -20,7 +20,9 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
+from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.response import JointResponse
+from pam_sim.records import columns, size_of
 from pam_sim.rollout import layout as muscle
 from pam_sim.rollout import simulate as one_muscle
 
@@ -37,12 +39,13 @@ def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal
     inputs = input_array(joint, flexor_signal, extensor_signal, external_torque_n_m)
     plant = joint.plant(dt_s=dt_s, **initial)
     rows = [np.empty((len(inputs) + 1, size))
-            for size in (layout.OUT_SIZE, muscle.OUT_SIZE, muscle.OUT_SIZE)]
+            for size in map(size_of, (layout.OUTPUT, muscle.OUTPUT, muscle.OUTPUT))]
     kernel.joint_rollout(inputs, *plant.arrays, *rows)
-    for rig, outputs in ((joint.flexor, rows[1]), (joint.extensor, rows[2])):
+    motion, *sides = rows
+    for rig, outputs in zip((joint.flexor, joint.extensor), sides):
         one_muscle.check_outputs(rig, outputs)
-    if not np.isfinite(rows[0].sum()):
-        row = int(np.argmax(~np.isfinite(rows[0]).all(axis=1)))
+    if not np.isfinite(motion.sum()):
+        row = int(np.argmax(~np.isfinite(motion).all(axis=1)))
         raise InputError(
             f'the motion is not finite from step {row} on; use a smaller `dt_s`, or less extreme '
             'numbers', f'joint {joint.name}')
@@ -52,7 +55,7 @@ def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal
 def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: FloatArray,
                 external_torque_n_m: FloatArray | None = None) -> FloatArray:
     """
-    Return the inputs (N, IN_SIZE) of a rollout; arguments as of ``JointRig.simulate``.
+    Return the inputs of a rollout, N rows of ``INPUT``; arguments as of ``JointRig.simulate``.
 
     Raises
     ------
@@ -72,10 +75,11 @@ def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: F
     if len(sides[0]) != len(sides[1]):
         raise InputError(f'has {len(sides[1])} samples, `flexor_signal` {len(sides[0])}',
                          'extensor_signal')
-    inputs = np.zeros((len(sides[0]), layout.IN_SIZE))
-    both = slice(muscle.INP_SIGNAL_0, muscle.INP_SIGNAL_1 + 1)
-    inputs[:, layout.IN_FLEXOR_0:layout.IN_FLEXOR_1 + 1] = sides[0][:, both]
-    inputs[:, layout.IN_EXTENSOR_0:layout.IN_EXTENSOR_1 + 1] = sides[1][:, both]
+    inputs = np.zeros((len(sides[0]), size_of(layout.INPUT)))
+    given = columns(inputs, layout.INPUT)
+    for side, one in zip(SIDES, sides):
+        for field in ('signal_0', 'signal_1'):
+            given[f'{side}_{field}'] = columns(one, muscle.INPUT)[field]
     if external_torque_n_m is not None:
         torque = np.asarray(external_torque_n_m, dtype=float)
         if torque.ndim != 0 and torque.shape != (len(inputs),):
@@ -87,5 +91,5 @@ def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: F
             raise InputError(
                 f'is {np.atleast_1d(torque)[row]:g} at sample {row}; allowed '
                 f'{-MAX_TORQUE_N_M:g} to {MAX_TORQUE_N_M:g} N m', 'external_torque_n_m')
-        inputs[:, layout.IN_TORQUE] = torque
+        given['torque_n_m'] = torque
     return inputs

@@ -26,7 +26,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, entry_point, source_key
 from pam_sim.records import part, size_of
-from pam_sim.rollout import step as steps
+from pam_sim.rollout import layout, step as steps
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
 
@@ -119,4 +119,4 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
 
 
 (step, look, settle, rest_contraction, driven_tension, driven_force, rollout) = _entries(
-    source_key(steps))
+    source_key(steps, layout))

@@ -103,9 +103,3 @@ PARAMETERS = record(
 
 # Values of ``valve``.
 PPR, HSV_AVERAGED, HSV_SWITCHING = 0, 1, 2
-
-# Places of the fields, for code that reads the arrays by index.
-INP_SIGNAL_0, INP_SIGNAL_1, INP_CONTRACTION = 0, 1, 3
-OUT_TIME, OUT_SIZE = 0, 13
-S_VELOCITY, S_MUSCLE_FORCE, S_DIRECTION = 4, 5, 10
-PAR_MAX_CONTRACTION = 11

@@ -16,7 +16,9 @@
 
 import numpy as np
 from pam_sim.joint import load_joint
+from pam_sim.joint.layout import PARAMETERS
 from pam_sim.muscle.laws.inoue_pair import InouePair
+from pam_sim.records import fields
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -184,8 +186,7 @@ def test_a_light_limb_takes_several_coupling_steps(level, inertia, substeps):
     signal = 3.0 + np.sin(np.arange(300) * 0.02), np.full(300, 3.0)
     coarse = light.simulate(*signal, **EVEN)
     fine = light.simulate(*(np.repeat(s, 2) for s in signal), dt_s=0.0005, **EVEN)
-    from pam_sim.joint import layout
-    count = light.plant().par[layout.PAR_SUBSTEPS]
+    count = fields(light.plant().par, PARAMETERS).substeps
     assert substeps <= count <= 2 * substeps
     assert np.max(np.abs(coarse.angle_rad - fine.angle_rad[::2])) < 1e-3 * np.ptp(fine.angle_rad)
     assert coarse.flexor.time_s[-1] == coarse.time_s[-1] == pytest.approx(0.3)
