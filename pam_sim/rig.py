@@ -276,6 +276,11 @@ class Rig:
         return self.parameters['mass_kg'] * GRAVITY_M_PER_S2
 
     # -- dynamics --------------------------------------------------------------------------
+    @property
+    def muscles(self) -> dict[str, 'Rig']:
+        """Return its one muscle by the place below its namespace: {'': the rig itself}."""
+        return {'': self}
+
     def pack(self, dt_s: float = 0.001, initial_pressure_pa: float = P_ATM_PA,
              initial_contraction_m: float | None = None,
              initial_signal: npt.ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:

@@ -23,6 +23,7 @@ from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 
 if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 _MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
@@ -38,12 +39,16 @@ def _base(rig: 'Rig') -> dict[str, Any]:
     return {'muscle': rig.muscle.plain(), 'load': rig.load}
 
 
-def rig_title(rig: 'Rig') -> str:
+def rig_title(rig: 'Rig | JointRig') -> str:
     """Return the name of a rig for people, with the preset or muscle it is made from."""
-    base = f'{rig.muscle.name}_{rig.load}'
+    muscle = rig.muscles.get('')
+    if muscle is None:
+        return rig.name
+    base = f'{muscle.muscle.name}_{muscle.load}'
     made_of = [] if rig.name == base else [base]
-    if rig.effects:
-        made_of.append(f'{len(rig.effects)} effects' if len(rig.effects) > 1 else '1 effect')
+    if muscle.effects:
+        made_of.append(
+            f'{len(muscle.effects)} effects' if len(muscle.effects) > 1 else '1 effect')
     return f'{rig.name} ({", ".join(made_of)})' if made_of else rig.name
 
 

@@ -30,7 +30,7 @@ from pam_actuation.bags.plausibility import Implausible, recorded_length_m, topi
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import KEPT, OF_A_RUN, RECORDED, short_name, TOLD
+from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -118,6 +118,17 @@ def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
     named = renamed.checked(topics)
     bag = read_bag(path, recover=recover, wanted=lambda name, type_name, encoding: (
         name in named.values() or is_read(name, type_name, encoding)))
+    return run_of(bag, path, namespace, named)
+
+
+def run_of(bag: Bag, path: StrPath, namespace: str | None = None,
+           named: dict[str, str] | None = None) -> RecordedRun:
+    """
+    Return the run of one muscle of a bag that was read.
+
+    Parameters and errors are those of ``load_run``; ``named`` are its ``topics``, checked.
+    """
+    named = named or {}
     given = renamed.topics_by_name(bag, named)
     if given and namespace is None:
         present = list(namespaces(bag))
@@ -216,7 +227,7 @@ def _listed(names: Iterable[str]) -> str:
 
 def read_series(short: str, topic: TopicData, remarks: list[str]) -> Series:
     """Return the Series of a TopicData; what is odd is appended to ``remarks`` as sentences."""
-    row = OF_A_RUN[short]
+    row = BY_NAME[short]
     stamp_ns, values, bad = series.table(short, topic.payloads)
     keep = ~bad
     if bad.any():

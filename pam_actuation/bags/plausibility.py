@@ -125,6 +125,8 @@ def missing_topics(namespaces: Mapping[str, Collection[str]]) -> tuple[list[str]
         return ['The bag has no messages on any topic of a muscle.'], []
     remarks, notes = [], []
     for namespace, present in sorted(namespaces.items()):
+        if any(other.startswith(f'{namespace}/') for other in namespaces):
+            continue        # a joint: its muscles have namespaces of their own
         needed, optional = ([name for name, row in OF_A_RUN.items()
                              if row.need == need and name not in present]
                             for need in (NEEDED, USED))

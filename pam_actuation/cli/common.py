@@ -142,10 +142,10 @@ def load_setup(args):
     from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.limits import check_tracked
-    from pam_sim import load_rig
+    from pam_sim.joint import load_rig_or_joint
     experiment = load_experiment(args.experiment)
-    rig = load_rig(args.rig, valve=args.valve)
-    if not experiment.tracked:
+    rig = load_rig_or_joint(args.rig, args.valve)
+    if not experiment.asks_for_motion:
         if args.controller or args.rules:       # of no use here, but not to be wrong either
             load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules,
                             accept_other_rig=True)

@@ -27,7 +27,8 @@ EXAMPLE = 'pam replay runs/first --chain'
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
-    parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bag')
+    parser.add_argument(
+        '--namespace', default=None, help='namespace of the muscle or joint in the bag')
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
         '--only', choices=('controller', 'driver', 'plant'), default=None,
@@ -50,13 +51,15 @@ def add_arguments(parser):
 
 def run(args):
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
-    from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.replay.compare import replay_run
+    from pam_actuation.replay.joint import is_joint, replay_joint
     from pam_actuation.replay.settings import changed_controller
     check_outputs(args, args.out)
-    recorded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
+    recorded = load_recording(args.bag, args.namespace, args.recover)
     note_implausible(args, [recorded])
-    result = replay_run(recorded, changed_controller(
+    replayed = replay_joint if is_joint(recorded) else replay_run
+    result = replayed(recorded, changed_controller(
         recorded, args.changes, args.accept_other_rig), args.only, args.chain)
     if args.out:
         result.save(args.out)

@@ -164,7 +164,7 @@ class JointControllerLoop:
         """Return what takes each topic, by name relative to the joint."""
         takes: dict[str, Callable[[Any], None]] = {
             'joint_state': self.on_joint_state, 'joint_reference': self.on_joint_reference,
-            'joint_trajectory': self.on_joint_trajectory,
+            'joint_trajectory': self.on_trajectory,
             'co_contraction': self.on_co_contraction}
         for k, side in enumerate(SIDES):
             takes[f'{side}/pressure'] = partial(self.on_pressure, k)
@@ -199,6 +199,14 @@ class JointControllerLoop:
     def on_named_trajectory(self, message: NamedTrajectory) -> None:
         """Take a ``NamedTrajectory``; the next tick counts it or, where unusable, refuses it."""
         self._trajectory = message
+
+    def on_trajectory(self, message: AngleTrajectory | NamedTrajectory) -> None:
+        """Take a trajectory as it is sent or as it is received, by the way of the latter."""
+        if isinstance(message, AngleTrajectory):
+            points = zip(message.time_from_start_ns, message.angle_rad, message.rate_rad_per_s)
+            message = NamedTrajectory(message.stamp_ns, (self._name,), tuple(
+                (time_ns, (angle,), (rate,)) for time_ns, angle, rate in points))
+        self.on_named_trajectory(message)
 
     def _take_trajectory(self, message: NamedTrajectory, now_ns: int) -> None:
         """Let the trajectory that arrived count from now on."""
@@ -280,6 +288,12 @@ class JointControllerLoop:
         flexor_pa, extensor_pa = commands_pa
         return ((Pressure(now_ns, flexor_pa), Pressure(now_ns, extensor_pa)),
                 ControllerState(now_ns, self.names, values))
+
+    def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
+        """Run one tick; return what it sends by topic relative to the joint, as ``tick``."""
+        commands, state = self.tick(now_ns, learning)
+        return {**{f'{side}/pressure_command': command for side, command in zip(SIDES, commands)},
+                'controller_state': state}
 
     def _choose_law(self, now_ns: int) -> bool:
         """Let a fresh wish of an angle decide, else a fresh torque; return if that changed."""

@@ -248,6 +248,11 @@ class ControllerLoop:
         return (Pressure(now_ns, command_pa),
                 ControllerState(now_ns, self._core.names, values))
 
+    def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
+        """Run one tick; return what it sends by short topic name, as ``tick``."""
+        command, state = self.tick(now_ns, learning)
+        return {'pressure_command': command, 'controller_state': state}
+
     def _measured(self) -> tuple[Contraction | Force | None, float]:
         """Return the newest message of what is tracked and its value; None, NaN before."""
         if self.tracked == FORCE:

@@ -21,9 +21,7 @@ The loops are the ones the nodes call, joined by messages that take no time.
 from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.joint_plant_loop import JointPlantLoop
+from pam_actuation.loops.assembly import driver_loops, plant_loop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
 from pam_actuation.messages import ControllerState, Pressure, START_NS
@@ -53,9 +51,8 @@ class JointLoops:
 
     def __init__(self, joint: 'JointRig', control: 'JointControllerLoop', seed: int = 0) -> None:
         self.control = control
-        self.plant = JointPlantLoop(joint, seed=seed)
-        self.drivers = [DriverLoop(rig.valve, driver_config(rig))
-                        for rig in (joint.flexor, joint.extensor)]
+        self.plant, drivers = plant_loop(joint, seed), driver_loops(joint)
+        self.drivers = list(drivers.values())
         self.period_ns = round(_NS / control.rate_hz)
         self.now_ns = START_NS
         self.state: ControllerState | None = None       # the newest
@@ -67,9 +64,9 @@ class JointLoops:
         first_ns = START_NS + self.period_ns
         bus.add(attach_plant(bus, self.plant), every(control.rate_hz, first_ns))
         bus.add(self._tick_control, every(control.rate_hz, first_ns))
-        for side, driver in zip(SIDES, self.drivers):
-            attach(bus, driver, f'{side}/')
-            bus.add(driver_tick(bus, driver, f'{side}/'), every(driver.rate_hz, first_ns))
+        for place, driver in drivers.items():
+            attach(bus, driver, place)
+            bus.add(driver_tick(bus, driver, place), every(driver.rate_hz, first_ns))
         for topic, take in control.takes().items():
             bus.connect(topic, self._unless_replaced(topic, take))
 

@@ -76,7 +76,7 @@ def check_tracked(
         experiment: 'Experiment',
         controller: 'CompiledController | WrappedLaw | None') -> None:
     """Raise InputError where an experiment is in one quantity, its controller in another."""
-    if not experiment.tracked:
+    if not experiment.asks_for_motion:
         return
     tracked = tracked_by(controller)
     if tracked.topic != experiment.domain:

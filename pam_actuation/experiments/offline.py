@@ -22,6 +22,8 @@ seed, all stamps from the virtual clock.
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import partial
 import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -30,49 +32,48 @@ from pam_actuation import interrupts
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
-from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
+from pam_actuation.loops.assembly import controller_loop, driver_loops, plant_loop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
 from pam_actuation.messages import START_NS, Status
-from pam_actuation.plant_loop import PlantLoop
-from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
-    from pam_actuation.control.modes.force import ForceController
+    from pam_actuation.control.config import Controller
     from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
 LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live
-NAMESPACE = '/muscle'
+NAMESPACE, JOINT_NAMESPACE = '/muscle', '/knee'
 
 
 class _Recorder:
     """Encode messages into a bag and count them, as publisher and recorder at once."""
 
-    def __init__(self, writer: BagWriter, namespace: str) -> None:
+    def __init__(self, writer: BagWriter, namespace: str, name: str) -> None:
         self._writer, self._namespace = writer, namespace
-        self._known: set[str] = set()
+        self.name = name            # of the muscle or joint, within messages
+        # Topic to its full name and what makes its bytes.
+        self._known: dict[str, tuple[str, Callable[[Any], bytes]]] = {}
         self.counts: Counter[str] = Counter()
 
     def write(self, topic: str, message: Any, now_ns: int) -> None:
         """Write one message under its full topic name."""
-        row = topic_of(topic)
-        name = row.full_name(self._namespace)
-        if name not in self._known:
-            self._writer.add_topic(name, row.type_name)
-            self._known.add(name)
-        self._writer.write(name, encode(topic, message), now_ns, now_ns)
-        self.counts[name] += 1
+        if topic not in self._known:
+            row, (place, _, _) = topic_of(topic), topic.rpartition('/')
+            full = row.full_name(f'{self._namespace}/{place}' if place else self._namespace)
+            self._writer.add_topic(full, row.type_name)
+            self._known[topic] = full, row.content.encoder(self.name)
+        full, encode = self._known[topic]
+        self._writer.write(full, encode(message), now_ns, now_ns)
+        self.counts[full] += 1
 
     def finish(self, now_ns: int, said: str) -> None:
         """Write the last status: the counts as a node states them."""
@@ -86,17 +87,17 @@ class _Loops:
     """The loops of the live nodes on a bus, and how far they came."""
 
     def __init__(
-            self, experiment: 'Experiment', rig: 'Rig',
-            controller: 'CompiledController | ForceController | None',
+            self, experiment: 'Experiment', rig: 'Rig | JointRig',
+            controller: 'Controller | None',
             seed: int, learning: bool, recorder: _Recorder, transport_ns: int,
             ticks: Mapping[str, Iterable[int]]) -> None:
         self._recorder = recorder
-        self._status_ns = -STATUS_EVERY_NS
+        self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
-        plant, reference = PlantLoop(rig, seed=seed), ReferenceLoop(experiment, valve=rig.valve)
-        driver = DriverLoop(rig.valve, driver_config(rig))
-        lead_ns = LEAD_NS if experiment.tracked else 0
+        plant, drivers = plant_loop(rig, seed), driver_loops(rig)
+        reference = ReferenceLoop(experiment, valve=rig.valve)
+        lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 
         def add(name: str, tick: Callable[[int], object], rate_hz: float,
                 lead_ns: int = lead_ns) -> None:
@@ -105,21 +106,25 @@ class _Loops:
                     else (START_NS + int(after_ns) for after_ns in times))
 
         # At equal times: measure, then want, then decide, then act.
-        attach(bus, driver)
+        for place, driver in drivers.items():
+            attach(bus, driver, place)
         add('plant', attach_plant(bus, plant), PUBLISH_RATE_HZ)
         add('reference', reference_tick(bus, reference), reference.rate_hz, 0)
-        if experiment.tracked and controller is not None:
-            control = ControllerLoop(controller)
+        if experiment.asks_for_motion and controller is not None:
+            control = controller_loop(controller, rig, recorder.name)
             attach(bus, control)
             decide = controller_tick(bus, control)
             add('controller', lambda now_ns: decide(now_ns, learning), controller.rate_hz)
-        add('driver', driver_tick(bus, driver, told=self._told), driver.rate_hz)
+        for place, driver in drivers.items():
+            add(f'{place}driver', driver_tick(bus, driver, place, partial(self._told, place)),
+                driver.rate_hz)
 
-    def _told(self, now_ns: int, status: Status) -> None:
-        """Record the status of the driver from time to time."""
-        if now_ns - self._status_ns >= STATUS_EVERY_NS:
-            self._status_ns = now_ns
-            self._recorder.write('diagnostics', status, now_ns)
+    def _told(self, place: str, now_ns: int, status: Status) -> None:
+        """Record the status of a driver from time to time."""
+        if now_ns - self._status_ns.get(place, -STATUS_EVERY_NS) >= STATUS_EVERY_NS:
+            self._status_ns[place] = now_ns
+            self._recorder.write(
+                'diagnostics', replace(status, name=f'{place}{status.name}'), now_ns)
 
     def run(self, end_ns: int, progress: Callable[[int], object] | None,
             stopped: Callable[[], bool]) -> None:
@@ -139,10 +144,10 @@ class _Loops:
 
 
 def simulate_experiment(
-        experiment: 'Experiment', rig: 'Rig',
-        controller: 'CompiledController | ForceController | None',
+        experiment: 'Experiment', rig: 'Rig | JointRig',
+        controller: 'Controller | None',
         out: Path | str, seed: int = 0, learning: bool = True, overwrite: bool = False,
-        progress: Callable[[int], object] | None = None, namespace: str = NAMESPACE,
+        progress: Callable[[int], object] | None = None, namespace: str | None = None,
         ticks: Mapping[str, Iterable[int]] | None = None,
         transport_ns: int = 0) -> dict[str, Any]:
     """
@@ -151,8 +156,8 @@ def simulate_experiment(
     Parameters
     ----------
     experiment : Experiment
-        What to ask for. The domains contraction and force use the controller.
-    rig : pam_sim.rig.Rig
+        What to ask for. The domains contraction, force and joint_angle use the controller.
+    rig : pam_sim.rig.Rig or pam_sim.joint.JointRig
         The simulated rig, valve included.
     controller : object or None
         Anything ``control.config.load_controller`` returns.
@@ -166,12 +171,12 @@ def simulate_experiment(
         Replace the bag that is there, once this one is whole.
     progress : callable, optional
         Called with simulated seconds done.
-    namespace : str
-        Namespace of the topics.
+    namespace : str, optional
+        Namespace of the topics; by default ``/muscle``, of a joint ``/knee``.
     ticks : dict of str to sequence of int, optional
-        When the loops ``plant``, ``reference``, ``controller`` and ``driver`` tick, ns since
-        the start and perhaps before it; a loop not named ticks at its rate. For the tick
-        times of a live run.
+        When the loops ``plant``, ``reference``, ``controller`` and ``driver`` (of a joint
+        ``flexor/driver`` and ``extensor/driver``) tick, ns since the start and perhaps before
+        it; a loop not named ticks at its rate. For the tick times of a live run.
     transport_ns : int
         Time from the tick that sends a message to its arrival.
 
@@ -191,6 +196,7 @@ def simulate_experiment(
     """
     experiment.check_reachable(rig)
     check_tracked(experiment, controller)
+    name, namespace = _names(rig, namespace)
     metadata = experiment_metadata(
         experiment=experiment, rig=rig.to_yaml(),
         controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
@@ -199,7 +205,7 @@ def simulate_experiment(
     try:
         with interrupts.held() as stopped:
             writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
-            recorder = _Recorder(writer, namespace)
+            recorder = _Recorder(writer, namespace, name)
             loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
                            ticks or {})
             ending = _recorded(loops, recorder, experiment, progress, stopped)
@@ -222,6 +228,14 @@ def simulate_experiment(
             f'{ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': dict(recorder.counts)}
+
+
+def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:
+    """Return the name of a muscle or joint within messages, and its namespace."""
+    if '' in rig.muscles:
+        return NAMESPACE.removeprefix('/'), NAMESPACE if namespace is None else namespace
+    namespace = JOINT_NAMESPACE if namespace is None else namespace
+    return namespace.rpartition('/')[2], namespace
 
 
 def _recorded(loops: _Loops, recorder: _Recorder, experiment: 'Experiment',

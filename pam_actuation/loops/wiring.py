@@ -23,8 +23,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from pam_actuation.loops.bus import Bus, Take, Tick
-from pam_actuation.messages import (
-    ControllerState, Message, Pressure, Status, ValveSignal)
+from pam_actuation.messages import Message, Pressure, Status, ValveSignal
 
 
 class Takes(Protocol):
@@ -54,8 +53,8 @@ class Reference(Protocol):
 class Controller(Takes, Protocol):
     """What a controller on a clock does."""
 
-    def tick(self, now_ns: int, learning: bool) -> tuple[Pressure, ControllerState]:
-        """Return command and internals."""
+    def sent(self, now_ns: int, learning: bool) -> Mapping[str, Message]:
+        """Run one tick; return commands and internals by topic."""
 
 
 class Driver(Takes, Protocol):
@@ -109,9 +108,8 @@ def reference_tick(bus: Bus, reference: Reference) -> Tick:
 def controller_tick(bus: Bus, control: Controller) -> Callable[[int, bool], None]:
     """Return the tick of a controller: ``tick(now_ns, learning)``."""
     def tick(now_ns: int, learning: bool = True) -> None:
-        command, state = control.tick(now_ns, learning)
-        bus.send('pressure_command', command, now_ns)
-        bus.send('controller_state', state, now_ns)
+        for topic, message in control.sent(now_ns, learning).items():
+            bus.send(topic, message, now_ns)
 
     return tick
 
@@ -129,10 +127,10 @@ def driver_tick(bus: Bus, driver: Driver, prefix: str = '',
     return tick
 
 
-def signal_tick(bus: Bus, driver: Driver) -> Tick:
+def signal_tick(bus: Bus, driver: Driver, prefix: str = '') -> Tick:
     """Return the tick of a driver that does not say which pressure it follows."""
     def tick(now_ns: int) -> None:
-        bus.send('valve_signal', driver.tick(now_ns)[0], now_ns)
+        bus.send(f'{prefix}valve_signal', driver.tick(now_ns)[0], now_ns)
 
     return tick
 

@@ -21,24 +21,30 @@ received each message. For a simulated bag this is exactly when the loops got it
 one it is another process's receive time, near that of the node but not the same.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 import os
 from typing import Any
 
 import numpy as np
 from pam_actuation.bags import series
 from pam_actuation.bags.load import is_read, topics_of
+from pam_actuation.bags.load_joint import topics_of_joint
 from pam_actuation.bags.source import read_bag, TopicData
 from pam_actuation.loops.bus import Bus
 from pam_actuation.messages import Message
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import OF_A_RUN
+from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 
 # At equal times: measure, want, decide, act. The simulation runs its loops in this order too.
 ORDER = tuple(OF_A_RUN)
+# Of a joint as well; the angle comes first, it tells of a sample.
+ORDER_OF_JOINT = ('joint_state', 'pressure', 'contraction', 'force', 'supply_pressure',
+                  'joint_reference', 'joint_trajectory', 'joint_effort', 'co_contraction',
+                  'controller_state', 'pressure_command', 'valve_signal', 'followed_pressure')
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000
@@ -56,16 +62,16 @@ class RecordedTopic:
     """
 
     def __init__(self, short: str, topic: TopicData, by_stamp: bool,
-                 path: str | os.PathLike[str]) -> None:
+                 path: str | os.PathLike[str], only: Collection[str] | None = None) -> None:
         self.short = short
         self._messages: list[Message] | None = None
-        numeric = OF_A_RUN[short].numeric
+        numeric = BY_NAME[short].numeric
         if numeric is None:
             self._messages = [decode(short, raw) for raw in topic.payloads]
             self._columns: dict[str, FloatArray] = {}
             stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
         else:
-            stamp_ns, self._columns, bad = series.table(short, topic.payloads, ONLY.get(short))
+            stamp_ns, self._columns, bad = series.table(short, topic.payloads, only)
             self._make = numeric.maker(tuple(self._columns))
             if bad.any():
                 raise InputError(
@@ -132,9 +138,27 @@ def recorded_topics(run: Run, topics: Iterable[str],
     found = {}
     for short, topic in topics_of(bag, run.namespace).items():
         if short in topics:
-            found[short] = RecordedTopic(short, topic, short in ticks, run.path)
+            found[short] = RecordedTopic(
+                short, topic, short in ticks, run.path, ONLY.get(short))
         bag.topics.pop(topic.name)            # its bytes are not needed any more
     return {short: found[short] for short in ORDER if short in found}
+
+
+def recorded_topics_of_joint(run: Run) -> dict[str, RecordedTopic]:
+    """
+    Return the topics of a joint's bag as they arrived, by name relative to the joint.
+
+    Commands and signals of each muscle are beside each other: the flexor comes first, as in a
+    simulation. Errors are those of ``recorded_topics``.
+    """
+    bag = read_bag(run.path, recover=True)
+    found = topics_of_joint(bag, run.namespace)
+    ordered = sorted(
+        (name for name in found if short_name(name) in ORDER_OF_JOINT),
+        key=lambda name: (ORDER_OF_JOINT.index(short_name(name)), SIDES.index(
+            name.rpartition('/')[0]) if '/' in name else 0))
+    return {name: RecordedTopic(short_name(name), found[name], short_name(name) in TICKED,
+                                run.path) for name in ordered}
 
 
 def _check_clocks(stamp_ns: IntArray, received_ns: IntArray, topic: TopicData,

@@ -23,27 +23,28 @@ model.
 """
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
+import math
 import os
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.loops.assembly import controller_loop, driver_loops, plant_loop
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, send_followed, signal_tick)
-from pam_actuation.messages import ControllerState, Message, Pressure, ValveSignal
-from pam_actuation.plant_loop import PlantLoop
-from pam_actuation.replay.arrivals import ORDER, recorded_topics, RecordedTopic
+from pam_actuation.messages import ControllerState, JointAngle, Message, Pressure, ValveSignal
+from pam_actuation.replay.arrivals import (
+    ORDER, recorded_topics, recorded_topics_of_joint, RecordedTopic)
 from pam_actuation.replay.difference import Difference, difference
-from pam_sim import load_rig
+from pam_actuation.topics.table import short_name
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.joint import JointRig, load_rig_or_joint
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
@@ -53,10 +54,10 @@ if TYPE_CHECKING:
 
 SENSORS = ('pressure', 'contraction', 'force', 'supply_pressure')
 _UNITS = {'pressure_pa': 'Pa', 'contraction_m': 'm', 'force_n': 'N', 'ppr_voltage': 'V',
-          'fill_duty': '1', 'vent_duty': '1'}
+          'fill_duty': '1', 'vent_duty': '1', 'angle_rad': 'rad'}
 _FIELD = {'pressure': 'pressure_pa', 'supply_pressure': 'pressure_pa', 'force': 'force_n',
           'contraction': 'contraction_m', 'pressure_command': 'pressure_pa',
-          'followed_pressure': 'pressure_pa'}
+          'followed_pressure': 'pressure_pa', MEASURED: 'angle_rad'}
 # Readings of one sample arrive close together; those of older samples are forgotten.
 _SAMPLES = 20_000
 
@@ -97,7 +98,7 @@ class ChainReplay:
     def lines(self) -> list[str]:
         """Return the outcome for people."""
         what = f'controller, driver and {self.rig} in a closed loop on the recorded reference'
-        if 'pressure_command.pressure_pa' not in self.recorded:
+        if not any('pressure_command' in name for name in self.recorded):
             what = f'driver and {self.rig} on the recorded commands'
         return [f'chain: {what}', *(one.line() for one in self.differences)]
 
@@ -105,42 +106,73 @@ class ChainReplay:
         """Return all arrays by name, for saving."""
         out: dict[str, IntArray | FloatArray] = {}
         for name in self.recorded:
-            key = 'chain_' + name.replace('.', '_')
+            key = 'chain_' + name.replace('.', '_').replace('/', '_')
             out[f'{key}_stamp_ns'] = self.stamp_ns[name]
             out[f'{key}_recorded'] = self.recorded[name]
             out[f'{key}_replayed'] = self.replayed[name]
         return out
 
 
-class _Chain:
+class RepeatedLoops:
     """
     The loops of one repeated experiment on a bus.
 
     A loop ticks when it did in the recording. What the recording gives is sent when it arrived.
+
+    Parameters
+    ----------
+    rig : Rig or JointRig
+    controller : object or None
+        Of the rig; None: there is none.
+    seed : int
+        Of the simulated sensors.
+    name : str
+        Of a joint, in messages to several joints.
+    parts : collection of str
+        Which of ``controller``, ``driver`` and ``plant`` are computed; what the others sent
+        comes from the recording.
+
     """
 
-    def __init__(self, rig: Rig, controller: 'Controller | None', seed: int) -> None:
+    def __init__(self, rig: Rig | JointRig, controller: 'Controller | None', seed: int,
+                 name: str, parts: Collection[str] = ('controller', 'driver', 'plant')) -> None:
+        self._parts = parts
         self.bus = Bus(on_sent=self._sent)
         self._newest: dict[str, Any] = {}       # by topic, of what was sent
-        self._samples: dict[int, dict[str, Message]] = {}   # by the recorded stamp of a reading
-        self._command: Message | None = None        # of the newest tick of the controller
-        self._driver = DriverLoop(rig.valve, driver_config(rig))
-        attach(self.bus, self._driver)
-        self._measure = attach_plant(self.bus, PlantLoop(rig, seed=seed))
-        self._drive = signal_tick(self.bus, self._driver)
+        self._samples: dict[int, dict[str, Message]] = {}   # by what tells a sample
+        self._angles = 0                        # of a joint
+        self._commands: dict[str, Message] = {}     # of the newest tick of the controller
+        self._drivers = driver_loops(rig) if 'driver' in parts else {}
+        for place, driver in self._drivers.items():
+            attach(self.bus, driver, place)
+        if 'plant' in parts:
+            self._measure = attach_plant(self.bus, plant_loop(rig, seed))
+        self._drive = {place: signal_tick(self.bus, driver, place)
+                       for place, driver in self._drivers.items()}
         self._decide: Callable[[int, bool], None] | None = None
-        if controller is not None:
-            control = ControllerLoop(controller)
+        if controller is not None and 'controller' in parts:
+            control = controller_loop(controller, rig, name)
             attach(self.bus, control)
             self._decide = controller_tick(self.bus, control)
+        self._sensors = tuple(f'{place}{topic}' for place in rig.muscles for topic in SENSORS)
+        self._command_topics = tuple(f'{place}pressure_command' for place in rig.muscles)
+        self.internals: dict[str, int] = {}     # name to ticks in which it differs
         self.rows: dict[str, tuple[array[int], array[float], array[float]]] = {}
 
     def run(self, recorded: Mapping[str, RecordedTopic]) -> None:
         """Repeat what was recorded of these topics."""
-        ticks: dict[str, Callable[..., None]] = {
-            **{topic: partial(self._sense, topic) for topic in SENSORS},
-            'controller_state': self._control, 'pressure_command': self._take_command,
-            'valve_signal': self._signal, 'followed_pressure': self._follow}
+        ticks: dict[str, Callable[..., None]] = {}
+        if 'plant' in self._parts:
+            ticks = {topic: partial(self._sense, topic) for topic in self._sensors}
+            ticks[MEASURED] = self._sense_angle
+        if self._decide is not None:
+            ticks['controller_state'] = self._control
+        if 'controller' in self._parts:
+            for topic in self._command_topics:
+                ticks[topic] = partial(self._take_command, topic)
+        for place in self._drivers:
+            ticks[f'{place}valve_signal'] = partial(self._signal, place)
+            ticks[f'{place}followed_pressure'] = partial(self._follow, place)
         for topic, messages in recorded.items():
             messages.play(self.bus, ticks.get(topic, partial(self.bus.send, topic)))
         self.bus.run_until()
@@ -148,46 +180,57 @@ class _Chain:
     def _sent(self, topic: str, message: Message, now_ns: int) -> None:
         self._newest[topic] = message
 
+    def _sense_angle(self, message: JointAngle, now_ns: int) -> None:
+        self._angles += 1       # with it a sample of the joint begins
+        self._sense(MEASURED, message, now_ns)
+
     def _sense(self, topic: str, message: Message, now_ns: int) -> None:
-        # All readings of one sample carry one stamp.
-        if message.stamp_ns not in self._samples:
+        # All readings of one sample of a muscle carry one stamp.
+        sample = self._angles or message.stamp_ns
+        if sample not in self._samples:
             self._measure(now_ns)
-            self._samples[message.stamp_ns] = {
-                name: self._newest[name] for name in SENSORS if name in self._newest}
+            self._samples[sample] = {
+                name: self._newest[name] for name in (MEASURED, *self._sensors)
+                if name in self._newest}
             if len(self._samples) > _SAMPLES:
                 del self._samples[next(iter(self._samples))]
-        simulated = self._samples[message.stamp_ns].get(topic)
+        simulated = self._samples[sample].get(topic)
         if simulated is not None:
             self._note(topic, message, simulated)
 
     def _control(self, message: ControllerState, now_ns: int) -> None:
-        learning = dict(zip(message.names, message.values)).get('learning', 1.0)
+        recorded = dict(zip(message.names, message.values))
         assert self._decide is not None         # without a controller nobody plays its states
-        self._decide(now_ns, bool(learning))
-        self._command = self._newest['pressure_command']
+        self._decide(now_ns, bool(recorded.get('learning', 1.0)))
+        self._commands = {topic: self._newest[topic] for topic in self._command_topics}
+        state = self._newest['controller_state']
+        for name, value in zip(state.names, state.values):
+            if name in recorded and not same_bits(recorded[name], value):
+                self.internals[name] = self.internals.get(name, 0) + 1
 
-    def _take_command(self, message: Pressure, now_ns: int) -> None:
-        if self._command is not None and self._command.stamp_ns == message.stamp_ns:
-            self._note('pressure_command', message, self._command)
+    def _take_command(self, topic: str, message: Pressure, now_ns: int) -> None:
+        command = self._commands.get(topic)
+        if command is not None and command.stamp_ns == message.stamp_ns:
+            self._note(topic, message, command)
         else:
             # No tick made it: there is no controller, or it is the command to vent at its end.
-            self.bus.send('pressure_command', message, now_ns)
+            self.bus.send(topic, message, now_ns)
 
-    def _signal(self, message: ValveSignal, now_ns: int) -> None:
-        self._drive(now_ns)
-        signal = self._newest['valve_signal']
+    def _signal(self, place: str, message: ValveSignal, now_ns: int) -> None:
+        self._drive[place](now_ns)
+        signal = self._newest[f'{place}valve_signal']
         recorded = dict(zip(message.names, message.efforts))
         for name, effort in zip(signal.names, signal.efforts):
-            self._note_value(f'valve_signal.{name}', message.stamp_ns,
+            self._note_value(f'{place}valve_signal.{name}', message.stamp_ns,
                              recorded.get(name, np.nan), effort)
 
-    def _follow(self, message: Pressure, now_ns: int) -> None:
-        followed = send_followed(self.bus, self._driver, now_ns)
+    def _follow(self, place: str, message: Pressure, now_ns: int) -> None:
+        followed = send_followed(self.bus, self._drivers[place], now_ns, place)
         if followed is not None:
-            self._note('followed_pressure', message, followed)
+            self._note(f'{place}followed_pressure', message, followed)
 
     def _note(self, topic: str, recorded: Message, replayed: Message) -> None:
-        field = _FIELD[topic]
+        field = _FIELD[short_name(topic)]
         self._note_value(f'{topic}.{field}', recorded.stamp_ns, getattr(recorded, field),
                          getattr(replayed, field))
 
@@ -196,6 +239,19 @@ class _Chain:
         columns[0].append(stamp_ns)
         columns[1].append(recorded)
         columns[2].append(replayed)
+
+    def signals(
+            self) -> tuple[dict[str, IntArray], dict[str, FloatArray], dict[str, FloatArray]]:
+        """Return stamps, recorded and replayed numbers by name of the signal, as arrays."""
+        stamp_ns, recorded, replayed = (
+            {name: np.array(columns[k]) for name, columns in self.rows.items()}
+            for k in range(3))
+        return stamp_ns, recorded, replayed
+
+
+def same_bits(a: float, b: float) -> bool:
+    """Return whether two floats are the same bits, all NaN being one."""
+    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
 
 
 def replay_chain(run: Run,
@@ -221,29 +277,37 @@ def replay_chain(run: Run,
     text = run.metadata.get('rig')
     if not text:
         raise InputError('the recording does not say which rig it is', str(run.path))
-    rig = load_rig(text)
-    run.require('valve_signal')
-    runs = _controller(run, rig, controller)
+    rig = load_rig_or_joint(text)
+    of_muscle = '' in rig.muscles
+    for place in rig.muscles:
+        run.require(f'{place}valve_signal')
+    law = _controller(run, rig, controller, 'reference' if of_muscle else 'joint_reference')
+    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2])
+    if of_muscle:
+        topics = set(ORDER) if law is not None else set(ORDER) - {'controller_state'}
+        chain.run(recorded_topics(run, topics))
+    else:
+        chain.run(recorded_topics_of_joint(run))
+    return ChainReplay(rig.name, *chain.signals(), run.start_ns)
+
+
+def recorded_seed(run: Run) -> int:
+    """Return the seed of the sensors of a recording, 0 where it says none."""
     seed = run.metadata.get('seed', '0')
     if not seed.isdigit():
         raise InputError(f'its seed `{seed}` is not a whole number', str(run.path))
-    chain = _Chain(rig, runs, int(seed))
-    topics = set(ORDER) if runs is not None else set(ORDER) - {'controller_state'}
-    chain.run(recorded_topics(run, topics))
-    stamp_ns, recorded, replayed = (
-        {name: np.array(columns[k]) for name, columns in chain.rows.items()} for k in range(3))
-    return ChainReplay(rig.name, stamp_ns, recorded, replayed, run.start_ns)
+    return int(seed)
 
 
 def _controller(
-        run: Run, rig: Rig,
-        controller: 'Controller | str | os.PathLike[str] | None') -> 'Controller | None':
+        run: Run, rig: Rig | JointRig, controller: 'Controller | str | os.PathLike[str] | None',
+        wish: str) -> 'Controller | None':
     """Return the controller of the loop, None for an experiment without one."""
     own = run.metadata.get('controller')
     if controller is None and not own:
         return None
     run.require('controller_state')
-    run.require('reference')
+    run.require(wish)
     if isinstance(controller, (str, os.PathLike)):
         return load_controller(controller, rig)
     if controller is not None:

@@ -18,8 +18,8 @@ import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.config import load_controller
-from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.joint import load_rig_or_joint
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def changed_controller(run: 'Run', wanted: list[str] | None,
     if files:
         rig = run.metadata.get('rig')
         controller = load_controller(
-            files[0], load_rig(rig) if rig else None, accept_other_rig=accept_other_rig)
+            files[0], load_rig_or_joint(rig) if rig else None, accept_other_rig=accept_other_rig)
         if not changes:
             return controller
         base = controller.to_yaml()

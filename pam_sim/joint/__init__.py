@@ -22,16 +22,18 @@ runs it on arrays, ``JointRig.plant`` step by step.
 from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pam_sim.joint.model_file import joint_preset_names, load_joint, load_rig_or_side
+    from pam_sim.joint.model_file import (
+        joint_preset_names, load_joint, load_rig_or_joint, load_rig_or_side)
     from pam_sim.joint.plant import JointPlant
     from pam_sim.joint.rig import JointRig
 
-__all__ = ['JointPlant', 'JointRig', 'joint_preset_names', 'load_joint', 'load_rig_or_side']
+__all__ = ['JointPlant', 'JointRig', 'joint_preset_names', 'load_joint', 'load_rig_or_joint',
+           'load_rig_or_side']
 
 
 def __getattr__(name: str) -> Any:
     """Import the simulation only when it is asked for: it brings the compiler with it."""
-    if name in ('load_joint', 'joint_preset_names', 'load_rig_or_side'):
+    if name in ('load_joint', 'joint_preset_names', 'load_rig_or_joint', 'load_rig_or_side'):
         from pam_sim.joint import model_file
         return getattr(model_file, name)
     if name == 'JointRig':

@@ -19,7 +19,7 @@ import os
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.rig import JointRig
-from pam_sim.located_yaml import Located
+from pam_sim.located_yaml import load_yaml, Located
 from pam_sim.model_file import load_rig
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters
@@ -63,6 +63,35 @@ def load_joint(source: str | os.PathLike[str] | Located | JointRig, valve: str |
         data, name = _PRESETS.locate(source, 'joint')
         joint = _from_mapping(data, name or file_stem(source) or '')
     return joint.with_(valve=valve, fidelity=fidelity)
+
+
+def load_rig_or_joint(source: str | os.PathLike[str] | Rig | JointRig,
+                      valve: str | None = None) -> Rig | JointRig:
+    """
+    Return what a preset or a model file describes: a Rig or a JointRig.
+
+    Parameters
+    ----------
+    source : str, os.PathLike, Rig or JointRig
+        Preset name, path of a model file, or YAML text.
+    valve : str, optional
+        Instead of that of the model.
+
+    Raises
+    ------
+    InputError
+        As of ``load_rig`` and ``load_joint``.
+
+    """
+    if isinstance(source, Rig):
+        return load_rig(source, valve=valve)
+    if isinstance(source, JointRig) or str(source) in joint_preset_names():
+        return load_joint(source, valve)
+    if isinstance(source, str) and '\n' in source or os.path.isfile(str(source)):
+        data = load_yaml(source)
+        if 'joint' in data or data.get('load', str, '') == NAME:
+            return load_joint(source, valve)
+    return load_rig(source, valve=valve)
 
 
 def load_rig_or_side(source: str | os.PathLike[str], valve: str | None = None) -> Rig:

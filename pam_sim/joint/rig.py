@@ -87,6 +87,16 @@ class JointRig:
                     'its own `friction_n_m` and `damping_n_m_s`', side)
 
     @property
+    def muscles(self) -> dict[str, 'Rig']:
+        """Return its muscles by the place below its namespace: ``flexor/`` and ``extensor/``."""
+        return {f'{side}/': getattr(self, side) for side in SIDES}
+
+    @property
+    def valve(self) -> str:
+        """Return the valve of the flexor; that of the extensor is the same as a rule."""
+        return self.flexor.valve
+
+    @property
     def range_rad(self) -> tuple[float, float]:
         """Joint angles (lower, upper) between the stops: an end stop or a stretched braid."""
         value = self.parameters

@@ -37,8 +37,10 @@ _MODES: dict[str, type[ForceMode] | type[JointMode]] = {
 LARGE_JOINT_KG_M2 = 0.03      # moment of inertia: a leg, and not a rod on a bench
 
 
-def preset_for(experiment: 'Experiment', rig: 'Rig') -> str:
+def preset_for(experiment: 'Experiment', rig: 'Rig | JointRig') -> str:
     """Return the name of the self-organizing controller for an experiment's quantity."""
+    if isinstance(rig, JointRig):
+        return joint_preset_for(rig, rig.valve)
     mode = 'force_' if experiment.domain == FORCE.topic else ''
     return f'sofc_{mode}{rig.valve}'
 

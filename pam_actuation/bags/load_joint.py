@@ -1,0 +1,98 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Load the run of a joint, or of a muscle: ``load_recording(path)``.
+
+The topics of a joint are named relative to it: ``joint_state``, ``flexor/pressure`` and so on.
+"""
+
+import os
+
+from pam_actuation.bags.load import read_series, RecordedRun, run_of
+from pam_actuation.bags.source import Bag, read_bag, TopicData
+from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
+from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
+
+MEASURED = 'joint_state'
+
+
+def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
+                   recover: bool = False) -> RecordedRun:
+    """
+    Load the run of a muscle, or of a joint where the bag has one and no muscle is chosen.
+
+    Trajectories of a joint are no series: ``replay`` reads them where it needs them.
+
+    Parameters
+    ----------
+    path : path
+        As for ``load_run``.
+    namespace : str, optional
+        Of the muscle or the joint; needed only if the bag has several.
+    recover : bool
+        Also read what precedes the damage in a bag that ended early.
+
+    Raises
+    ------
+    InputError
+        As of ``load_run``.
+
+    """
+    bag = read_bag(path, recover=recover, wanted=_is_of_rig)
+    joints = [name.rpartition('/')[0] for name, topic in bag.topics.items()
+              if short_name(name) == MEASURED and is_joint_topic(topic)]
+    if namespace is not None:
+        joints = [joint for joint in joints if joint.strip('/') == namespace.strip('/')]
+    if not joints:
+        return run_of(bag, path, namespace)
+    if len(joints) > 1:
+        raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
+                         'with namespace', str(path))
+    topics, remarks = {}, list(bag.remarks)
+    for relative, topic in topics_of_joint(bag, joints[0]).items():
+        if BY_NAME[short_name(relative)].numeric is not None:
+            series = read_series(short_name(relative), topic, remarks)
+            if len(series):
+                topics[relative] = series
+    return RecordedRun(topics=topics, metadata=bag.experiment, namespace=joints[0],
+                       path=str(path), remarks=tuple(remarks))
+
+
+def topics_of_joint(bag: Bag, namespace: str) -> dict[str, TopicData]:
+    """Return the topics of a joint and its muscles, by name relative to the joint."""
+    return {place: topic for name, topic in bag.topics.items()
+            if (place := _place(name, namespace)) is not None
+            and is_joint_topic(topic)}
+
+
+def is_joint_topic(topic: TopicData) -> bool:
+    """Return whether a topic has the name and type of one of a joint or of a muscle."""
+    return _is_of_rig(topic.name, topic.type_name, topic.encoding)
+
+
+def _place(name: str, namespace: str) -> str | None:
+    """Return a topic's name relative to a joint, None where it is not the joint's."""
+    if not name.startswith(f'{namespace}/'):
+        return None
+    relative = name.removeprefix(f'{namespace}/')
+    below, _, short = relative.rpartition('/')
+    return relative if below in ('', *SIDES) and short in BY_NAME else None
+
+
+def _is_of_rig(name: str, type_name: str, encoding: str) -> bool:
+    row = BY_NAME.get(short_name(name))
+    return row is not None and encoding == 'cdr' and (
+        row.place in (MUSCLE, JOINT) and row.type_name == type_name)

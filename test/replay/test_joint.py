@@ -1,0 +1,150 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A joint is simulated into a bag, and the bag is replayed: to the bit, or with another law."""
+
+from dataclasses import replace
+import json
+import re
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.load_joint import load_recording
+from pam_actuation.cli.main import main
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.replay.joint import is_joint, PARTS, replay_joint
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+from pam_sim.joint.parameters import SIDES
+import pytest
+
+EXPERIMENT = """
+name: short_joint_sine
+domain: joint_angle
+segments:
+  - rest: {duration_s: 0.5}
+  - ramp: {to_rad: -0.3, duration_s: 1.0}
+  - sine: {center_rad: 0.0, amplitude_rad: 0.3, frequency_hz: 1.0, cycles: 1}
+"""
+MEASURED = ('pressure', 'contraction', 'force')
+
+
+@pytest.fixture(scope='module', params=['ppr', 'hsv'])
+def bag(request, tmp_path_factory):
+    valve = request.param
+    joint = load_joint('joint_dmsp_5_300_realistic', valve=valve)
+    place = tmp_path_factory.mktemp('joint') / valve
+    result = simulate_experiment(
+        load_experiment(EXPERIMENT), joint, load_controller(f'sofc_joint_{valve}', joint), place,
+        seed=5)
+    assert result['counts']['/knee/joint_state'] == 250 * 2.6 + 1
+    return place
+
+
+@pytest.fixture(scope='module')
+def run(bag):
+    return load_recording(bag)
+
+
+def with_integral(text, gain):
+    """Return the text of a controller with another integral gain."""
+    changed, count = re.subn(r'integral_pa_per_m_s: \S+', f'integral_pa_per_m_s: {gain}', text)
+    assert count == 1
+    return changed
+
+
+def test_a_run_of_a_joint_has_the_topics_of_joint_and_muscles(run, bag):
+    assert is_joint(run) and run.namespace == '/knee'
+    assert {'joint_state', 'joint_reference', 'controller_state', *(
+        f'{side}/{topic}' for side in SIDES
+        for topic in (*MEASURED, 'pressure_command', 'valve_signal'))} <= set(run.topics)
+    angle, wanted = (run[topic]['angle_rad'] for topic in ('joint_state', 'joint_reference'))
+    assert abs(angle.min() - wanted.min()) < 0.1
+    assert run.remarks == () and run.implausible == ()
+    muscle = load_recording(bag, namespace='/knee/flexor')
+    assert not is_joint(muscle)
+    assert np.array_equal(muscle['pressure']['pressure_pa'], run['flexor/pressure']['pressure_pa'])
+    with pytest.raises(InputError, match='several muscles'):
+        load_run(bag)
+    with pytest.raises(InputError, match='namespace /hip'):
+        load_recording(bag, namespace='/hip')
+
+
+def test_each_part_and_the_chain_are_reproduced_to_the_bit(run):
+    parts = replay_joint(run)
+    assert set(parts.parts) == set(PARTS) and parts.internals == {}
+    assert all(part.identical and part.recorded for part in parts.parts.values())
+    assert not parts.unexpected_difference
+    chain = replay_joint(run, chain=True).parts['chain']
+    assert chain.identical
+    wanted = {'joint_state.angle_rad', *(f'{side}/{name}' for side in SIDES for name in (
+        'pressure.pressure_pa', 'contraction.contraction_m', 'force.force_n',
+        'pressure_command.pressure_pa', 'followed_pressure.pressure_pa'))}
+    assert wanted <= set(chain.recorded)
+    for name in wanted:
+        topic, _, field = name.rpartition('.')
+        assert np.array_equal(np.sort(chain.recorded[name]), np.sort(run[topic][field]))
+
+
+def test_another_law_gives_another_experiment_and_is_no_mistake(run):
+    text = with_integral(run.metadata['controller'], 1e6)
+    other = load_controller(text, load_joint(run.metadata['rig']))
+    found = replay_joint(run, other, only='controller')
+    assert not found.parts['controller'].identical and not found.unexpected_difference
+    chain = replay_joint(run, load_controller(text, load_joint(run.metadata['rig'])), chain=True)
+    angle = {one.signal: one for one in chain.parts['chain'].differences}['joint_state.angle_rad']
+    assert not angle.identical
+    with pytest.raises(InputError, match='changes nothing for the plant'):
+        replay_joint(run, other, only='plant')
+
+
+def test_a_changed_recording_is_noticed(run):
+    other = with_integral(run.metadata['controller'], 2e6)
+    changed = replace(run, metadata={**run.metadata, 'controller': other})
+    found = replay_joint(changed, only='controller')
+    assert found.unexpected_difference and 'integral_pa' in found.internals
+    live = replace(run, metadata={**changed.metadata, 'origin': 'live'})
+    assert not replay_joint(live, only='controller').unexpected_difference
+    with pytest.raises(InputError, match='which joint'):
+        replay_joint(replace(run, metadata={}))
+    with pytest.raises(InputError, match='no recorded controller'):
+        replay_joint(replace(run, metadata={'rig': run.metadata['rig']}), only='controller')
+
+
+def test_the_verbs_take_a_joint(bag, tmp_path, capsys):
+    out = tmp_path / 'replayed.npz'
+    assert main(['replay', str(bag), '--chain', '--out', str(out)]) == 0
+    assert capsys.readouterr().out.count('identical to the bit') >= 13
+    with np.load(out) as arrays:
+        assert 'chain_flexor_pressure_pressure_pa_recorded' in arrays
+    assert main(['replay', str(bag), '--only', 'driver', '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['driver']['identical'] is True
+    assert main(['info', str(bag)]) == 0
+    assert 'most analyses' not in capsys.readouterr().out
+
+
+def test_what_does_not_fit_is_one_sentence(tmp_path, capsys):
+    for options, words in (
+            (['joint_sine'], 'is a single muscle'),
+            (['sine_quarter_hz', '--rig', 'joint_dmsp_5_300'], 'is a joint')):
+        assert main(['simulate', *options, '--out', str(tmp_path / 'bag')]) == 2
+        assert words in capsys.readouterr().err
+    assert not (tmp_path / 'bag').exists()
+    experiment = load_experiment(EXPERIMENT)
+    joint, rig = load_joint('joint_dmsp_5_300'), load_rig('dmsp_5_300_realistic', valve='ppr')
+    with pytest.raises(InputError, match='the controller has `mode: contraction`'):
+        simulate_experiment(experiment, joint, load_controller('sofc_ppr', rig), tmp_path / 'bag')
