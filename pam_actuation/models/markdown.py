@@ -20,15 +20,22 @@ from pam_actuation.models.cells import facts, groups, tables
 
 _INTRODUCTION = """# Models
 
-Every muscle law, valve, load, effect and sensor setting that the simulator knows. This page is
-made from the code by `pam models --markdown docs/reference/models.md`; do not edit it. Files of
-yours in a folder named by `PAM_EFFECTS_PATH` or `PAM_MUSCLE_LAWS_PATH` are listed by
-`pam models` too.
+Every muscle law, valve, load, effect and sensor setting of the simulator. This page is
+made from the code by `pam models --markdown docs/reference/models.md`; do not edit it.
+`pam models` also lists your own files in the folders that `PAM_EFFECTS_PATH` or
+`PAM_MUSCLE_LAWS_PATH` name.
 
-Symbols: p absolute and p_g gauge pressure in the muscle, x contraction, eps = x / L0, v = dx/dt,
-F muscle tension, F_cell load cell, u voltage of the regulator, d_f and d_v fill and vent duty,
-V inner volume, mdot mass flow, psi the flow function of ISO 6358. An arrow says what an effect
-puts in the place of a term of the nominal rig. All numbers are SI.
+| symbol | meaning |
+|---|---|
+| p, p_g | absolute and gauge pressure in the muscle |
+| x, eps, v | contraction, x / L0, dx/dt |
+| F, F_cell | muscle tension, force at the load cell |
+| u | voltage of the regulator |
+| d_f, d_v | fill and vent duty |
+| V, mdot | inner volume, mass flow |
+| psi | flow function of ISO 6358 |
+
+All numbers are SI. An arrow shows which term of the nominal rig an effect replaces, and by what.
 """
 
 

@@ -54,10 +54,10 @@ class ExperimentRecorder(ManagedNode):
     """
     Record while active; each activation writes one bag.
 
-    Messages are taken in serialized form with the times of sending and receiving and
-    the number their publisher gave them, so that losses are seen. A write error ends the
-    node with exit code 1; what was written is kept. When the node is
-    stopped by a signal it goes on until the other nodes are gone (at most 2 s).
+    It stores serialized messages with the times of sending and receiving. The sequence numbers
+    of their publishers show losses. A write error ends the node with exit code 1; what was
+    written is kept. After a signal, the node continues until the other nodes are gone, at most
+    2 s.
     """
 
     NAME = 'experiment_recorder'

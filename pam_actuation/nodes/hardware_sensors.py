@@ -32,10 +32,10 @@ from pam_sim.errors import InputError
 
 class HardwareSensors(ManagedNode):
     """
-    Publish what the sensors of the rig read, in place of ``plant_simulator``.
+    Publish the readings of the sensors of a real rig, in place of ``plant_simulator``.
 
-    A sensor that does not answer sends nothing: those who need it notice that it is
-    silent, and the driver vents.
+    If a sensor does not answer, nothing is sent. Its subscribers notice the silence, and the
+    driver vents.
     """
 
     NAME = 'hardware_sensors'

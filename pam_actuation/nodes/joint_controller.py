@@ -41,12 +41,12 @@ INPUTS = {
 
 class JointNode(LearningSwitch, ManagedNode):
     """
-    Turn a joint with both its muscles; on every way out ask both to be vented.
+    Control a joint with its two muscles; at every end ask both drivers to vent.
 
-    It tracks an angle or, where none is asked for, gives a torque. Its own namespace is that
-    of the joint; the drivers of the muscles run in ``flexor`` and ``extensor`` below it. The
-    joint's URDF is on ``robot_description``, as other programs expect it; the parameter
-    ``muscle`` is the joint's name there, in trajectories and in efforts.
+    It tracks an angle or, without one, a torque. Its namespace is that of the joint. The
+    drivers of the muscles run in ``flexor`` and ``extensor`` below it. It publishes the URDF
+    of the joint on ``robot_description``. The parameter ``muscle`` is the name of the joint
+    in the URDF, in trajectories and in efforts.
     """
 
     NAME = 'joint_controller'

@@ -27,8 +27,8 @@ class JointSimulator(PhysicsNode):
     """
     Simulate two muscles, their valves and the limb they turn, in real time with 1 ms steps.
 
-    Its own namespace is that of the joint; the muscles have ``flexor`` and ``extensor``
-    below it, each with the topics of a rig. Timing is that of the plant simulator.
+    Its namespace is that of the joint. The muscles have ``flexor`` and ``extensor`` below it,
+    each with the topics of a rig. Timing is that of the plant simulator.
     """
 
     NAME = 'joint_simulator'

@@ -33,8 +33,8 @@ class PlantSimulator(PhysicsNode):
     """
     Simulate valve, muscle, load and sensors in real time with 1 ms steps.
 
-    Physics runs up to the present at every tick. A valve signal or a disturbance acts from
-    its own stamp on if physics has not passed it yet, else at once, and is held without limit.
+    At every tick the physics runs up to the present. A valve signal or a disturbance acts from
+    its own stamp on, or at once if the physics has passed that time. It is held without limit.
     With use_sim_time the plant makes the time and is the only publisher of ``/clock``.
     """
 

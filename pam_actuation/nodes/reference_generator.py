@@ -29,9 +29,9 @@ class ReferenceGenerator(ManagedNode):
     """
     Play one experiment; afterwards keep sending its last value.
 
-    An experiment in the pressure domain sends ``pressure_command`` itself, one in the raw
-    valve signal ``valve_command``; both run without a controller. The disturbance of an
-    experiment goes out on ``external_force``.
+    An experiment in pressure sends ``pressure_command``, one in the raw valve signal
+    ``valve_command``. Both run without a controller. The disturbance of an experiment is sent
+    on ``external_force``.
     """
 
     NAME = 'reference_generator'

@@ -45,11 +45,11 @@ SHORTEST_SILENCE_S = 0.03   # three signals
 
 class ValveDriver(ManagedNode):
     """
-    Turn pressure commands into valve signals, supervised.
+    Turn pressure commands into valve signals, and supervise commands and sensors.
 
-    PPR: a command is passed on within 1 ms, and without commands a signal goes out
-    at the rate of the law. HSV: one signal per PWM period. The signal that
-    vents is the last one on every way out.
+    PPR: a command is passed on within 1 ms; without commands, signals are sent at the rate of
+    the control law. HSV: one signal per PWM period. The last signal is always the one that
+    vents.
     """
 
     NAME = 'valve_driver'

@@ -33,10 +33,10 @@ class ValveWatchdog(ManagedNode):
     """
     Send the safe valve signal while the driver, a process of its own, is silent.
 
-    It covers a driver that was killed or stopped, for whatever listens to ``valve_signal``, and
-    a second sender beside the driver or in its place: each of his openings is answered with the
-    safe signal. What hangs on a device of the driver's computer is vented by a process of the
-    driver.
+    It acts when the driver was killed or stopped, for every subscriber of ``valve_signal``. It
+    also acts against a second sender, beside the driver or in its place, and answers each of
+    its openings with the safe signal. Behind a hardware back end, a process of the driver
+    vents the device.
     """
 
     NAME = 'valve_watchdog'
