@@ -15,9 +15,9 @@
 """
 Figures of merit of a recorded run, as pure functions.
 
-The functions on arrays take SI values and return SI values; those on a
-``pam_sim.run.Run`` read the topics they need and return None where a topic is
-missing, so that a page can leave a cell empty instead of failing.
+The functions on arrays take and return SI values. Those on a ``pam_sim.run.Run`` read the topics
+they need. They return None if a topic is missing, so a page can leave a cell empty instead of
+failing.
 """
 
 from dataclasses import dataclass, field
@@ -293,9 +293,9 @@ def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
     """
     Return the air [kg] filled in over a record, by mass balance of the muscle.
 
-    Increases of m = p V / (R T) are summed after a play of 0.5 % of the range of
-    m, which keeps sensor noise from being counted as consumption. Leakage and
-    what a regulator bleeds itself are not seen, so this is a lower bound.
+    Increases of m = p V / (R T) are summed after a play of 0.5 % of the range of m. The play keeps
+    sensor noise from counting as consumption. Leakage and what a regulator bleeds itself are not
+    seen, so this is a lower bound.
 
     Parameters
     ----------

@@ -15,9 +15,9 @@
 """
 Small still figures as SVG text: lines over two axes, surfaces over three, maps in colours.
 
-The pages of this project draw with plotly; these are for documents, where a
-picture must stand by itself, without a script. matplotlib draws them; it is
-imported when the first one is drawn, for it takes a while.
+The pages of this project draw with plotly. These figures are for documents, where a picture must
+work without a script. matplotlib draws them; it is imported with the first figure, because that
+takes a while.
 """
 
 from dataclasses import dataclass, field

@@ -15,10 +15,9 @@
 """
 Nearest monotone surface: contraction rises with pressure and falls with load.
 
-Isotonic regression in two directions: pool-adjacent-violators along each axis,
-joined by Dykstra's projections (Dykstra and Robertson 1982, Annals of
-Statistics 10(3), An algorithm for isotonic regression for two or more
-independent variables).
+This is isotonic regression in two directions: pool-adjacent-violators along each axis, joined by
+Dykstra's projections. Source: Dykstra and Robertson 1982, Annals of Statistics 10(3), An algorithm
+for isotonic regression for two or more independent variables.
 """
 
 from collections.abc import Sequence

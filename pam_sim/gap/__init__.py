@@ -15,13 +15,13 @@
 """
 Find the gap between recordings and a model, name what is missing, add it and prove it.
 
-The rooms in reading order, each of which knows only those before it: ``data`` (what was
-recorded, its noise, its split), ``subsystems`` (each on its own measured input), ``fit``
-(hypotheses fitted), ``select`` (candidates, ranking, forward selection, backward elimination,
-pairs), ``verify`` (certify data: validation, refutation, materiality), ``report`` (reason, place
-and fingerprint of a gap), ``plan`` (what a protocol could show, before measuring). On top
-``verdict`` and ``workflow``. Below all: ``criteria`` (every decision threshold) and ``result``
-(what gap.json holds).
+The rooms in reading order, each of which knows only those before it: ``data`` holds the
+recordings, their noise and their split. ``subsystems`` simulates each part on its own measured
+input. ``fit`` fits hypotheses. ``select`` has candidates, ranking, forward selection, backward
+elimination and pairs. ``verify`` uses the certify data: validation, refutation, materiality.
+``report`` gives reason, place and fingerprint of a gap. ``plan`` predicts what a protocol could
+show. On top ``verdict`` and ``workflow``. Below all: ``criteria`` (every decision threshold) and
+``result`` (what gap.json holds).
 """
 
 from pam_sim.gap.result import GapResult

@@ -16,10 +16,11 @@
 The decision thresholds of the gap workflow, all of them.
 
 A *decision threshold* is a number with which recordings, fits or names are compared, and whose
-outcome changes what is refused, tried, kept, named or called certain. It stands here. *Numerics*
-stay near their code: grids, steps, tolerances, iterations, windows and draws; so do *effort* (how
-many names are fitted), *assumptions* about the measurement (priors of latency and skew, smallest
-noise of a sensor), the widths of intervals, and the wording of sentences.
+outcome changes what is refused, tried, kept, named or called certain. It stands here. Other
+numbers stay near their code. These are *numerics* (grids, steps, tolerances, iterations, windows,
+draws) and *effort* (how many effects are fitted). They are also *assumptions* about the
+measurement, such as priors of latency and skew, the widths of intervals, and the wording of
+sentences.
 
 A workflow is given its criteria as an argument. ``replace(CRITERIA, seen_gap=0.1)`` makes others,
 such as an ablation needs.

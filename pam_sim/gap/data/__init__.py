@@ -15,7 +15,7 @@
 """
 What was recorded: signals, health, noise, and how it is split into parts.
 
-``signals`` (names and units), ``health`` (can these data be used), ``overlap`` (are they data
-of their own), ``recording`` (inputs on the grid of the physics), ``noise`` (what sensors and
-stamps explain), ``split`` (what is fitted, what judges, what certifies).
+``signals`` has names and units. ``health`` checks whether data can be used, ``overlap`` whether
+recordings are independent. ``recording`` puts inputs on the grid of the physics. ``noise`` is the
+error that sensors and stamps explain. ``split`` makes fit, select and certify set.
 """

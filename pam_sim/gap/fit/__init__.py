@@ -15,7 +15,8 @@
 """
 Least-squares fits of hypotheses to the subsystem problems.
 
-``candidate`` (one formulation of an effect), ``hypothesis`` (what a model may have beyond the
-given one), ``solver`` (one least-squares problem), ``estimator`` (hypotheses fitted),
-``distance`` (how far a fit is from none), ``parallel`` (several at once).
+A ``candidate`` is one formulation of an effect. A ``hypothesis`` is what a model may have beyond
+the given one. The ``solver`` solves one least-squares problem, and the ``estimator`` fits
+hypotheses with it. ``distance`` tells how far a fit is from no effect. ``parallel`` fits several
+at once.
 """

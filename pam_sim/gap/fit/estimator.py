@@ -15,11 +15,11 @@
 """
 Fit a hypothesis: the model with some effects added and some numbers set free.
 
-Bounded least squares of the subsystems' errors with a Gaussian prior on every known number.
-It stays within ``max_prior_sd`` deviations unless the hypothesis frees it. A subsystem that it
-does not touch keeps its baseline. Errors of a model that still misses something are
-neither white nor at the floor; their weight is tempered by misfit and memory, or
-the known numbers would bend to hide what is missing.
+Bounded least squares of the subsystems' errors with a Gaussian prior on every known number. It
+stays within ``max_prior_sd`` deviations unless the hypothesis frees it. A subsystem that it does
+not touch keeps its baseline. The errors of an incomplete model are neither white nor at the floor.
+Misfit and memory lower their weight. Otherwise the parameters would adapt and hide the missing
+effect.
 
 Slopes with respect to the known numbers are taken once for all rivals of a step: they
 change little, and each iteration costs only the parameters of the effects.
@@ -202,10 +202,10 @@ class Estimator:
         Return by how many standard deviations the size of an effect differs from none.
 
         Its shapes are held: a size that is known only together with a shape is none the less
-        there. The numbers that could stand in for it stay within their ranges: a latency is
-        no longer than the longest. An effect of shapes alone, of which no value means none, is
-        as certain as the best known of them, in relation to itself: a reservoir that may as well
-        be twice as large is none that empties.
+        there. The numbers that could stand in for it stay within their ranges: a latency is no
+        longer than the longest. An effect with shape parameters only has no value that means zero.
+        Its certainty is that of its best-known shape, relative to the value. A reservoir that
+        might be twice as large is not one that empties.
         """
         own = self._own()
         own._slopes_at(found)

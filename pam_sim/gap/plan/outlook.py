@@ -15,11 +15,11 @@
 """
 Before measuring: what a protocol could show on a rig, and which effects it would confuse.
 
-Everything is local: how each known number and each effect moves the signals of a
-protocol, in noise floors. What the numbers can do within their tolerance is taken out of
-an effect's signature; what is left tells from which size on the effect shows, and what
-is left once a rival has done its best too, from which size on it can be named. Only inner
-products are kept, so protocols made of the same pieces are joined by adding them.
+Everything is local: how each known number and each effect moves the signals of a protocol, in
+noise floors. The part that parameters can explain within their tolerance is removed from the
+signature of an effect. The rest gives the smallest size that shows. The rest after fitting a rival
+as well gives the smallest size that can be named. Only inner products are kept, so protocols made
+of the same pieces are joined by adding them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

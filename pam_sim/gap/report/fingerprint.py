@@ -15,15 +15,16 @@
 """
 What the gap depends on, without any model of it: a second witness beside the named effects.
 
-Errors of a subsystem with everything measured put in, calibrated, are averaged in bins of
-what was measured: pressure, contraction, direction, rate, time since the last reversal, and
-some pairs. The means are taken on one part of the data; which share of the squared errors
-beyond the noise they explain is counted on another. Static maps show in pressure and
-contraction, friction in direction, damping in rate, what relaxes in the time since a reversal.
+The subsystem is calibrated and fed with everything measured. Its errors are averaged in bins of
+measured quantities: pressure, contraction, direction, rate, time since the last reversal, and some
+pairs. The means are taken on one part of the data; which share of the squared errors beyond the
+noise they explain is counted on another. Static maps show in pressure and contraction, friction in
+direction, damping in rate, what relaxes in the time since a reversal.
 
-The valve errs in pressure. Muscle and load err in force, where nothing oscillates: the
-tension at measured pressure and contraction against the load cell, and the cell against the
-weight and inertia of the measured motion; without a cell the first against the last.
+The valve errs in pressure. Muscle and load are compared in force, where nothing oscillates. The
+tension at measured pressure and contraction is compared with the load cell. The load cell is
+compared with weight and inertia of the measured motion. Without a cell, the first is compared with
+the last.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -15,11 +15,10 @@
 """
 Where the gap sits: which subsystem makes it, and under which condition.
 
-Subsystems are cut at measured signals. With the measured pressure as input the
-valve is out of the loop, so what is left of the gap belongs to muscle and load;
-with the measured contraction as input too, the load cell shows what the muscle
-alone misses; force and measured motion show what the load misses. The subsystem needs
-no knowledge of what is missing.
+Subsystems are cut at measured signals. With the measured pressure as input, the valve plays no
+role, and the remaining gap belongs to muscle and load. With the measured contraction as input too,
+the load cell shows what the muscle alone misses. Force and measured motion show what the load
+misses. The subsystem needs no knowledge of what is missing.
 """
 
 from collections.abc import Mapping

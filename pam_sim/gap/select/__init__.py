@@ -15,10 +15,10 @@
 """
 Which effects are missing: candidates, ranking, forward selection, backward elimination.
 
-``candidates`` (what may be missing), ``screening`` (which of them are worth a fit),
-``comparison`` (which of two fits the held-out data prefer), ``rival``, ``ranking`` (which rival
-wins), ``context`` (what a search stands on), ``rivals`` (those of a round), ``refit`` (with one
-effect left out or replaced), ``forward``, ``rerank``, ``size``, ``plausibility`` and
-``backward`` (what stays), ``pairs`` (two at once, where that fails), ``search`` (all of it in
-order).
+``candidates`` lists what may be missing, and ``screening`` chooses those worth a fit.
+``comparison`` decides which of two fits the held-out data prefer. ``rival``, ``rivals`` and
+``ranking`` find the winner of a round. ``context`` holds the data of a search, and ``refit`` fits
+with one effect left out or replaced. ``forward`` adds effects; ``rerank``, ``size``,
+``plausibility`` and ``backward`` decide what stays. ``pairs`` tries two at once where that fails.
+``search`` runs everything in order.
 """

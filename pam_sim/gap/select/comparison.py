@@ -15,11 +15,11 @@
 """
 Which of two fitted hypotheses the held-out data prefer, and how much each explains.
 
-A share of the gap is taken inside one subsystem, so that a badly fitting subsystem cannot
-drown another. Rivals are compared block by block on the logarithm of their squared
-errors, in blocks where there is something to explain: a mean over everything would
-let the few blocks with the largest error decide. Blocks in which both say the same are
-left out too, or what a second recording tells would drown in the first.
+A share of the gap is taken inside one subsystem, so that a badly fitting subsystem cannot drown
+another. Rivals are compared block by block on the logarithm of their squared errors, in blocks
+where there is something to explain. In a mean over everything, the few blocks with the largest
+error would decide. Blocks in which both say the same are left out too, or what a second recording
+tells would drown in the first.
 """
 
 import math
@@ -67,9 +67,9 @@ def preference(problem: SubsystemProblem, base: FloatArray, better: FloatArray, 
     """
     Return by how many deviations the log ratio of squared errors says ``better``.
 
-    Student's t over the blocks, or Wilcoxon's signed ranks where they say it more clearly (all
-    blocks agree, but some differ by far more), each as the deviation of a normal distribution
-    that is as rare: few blocks must agree the more.
+    The test is Student's t over the blocks, or Wilcoxon's signed ranks where they are more
+    significant (all blocks agree, but some differ by far more). Both are stated as the equivalent
+    deviation of a normal distribution. Few blocks must therefore agree more.
 
     Parameters
     ----------

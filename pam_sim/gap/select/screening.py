@@ -15,9 +15,9 @@
 """
 Which effects are worth a fit: sensitivity signatures against what the baseline leaves.
 
-One simulation per formulation and start. Its change of the errors is freed of what the
-known numbers can do within their priors; what is left is the effect's signature, and
-its projection on the remaining errors gives amplitude and promise in closed form.
+One simulation per formulation and start. The part that parameters can explain within their priors
+is removed from its change of the errors. The rest is the signature of the effect. Its projection
+on the remaining errors gives amplitude and promise in closed form.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

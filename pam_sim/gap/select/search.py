@@ -15,8 +15,8 @@
 """
 Which effects are missing: fit what promises something, rank, keep what holds out.
 
-One effect at a time is added in each subsystem with a gap, the best on held-out blocks; then
-everything is refitted and the rest of the gap looked at again. Where rivals cannot be told
+In each subsystem with a gap, the effect that is best on held-out blocks is added, one at a time.
+Then everything is refitted and the rest of the gap is examined again. Where rivals cannot be told
 apart they stay together as a set. At the end every effect must be missed when it is left out.
 """
 

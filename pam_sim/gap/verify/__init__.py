@@ -15,7 +15,8 @@
 """
 Whether what is named holds on data that neither fit nor selection has seen.
 
-``model`` (the rig of a fit), ``materiality`` (does it move a signal by enough), ``validation``
-(free runs on the certify data), ``refutation`` (which names these contradict), ``spread`` (what
-the doubt about the numbers leaves), ``uncertainty`` (how well the numbers are known).
+``model`` is the rig of a fit. ``materiality`` asks whether an effect moves a signal by enough.
+``validation`` makes free runs on the certify data, and ``refutation`` finds the effects that these
+contradict. ``spread`` is the error that uncertain parameters leave, and ``uncertainty`` tells how
+well they are known.
 """

@@ -29,10 +29,11 @@ def is_material(own: Mapping[str, float], refitted: Mapping[str, float], materia
     """
     Return whether effects are worth a name.
 
-    That is, whether they move a signal by more than ``materiality`` where the numbers of the
-    model do what they can to replace them; or while these stay, and still by ``visible_sd`` where
-    they do not, or by ``found_again_sd`` if the certify data confirm it. Numbers that were bent by
-    one motion are wrong in another, though the effect itself may do nothing there.
+    They are material if they move a signal by more than ``materiality`` after the parameters of
+    the model are refitted to replace them. They are also material if they do so with the
+    parameters held, and still by ``visible_sd`` after the refit. ``found_again_sd`` suffices there
+    if the certify data confirm it. Numbers that were bent by one motion are wrong in another,
+    though the effect itself may do nothing there.
 
     Parameters
     ----------

@@ -15,10 +15,9 @@
 """
 Which names of a set the certify data contradict.
 
-Where two of a set differ on the certify data, the errors of the true one are the noise alone,
-and those of the other are larger by just what the two are apart. As a name needs to explain
-90 % of a gap and no more, for no formulation is the muscle's own, a smaller difference says
-nothing.
+Where two effects of a set differ on the certify data, the errors of the true one are noise alone.
+Those of the other are larger by the difference of the two. As a name needs to explain 90 % of a
+gap and no more, for no formulation is the muscle's own, a smaller difference says nothing.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -15,11 +15,12 @@
 """
 How well the numbers of a named effect are known.
 
-Three sources: the tempered likelihood around the solution, or how much time blocks differ
-where that is more; what latency and skew of the measurement took up, for it may be the
-effect's own; and the form: no formulation is the muscle's own, so the spread over those of
-the same name that explain about as much counts, and what is left of the gap. Results state
-quantities that mean the same in all formulations.
+There are three sources. The first is the tempered likelihood around the solution, or the
+difference between time blocks if that is larger. The second is what latency and skew of the
+measurement absorbed, since it may belong to the effect. The third is the form: no formulation is
+exactly that of the muscle. It is the spread over formulations of the same effect that explain
+about as much, and the rest of the gap. Results state quantities that mean the same in all
+formulations.
 """
 
 from collections.abc import Sequence

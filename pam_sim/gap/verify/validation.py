@@ -99,8 +99,8 @@ class Validation:
         """
         Return a run with the skew that this recording, which was not fitted, has itself.
 
-        It is no part of the model, and in a fast motion a fraction of a millisecond is more than
-        what an effect moves; the bounds are those of the fit.
+        It is no part of the model. In a fast motion, a fraction of a millisecond moves a signal by
+        more than an effect does. The bounds are those of the fit.
         """
         aligned = dict(run)
         for s, late in late_s.items():
