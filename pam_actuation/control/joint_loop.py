@@ -37,7 +37,7 @@ law starts from what the other one commanded last.
 from collections.abc import Callable
 from functools import partial
 import math
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
@@ -47,7 +47,7 @@ from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
 from pam_actuation.control.loop import (
     fresh, measurement_reason, reason_text, REFERENCE_REASONS, STALL_NS)
-from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR, JointController
+from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.slack_muscle import SlackMuscle
@@ -79,6 +79,21 @@ _TORQUE_NAMES = (
 
 
 Pair = tuple[float, float]      # of flexor and extensor
+
+
+class Inputs(NamedTuple):
+    """What a law is given in a tick, NaN where there is nothing; pressures absolute."""
+
+    angle_rad: float = math.nan
+    reference_rad: float = math.nan
+    reference_rate_rad_per_s: float = math.nan
+    lead_rad: float = math.nan
+    lead_rate_rad_per_s: float = math.nan
+    elapsed_s: float = math.nan
+    flexor_pressure_pa: float = math.nan
+    extensor_pressure_pa: float = math.nan
+    flexor_force_n: float = math.nan
+    extensor_force_n: float = math.nan
 
 
 class JointControllerLoop:
@@ -177,7 +192,7 @@ class JointControllerLoop:
         self._angle = message
 
     def on_pressure(self, side: int, message: Pressure) -> None:
-        """Take a ``Pressure`` measured at a muscle, ``FLEXOR`` or ``EXTENSOR``."""
+        """Take a ``Pressure`` measured at a muscle, ``modes.joint.FLEXOR`` or ``EXTENSOR``."""
         self._pressures[side] = message
 
     def on_followed_pressure(self, side: int, message: Pressure) -> None:
@@ -264,7 +279,7 @@ class JointControllerLoop:
             self._commands_pa = None
         may_learn = bool(learning and reason == codes.OK and not self.follows_torque
                          and not controller.freeze_learning)
-        inputs: tuple[float, ...] = (math.nan,) * 10
+        inputs = Inputs()
         stamp_ns = -1
         held_back = self._held_back(now_ns, measured_pa)
         if running and self._angle is not None:
@@ -344,15 +359,15 @@ class JointControllerLoop:
                 for expected, measured in zip(expected_pa, pressures_pa))
             both_pa = flexor_pa - extensor_pa
         # Both are to be asked, whatever the first one says.
-        frozen = self._frozen.judge(
-            now_ns, stamp_ns, angle, pressures_pa[FLEXOR] - pressures_pa[EXTENSOR])
+        flexor_pa, extensor_pa = pressures_pa
+        frozen = self._frozen.judge(now_ns, stamp_ns, angle, flexor_pa - extensor_pa)
         return self._frozen_both.judge(now_ns, stamp_ns, angle, both_pa) or frozen
 
     def _fresh_pressures_pa(self, now_ns: int) -> Pair:
         """Return both measured pressures [Pa], NaN for one that is not fresh."""
         flexor_pa, extensor_pa = (
             message.pressure_pa if fresh(message, now_ns) else math.nan
-            for message in (self._pressures[FLEXOR], self._pressures[EXTENSOR]))
+            for message in self._pressures)
         return flexor_pa, extensor_pa
 
     def _held_back(self, now_ns: int, pressures_pa: Pair) -> float:
@@ -380,28 +395,28 @@ class JointControllerLoop:
         flexor, extensor = self._slack
         return flexor.command_pa(now_ns), extensor.command_pa(now_ns)
 
-    def _run(self, inputs: tuple[float, ...], may_learn: bool,
-             held_back: float) -> Pair:
+    def _run(self, inputs: Inputs, may_learn: bool, held_back: float) -> Pair:
         """Return the commands [Pa] of the law that counts; the other one stands aside."""
         controller = self.controller
-        angle, reference, rate, lead, lead_rate, elapsed_s = inputs[:6]
-        pressures_pa, forces_n = (inputs[6], inputs[7]), (inputs[8], inputs[9])
+        pressures_pa = inputs.flexor_pressure_pa, inputs.extensor_pressure_pa
+        forces_n = inputs.flexor_force_n, inputs.extensor_force_n
         if not self.follows_torque:
             self.torque.pause()
             return controller.step(
-                angle, reference, rate, lead, lead_rate, may_learn, elapsed_s, pressures_pa,
-                forces_n, held_back)
+                inputs.angle_rad, inputs.reference_rad, inputs.reference_rate_rad_per_s,
+                inputs.lead_rad, inputs.lead_rate_rad_per_s, may_learn, inputs.elapsed_s,
+                pressures_pa, forces_n, held_back)
         if held_back != FOLLOWS:
             forces_n = math.nan, math.nan       # the feedback stands still
         commands_pa = self.torque.step(
-            angle, self.efforts.torque_n_m, controller.wanted_co_contraction_pa, forces_n,
-            pressures_pa)
+            inputs.angle_rad, self.efforts.torque_n_m, controller.wanted_co_contraction_pa,
+            forces_n, pressures_pa)
         controller.stand_aside(commands_pa)
         return commands_pa
 
     def _inputs(self, now_ns: int, measured: JointAngle, pressures_pa: Pair,
-                changed: bool) -> tuple[float, ...]:
-        """Return angle, references, time passed, pressures and forces as one tuple of floats."""
+                changed: bool) -> Inputs:
+        """Return angle, references, time passed, pressures and forces."""
         reference = lead = (math.nan, math.nan)
         if not self.follows_torque:
             # The error belongs to the time of the measurement, the preview to now.
@@ -413,5 +428,5 @@ class JointControllerLoop:
         if changed and self._commands_pa is not None:
             pressures_pa = self._commands_pa    # a law goes on from the commands of the other
         forces = (force.force_n if fresh(force, now_ns) else math.nan
-                  for force in (self._forces[FLEXOR], self._forces[EXTENSOR]))
-        return (measured.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)
+                  for force in self._forces)
+        return Inputs(measured.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)
