@@ -25,6 +25,7 @@ import math
 
 from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step, OUTPUT
 from pam_actuation.drivers.hsv_model import PARAMETERS, SENT_SIZE, STATE
+from pam_actuation.drivers.parameter import number
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, values_of, zeros
@@ -47,39 +48,44 @@ class HsvConfig:
     shortest pulse.
     """
 
-    period_s: float = 0.010
-    conductance_m3_per_s_pa: float = 2.0e-10
-    critical_ratio: float = 0.38
-    supply_pa: float = 801_325.0
-    volume_m3: float = 8.89e-6
-    volume_slope_m3_per_pa: float = 4.1e-12
-    volume_at_600kpa_m3: float = 11.7e-6
-    lift_off_gauge_pa: float = 236_000.0
-    swing_hz: float = 5.9
-    swing_lowest_hz: float = 2.95
-    swing_lowest_gauge_pa: float = 490_000.0
-    swing_damping: float = 0.1
-    dead_time_s: float = 0.030
-    open_time_s: float = 0.0017
-    close_time_s: float = 0.0020
-    pulse_margin_s: float = 0.0001
-    gain: float = 0.29
-    band_pa: float = 1_000.0
-    rest_share: float = 0.6
-    fine_band_pa: float = 400.0
-    look_ahead_periods: float = 1.0
-    correct: float = 0.735
-    correct_volume: float = 0.086
-    correct_rate: float = 0.09
-    learn_drift: float = 0.01
-    learn_gain: float = 0.006
-    learn_dead_time: float = 0.02
-    dead_time_range_s: float = 0.015
-    flow_scale_pa: float = 4_000.0
-    gain_limit: float = 2.0
-    drift_limit_pa_per_s: float = 20_000.0
-    supply_margin_pa: float = 5_000.0
-    slope_share: float = 1.0
+    period_s: float = number(0.010, 0.002, 0.01, 'PWM period')
+    conductance_m3_per_s_pa: float = number(2.0e-10, 1e-12, 1e-7, 'sonic conductance of a valve')
+    critical_ratio: float = number(0.38, 0.0, 0.8, 'critical pressure ratio of a valve')
+    supply_pa: float = number(801_325.0, 1.1e5, 2e6, 'nominal supply pressure, absolute')
+    volume_m3: float = number(8.89e-6, 1e-7, 1e-2, 'volume at rest, dead volume included')
+    volume_slope_m3_per_pa: float = number(4.1e-12, 0.0, 1e-8, 'volume per pressure at lift-off')
+    volume_at_600kpa_m3: float = number(11.7e-6, 1e-7, 1e-2, 'volume at 600 kPa gauge')
+    lift_off_gauge_pa: float = number(
+        236_000.0, 0.0, 5.5e5, 'gauge pressure from which the load moves')
+    swing_hz: float = number(5.9, 0.0, 100.0, 'frequency of the load on the muscle at lift-off')
+    swing_lowest_hz: float = number(2.95, 0.0, 100.0, 'lowest frequency of the load on the muscle')
+    swing_lowest_gauge_pa: float = number(
+        490_000.0, 0.0, 1e6, 'gauge pressure at which it is reached')
+    swing_damping: float = number(0.1, 0.0, 10.0, 'damping ratio of that swing')
+    dead_time_s: float = number(0.030, 0.0, 0.25, 'time from duty to pressure')
+    open_time_s: float = number(0.0017, 0.0, 0.01, 'opening time of a valve')
+    close_time_s: float = number(0.0020, 0.0, 0.01, 'closing time of a valve')
+    pulse_margin_s: float = number(0.0001, 0.0, 0.005, 'shortest pulse beyond the opening time')
+    gain: float = number(0.29, 0.05, 1.0, 'share of the predicted error removed per period')
+    band_pa: float = number(1_000.0, 0.0, 5e4, 'errors beyond start the valves')
+    rest_share: float = number(0.6, 0.0, 1.0, 'errors below this share of the shortest pulse rest')
+    fine_band_pa: float = number(
+        400.0, 0.0, 5e4, 'errors within end their work; 0 = no pairs of pulses')
+    look_ahead_periods: float = number(1.0, 1.0, 20.0, 'periods the error is looked ahead')
+    correct: float = number(0.735, 0.0, 1.0, 'observer: correction of the pressure')
+    correct_volume: float = number(0.086, -1.0, 1.0, 'observer: correction of the volume')
+    correct_rate: float = number(0.09, 0.0, 1.0, 'observer: correction of the volume rate')
+    learn_drift: float = number(0.01, 0.0, 0.5, 'observer: learning of the drift')
+    learn_gain: float = number(0.006, 0.0, 0.5, 'observer: learning of the flow gains')
+    learn_dead_time: float = number(0.02, 0.0, 0.5, 'observer: learning of the dead time')
+    dead_time_range_s: float = number(
+        0.015, 0.0, 0.1, 'range of the learned dead time about the one told of')
+    flow_scale_pa: float = number(4_000.0, 1.0, 1e6, 'flow from which the flow gains learn')
+    gain_limit: float = number(2.0, 1.0, 10.0, 'range of the learned flow gains')
+    drift_limit_pa_per_s: float = number(20_000.0, 0.0, 1e7, 'range of the learned drift')
+    supply_margin_pa: float = number(
+        5_000.0, 0.0, 5e5, 'the target stays this far below the supply')
+    slope_share: float = number(1.0, 0.0, 1.0, 'share of the slope of the command fed forward')
 
     def par(self) -> FloatArray:
         """

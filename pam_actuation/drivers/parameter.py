@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What one parameter of the valve driver or of a hardware back end is."""
+"""What one parameter of the valve driver or of a hardware back end is, and how it is declared."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -26,3 +27,15 @@ class DriverParameter:
     lower: float | None
     upper: float | None
     description: str
+
+
+def number(default: float, lower: float, upper: float, description: str) -> Any:
+    """Declare a number of a configuration: a field with its allowed range and its meaning."""
+    return field(default=default, metadata={
+        'lower': lower, 'upper': upper, 'description': description})
+
+
+def declared_numbers(configuration: type[Any], prefix: str = '') -> tuple[DriverParameter, ...]:
+    """Return the numbers that a configuration declares, ``prefix`` before their names."""
+    return tuple(DriverParameter(f'{prefix}{item.name}', item.default, **item.metadata)
+                 for item in fields(configuration))

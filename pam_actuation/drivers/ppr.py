@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from pam_actuation.drivers.parameter import number
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point
 from pam_sim.records import cells, record, values_of, zeros
@@ -96,13 +97,13 @@ class PprConfig:
     should have moved, and how far it is behind during the slow rise.
     """
 
-    gain_pa_per_v: float = 100_000.0
-    lowest_v: float = 0.0
-    highest_v: float = 6.0
-    slew_v_per_s: float = 0.0
-    period_s: float = 0.005
-    time_constant_s: float = 0.060
-    dead_time_s: float = 0.030
+    gain_pa_per_v: float = number(100_000.0, 1e3, 1e7, 'static gain K_m of the regulator')
+    lowest_v: float = number(0.0, -10.0, 10.0, 'lowest input of the regulator')
+    highest_v: float = number(6.0, 0.1, 24.0, 'highest input of the regulator')
+    slew_v_per_s: float = number(0.0, 0.0, 1e6, 'limit of the input change, 0 = none')
+    period_s: float = number(0.005, 0.001, 0.01, 'time between two signals')
+    time_constant_s: float = number(0.060, 0.001, 10.0, 'lag of the regulator')
+    dead_time_s: float = number(0.030, 0.0, 1.0, 'time from voltage to pressure')
 
     def par(self) -> FloatArray:
         """Return the parameter array of ``ppr_step``."""

@@ -29,9 +29,9 @@ import math
 import re
 from typing import TypeVar
 
+from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
-from pam_actuation.slow_rise import (
-    RISE_PA_PER_S, SlowRise, UNTIL_FOLLOWED_S, WAITS_LONG_S)
+from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 WAITING = 'waiting'
@@ -50,33 +50,6 @@ _GRACE_NS = 20_000_000
 _QUEUE = 256
 
 Fault = tuple[str, str]      # key in ``FAULTS``, sentence
-
-
-@dataclass(frozen=True)
-class SafetyLimits:
-    """Limits of the supervisor, SI; gauge pressures say so in the name."""
-
-    command_timeout_s: float = 0.1
-    measurement_timeout_s: float = 0.1
-    first_pressure_wait_s: float = 2.0
-    supply_timeout_s: float = 0.5
-    stamp_ahead_s: float = 0.02
-    max_pressure_gauge_pa: float = 600_000.0
-    lowest_plausible_gauge_pa: float = -20_000.0
-    highest_plausible_pa: float = 1_500_000.0
-    resume_rate_pa_per_s: float = RISE_PA_PER_S
-    resume_until_followed_s: float = UNTIL_FOLLOWED_S
-    frozen_after_s: float = 0.2
-    frozen_change_pa: float = 100_000.0
-    pause_s: float = 0.3
-    two_publishers_window_s: float = 0.5
-    two_publishers_clear_s: float = 1.0
-    supply_margin_pa: float = 20_000.0
-
-    @property
-    def trip_gauge_pa(self) -> float:
-        """Return the measured gauge pressure [Pa] above which the driver trips."""
-        return 1.05 * self.max_pressure_gauge_pa + 10_000.0
 
 
 @dataclass(frozen=True)
