@@ -15,10 +15,10 @@
 """
 The demo: the real nodes on DDS for both valves, then everything that can be done with a bag.
 
-Steps: live tracking on the PPR with learning, the same with frozen rules, live
-tracking on the HSV pair; bags checked with two independent readers; controller
-replayed; a short offline tuning; the gap to the nominal model;
-one page. Every step is what the ``pam`` verbs do, called in a row.
+The steps are live tracking on the PPR with learning, the same with frozen rules, and live tracking
+on the HSV pair. Then bags are checked with two independent readers and the controller is replayed.
+A short offline tuning, the gap to the nominal model and one page follow. Every step is what the
+``pam`` verbs do, called in a row.
 """
 
 from dataclasses import dataclass, field

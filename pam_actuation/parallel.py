@@ -51,8 +51,8 @@ def _silent_trackers() -> Iterator[None]:
     """
     Let trackers that are started meanwhile give no warnings.
 
-    After Ctrl-C they and this process tidy up at the same time; who comes second finds nothing
-    and would say so, below the one line that the user is told.
+    After Ctrl-C they and this process clean up at the same time. The second one finds nothing and
+    would report that, below the one line for the user.
     """
     sys.warnoptions.append('ignore:resource_tracker')       # handed on to the trackers
     try:

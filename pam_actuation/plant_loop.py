@@ -15,9 +15,9 @@
 """
 The simulated rig on a clock: valve signal in, measurements out, no ROS.
 
-The plant takes the place of the hardware behind the topics: it holds the last valve
-signal without limit, steps its physics up to the time it is told and reads its sensors
-when asked. The simulator node and the offline simulation both use it.
+The plant replaces the hardware behind the topics. It holds the last valve signal without limit,
+steps its physics up to a given time and reads its sensors on request. The simulator node and the
+offline simulation both use it.
 """
 
 from collections.abc import Callable, Hashable, Iterable

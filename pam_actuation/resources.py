@@ -15,10 +15,10 @@
 """
 Finds the files that come with the package: config, launch, msg_docs and pages of the nodes.
 
-They stand in one of three places: beside the package in a source tree (also
-an editable or symlinked installation), in ``share/pam_actuation`` below the
-prefix that holds the installed package (pip, colcon merged or not), or in the
-share folder that the ament index names. No ROS is needed for the first two.
+There are three possible places. In a source tree (also an editable or symlinked installation) they
+are beside the package. Installed by pip or colcon, merged or not, they are in
+``share/pam_actuation`` below the prefix. Otherwise they are in the share folder that the ament
+index names. No ROS is needed for the first two.
 """
 
 from collections.abc import Iterator

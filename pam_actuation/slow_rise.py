@@ -23,13 +23,13 @@ at the rate. It ends only when the muscle was under pressure and the command was
 time. Commands of atmospheric pressure do not count, however many there are, so no order of
 commands leads round it.
 
-It waits for the muscle: it is ahead of the measured pressure by what the valve lags at that
-rate and no more. Somebody else may vent, such as a watchdog or a dump valve; a valve that had
-meanwhile been commanded to the full pressure would then fill at once. A first-order valve
-rises at no more than the rate where the command is ahead by its time constant; what it has
-risen within its dead time tells where it will be after another one. A valve that is slower than
-it is said to be rises more slowly. So that an offset of a regulator does not stop it for good,
-the command goes ahead a little further as long as it has to wait.
+It waits for the muscle: it is ahead of the measured pressure by what the valve lags at that rate
+and no more. Somebody else may vent, such as a watchdog or a dump valve; a valve that had meanwhile
+been commanded to the full pressure would then fill at once. A first-order valve rises at no more
+than the rate if the command is ahead by its time constant. Its rise within one dead time predicts
+its pressure after another one. A valve that is slower than it is said to be rises more slowly. So
+that an offset of a regulator does not stop it for good, the command goes ahead a little further as
+long as it has to wait.
 """
 
 from collections import deque

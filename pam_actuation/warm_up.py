@@ -15,9 +15,9 @@
 """
 Compile the numerical code before it is needed: ``python -m pam_actuation.warm_up``.
 
-The first use of the physics and of the laws compiles them, which takes up to a minute on a
-small machine; numba keeps the result beside the installed files. Nodes that start at the
-same time would each compile the same, and wait for one another meanwhile.
+The first use of the physics and of the control laws compiles them. That takes up to a minute on a
+small machine. numba keeps the result beside the installed files. Nodes that start at the same time
+would each compile the same, and wait for one another meanwhile.
 """
 
 from pathlib import Path

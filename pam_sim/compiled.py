@@ -18,10 +18,10 @@ How the small numerical functions of the package are compiled.
 numpy error model: a division by zero gives inf as in NumPy instead of a check
 on every division. No fastmath: compiled and interpreted results stay equal.
 
-Machine code is stored for entry points alone. numba keeps it beside the file of
-the function and looks at the age of that file only, so an entry point built from
-the functions of other files takes their ``source_key`` as a constant: a changed
-source, another number, compiled anew.
+Machine code is stored for entry points only. numba keeps it beside the file of the function and
+checks the age of that file only. An entry point built from functions of other files therefore
+takes their ``source_key`` as a constant. A changed source changes the key, and numba compiles
+again.
 """
 
 from collections.abc import Callable

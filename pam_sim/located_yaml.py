@@ -15,9 +15,8 @@
 """
 YAML that remembers where every value stands, for errors a person can act on.
 
-Numbers follow YAML 1.2 (``2e-10`` is a number, ``on`` is a text), duplicate
-keys are refused, and :class:`Located` checks type, range and spelling with the
-file and line in the message.
+Numbers follow YAML 1.2: ``2e-10`` is a number, ``on`` is a text. Duplicate keys are refused.
+:class:`Located` checks type, range and spelling, with file and line in the message.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping

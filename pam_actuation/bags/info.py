@@ -15,9 +15,9 @@
 """
 What is in a bag, whether it is complete and whether it can be true: ``bag_info(path)``.
 
-Completeness is judged twice: by the recorder's own count, kept in the bag as
-``pam_recording``, and against the numbers of published messages that every
-node reports in /diagnostics as ``published.<full topic>``.
+Completeness is judged twice. One measure is the count of the recorder, kept in the bag as
+``pam_recording``. The other is the number of published messages that every node reports in
+/diagnostics as ``published.<full topic>``.
 """
 
 from collections.abc import Mapping
@@ -83,10 +83,9 @@ class BagInfo:
     """
     Everything ``pam info`` shows.
 
-    ``remarks`` are sentences on what is odd or implausible, empty for a good
-    bag; ``notes`` are harmless ones. ``complete`` is False when messages are
-    known to be missing or the run stopped early, True when every topic of the rig has
-    been checked, None where that is not known.
+    ``remarks`` are sentences on what is odd or implausible, empty for a good bag; ``notes`` are
+    harmless ones. ``complete`` is False when messages are known to be missing or the run stopped
+    early. It is True when every topic of the rig has been checked, and None if that is not known.
     """
 
     path: str

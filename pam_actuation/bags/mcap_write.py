@@ -15,10 +15,10 @@
 """
 Write MCAP so that every moment leaves a readable file: chunks closed on demand.
 
-Records come from the ``mcap`` package. Its own writer closes a chunk only by size, packs
-every message field by field and cannot take over chunks of another file; a recorder
-needs a chunk to end by the clock, few microseconds per message, and recovery copies
-chunks as they are. Format: https://mcap.dev/spec.
+Records come from the ``mcap`` package. Its own writer closes a chunk only by size, packs every
+message field by field and cannot copy chunks of another file. A recorder must end a chunk by the
+clock and needs a few microseconds per message. Recovery copies chunks as they are. Format:
+https://mcap.dev/spec.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -115,10 +115,9 @@ class SequenceCheck:
     """
     Finds gaps in sequence numbers that count from 1 per publisher.
 
-    Several publishers of one topic are told apart by the ``publisher`` given
-    with each number or else by continuity: a number continues the publisher
-    that expects it, one lower than every expected number begins a new
-    publisher, and any other is the smallest possible gap.
+    Several publishers of one topic are separated by the ``publisher`` given with each number, or
+    else by continuity. A number continues the publisher that expects it. One lower than every
+    expected number begins a new publisher. Any other is the smallest possible gap.
     """
 
     def __init__(self) -> None:

@@ -51,9 +51,9 @@ class RecoveredFile:
     """
     What became of one file.
 
-    ``rebuilt`` is False for a file that was whole and stays as it is. ``unreadable_bytes``
-    could not be taken over; where they are more than an end that was not written,
-    the former file is kept beside the new one under the name ``kept``.
+    ``rebuilt`` is False for a file that was whole and stays as it is. ``unreadable_bytes`` could
+    not be copied. If they are more than an end that was not written, the old file is kept beside
+    the new one under the name ``kept``.
     """
 
     name: str

@@ -26,10 +26,10 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
     joint: {co_contraction_gauge_pa: 300000}     # of mode joint, all keys optional
     rules: learned.json           # optional: rules to start from, path relative to this file
 
-Written by ``to_yaml`` for recordings, which must not depend on anything else:
-``rig`` (identity), ``made_for`` (what of the rig matters, see ``made_for``),
-``static_inverse`` (table) and ``initial_rules`` (content of a rule file); for an LQI
-controller instead its ``model`` and ``gains``, see ``lqi_files``.
+Written by ``to_yaml`` for recordings, which must not depend on anything else: ``rig`` (identity),
+``made_for`` (what of the rig matters, see ``made_for``), ``static_inverse`` (table) and
+``initial_rules`` (content of a rule file). An LQI controller has ``model`` and ``gains`` instead,
+see ``lqi_files``.
 """
 
 import os

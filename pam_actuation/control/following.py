@@ -15,9 +15,9 @@
 """
 Whether the driver follows the commands of a controller, as it tells on ``followed_pressure``.
 
-While the driver vents or limits a command, the error is not the controller's: an integral that
-grew on it would ask for too much once the command counts again. A controller that knows holds
-its integral and its rules. No ROS inside.
+While the driver vents or limits a command, the controller does not cause the error. An integral
+that grew on it would ask for too much once the command is followed again. A controller that knows
+holds its integral and its rules. No ROS inside.
 """
 
 from collections import deque

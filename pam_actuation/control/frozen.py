@@ -15,13 +15,13 @@
 """
 Notices a measured motion that stands still although the pressure moved the muscle.
 
-A frozen sensor goes on sending its last value with new stamps. It is told from a muscle at
-rest by the pressure: a value that stays the same to the last bit while the measured pressure
-changes by far more than friction can hold is not what the muscle does; of a joint it is the
-difference of both pressures. At its resting length, or without a force, a muscle may lie on a
-stop, as a joint at the ends of its range, and pressure moves nothing. Where a muscle has left its
-stop before, the pressure at which it did tells how much it may rise there; a force, the ends of a
-joint, and a muscle that has not moved yet are not judged.
+A frozen sensor goes on sending its last value with new stamps. The pressure distinguishes it from
+a muscle at rest. A value is frozen if it stays the same to the last bit while the measured
+pressure changes by far more than friction can hold. For a joint the difference of both pressures
+counts. At its resting length, or without a force, a muscle may lie on a stop, as a joint at the
+ends of its range, and pressure moves nothing. If a muscle has left its stop before, the pressure
+at which it did limits the rise there. A force, the ends of a joint, and a muscle that has not
+moved yet are not judged.
 """
 
 from collections import deque
@@ -43,8 +43,8 @@ class FrozenMeasurement:
     """
     Compares the newest value of what is tracked with the range of the pressure.
 
-    ``frozen`` stays until the value has changed, for 2 s at least: a muscle that is blocked
-    looks the same, and must not be filled against the obstacle again at once.
+    ``frozen`` stays until the value has changed, for 2 s at least. A blocked muscle looks the
+    same, and must not be filled against the obstacle again at once.
 
     Parameters
     ----------

@@ -20,18 +20,17 @@ joint angle in place of the contraction; while it does not run, both muscles are
 a torque is followed the joint may well be blocked: a frozen angle is looked for only otherwise.
 A missing force of either muscle is not used, nor is a pressure that was never measured.
 
-Neither muscle is left alone under air. Where the driver of one vents against its commands or
-falls silent, where its pressure is lost, or where it stays empty, both are vented until it has
-shown that it follows again (``slack_muscle``). While a law runs each is asked for 5 kPa at
-least, so that a driver that vents is always seen. After every vent the commands rise slowly.
+Neither muscle is left alone under air. Both are vented if the driver of one vents against its
+commands or falls silent, if its pressure is lost, or if it stays empty. They stay vented until
+that driver follows again (``slack_muscle``). While a law runs each is asked for 5 kPa at least, so
+that a driver that vents is always seen. After every vent the commands rise slowly.
 
 A wanted co-contraction counts until the next one; one that is not finite is ignored, one beyond
 the limits stops there.
 
-A wanted torque is followed in place of an angle where no wish of an angle is fresh, 0.5 s
-after the last ``joint_reference`` or the end of a trajectory. It counts for 0.1 s; then both
-muscles are vented until there is a torque or an angle again. Every change is bumpless: each
-law starts from what the other one commanded last.
+Without a fresh angle, a wanted torque is followed: 0.5 s after the last ``joint_reference`` or the
+end of a trajectory. It counts for 0.1 s; then both muscles are vented until there is a torque or
+an angle again. Every change is bumpless: each law starts from what the other one commanded last.
 """
 
 from collections.abc import Callable

@@ -15,9 +15,9 @@
 """
 A trajectory as larger stacks send it, made into the wanted angle of one joint.
 
-The rules are those of a joint trajectory controller: the joint is found by its name among
-``joint_names``; a stamp of zero means now; until the first point the joint goes there from
-where it is; a point without a rate lies on straight lines. No ROS inside.
+The rules are those of a joint trajectory controller. The joint is found by its name in
+``joint_names``. A stamp of zero means now. Before the first point, the joint moves there from its
+present angle. Points without rates are joined by straight lines. No ROS inside.
 """
 
 from collections.abc import Sequence

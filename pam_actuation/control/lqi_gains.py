@@ -20,12 +20,11 @@ the integral of the error; the gains minimise::
 
     sum y^2 + w_i q^2 + w_u u^2        y [mm], q [mm s], u [kPa]
 
-(discrete algebraic Riccati equation, ``scipy.linalg.solve_discrete_are``). What
-a command does begins one delay later, at a state that is known by then: the
-gains of the augmented system are those of the system without delay on the state
-predicted so far ahead, so that the equation solved is the small one. The
-observer is the stationary Kalman filter of the model with a disturbance of the
-command and noise of the sensor.
+(discrete algebraic Riccati equation, ``scipy.linalg.solve_discrete_are``). A command acts one
+delay later, at a state that is known by then. The gains of the augmented system are therefore
+those of the system without delay, on the state predicted so far ahead. Only the small equation is
+solved. The observer is the stationary Kalman filter of the model with a disturbance of the command
+and noise of the sensor.
 """
 
 from collections.abc import Mapping

@@ -19,12 +19,11 @@ From pressure command to contraction, deviations from the operating point::
 
     y[k] = -a_1 y[k-1] - ... - a_n y[k-n] + b_1 u[k-1-d] + ... + b_n u[k-n-d]
 
-The method of Steiglitz and McBride (IEEE Trans. Automatic Control 10, 1965):
-least squares on filtered signals, repeated, which minimises the error of the
-simulated output and not that of one step, so that sensor noise does not pass
-for damping. The delay is the one with which the simulated output fits best.
-Both signals pass a high-pass first: creep and hysteresis drift, which no linear
-model of low order explains, and the integral of the controller makes up for.
+The method of Steiglitz and McBride (IEEE Trans. Automatic Control 10, 1965): repeated least
+squares on filtered signals. It minimises the error of the simulated output, not that of one step,
+so sensor noise does not look like damping. The delay is the one with which the simulated output
+fits best. Both signals pass a high-pass first: creep and hysteresis drift, which no linear model
+of low order explains, and the integral of the controller makes up for.
 """
 
 from dataclasses import dataclass
@@ -188,8 +187,8 @@ def identification_record(
     """
     Return (command [absolute Pa], measured contraction [m]) of a simulated run of a rig.
 
-    Random steps of the pressure about the one that holds ``contraction_m``, 30 s, through the
-    driver law and with sensor noise; the first two seconds at rest are left out.
+    The data are 30 s of random pressure steps about the pressure that holds ``contraction_m``,
+    through the driver law and with sensor noise. The first two seconds at rest are left out.
 
     Raises
     ------

@@ -18,17 +18,17 @@ The wanted contraction (or force, or joint angle) now and a little ahead, from w
 ``reference`` alone is extrapolated with its rate; a ``reference_trajectory``
 is interpolated (cubic through positions and rates). Rules:
 
-* A trajectory counts while its stamp is at most ``TRAJECTORY_LIFE_S`` old and its end
-  has not passed; then its times are absolute and each message replaces the former.
-  Beyond its end the last point goes on with its rate. Where it moves faster, by
-  ``JUMP_PER_S``, than both its points say, it jumps: the first point goes on until the
-  second one's time, so that the controller sees a jump and not a steep ramp. One that is
-  newer than any ``reference`` is a whole movement, sent once: it counts to its end.
+* A trajectory counts while its stamp is at most ``TRAJECTORY_LIFE_S`` old and its end has not
+  passed; then its times are absolute and each message replaces the former. Beyond its end the last
+  point goes on with its rate. A change that exceeds the rates of both points by ``JUMP_PER_S`` is
+  a jump. The first point then holds until the time of the second, so the controller sees a jump
+  and not a steep ramp. One that is newer than any ``reference`` is a whole movement, sent once: it
+  counts to its end.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, after
   that the position stands still; the preview fades out until ``LOST_S``.
-* After ``LOST_S`` without either the reference is lost: the last position is held with
-  zero rate until ``HOLD_S``, then there is none and the muscle is to be vented. A new
-  message resumes at once.
+* After ``LOST_S`` without either the reference is lost. The last position is held with zero rate
+  until ``HOLD_S``. Then there is none and the muscle must be vented. A new message resumes at
+  once.
 * A reference stamped more than ``MAX_AHEAD_NS`` ahead, or a trajectory whose first point is more
   than ``TRAJECTORY_LIFE_S`` ahead, does not count: it could not grow old.
 """

@@ -38,9 +38,9 @@ class SlackMuscle:
     """
     Compares the command of one muscle with what its driver tells and with its pressure.
 
-    ``slack`` stays for 2 s at least, with both muscles vented. Then the slack muscle alone is
-    asked for a little pressure, until its driver follows and the pressure is there: a latched
-    stop may last, and the other muscle stays vented meanwhile.
+    ``slack`` stays for 2 s at least, with both muscles vented. Then only the slack muscle is
+    commanded a little pressure, until its driver follows and the pressure is reached. A latched
+    stop may last; the other muscle stays vented meanwhile.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@
 """
 Static inverse of the muscle at nominal load: contraction -> pressure, as a table.
 
-The table is one vector so that it can be handed to compiled code and written to a file
-exactly: a ``GRID``, then the pressure [absolute Pa] of every node.
+The table is one vector, for compiled code and for an exact file. It holds a ``GRID``, then the
+pressure [absolute Pa] of every node.
 """
 
 import numpy as np

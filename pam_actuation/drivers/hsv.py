@@ -39,13 +39,12 @@ class HsvConfig:
     """
     What the law knows, SI.
 
-    Valves: ISO 6358 ``conductance_m3_per_s_pa`` and ``critical_ratio``, ``supply_pa``
-    (absolute, used where no supply is measured), ``open_time_s`` and ``close_time_s``,
-    ``dead_time_s`` from duty to pressure. Volumes include the dead volume and hold at 0
-    and at 600 kPa gauge. Loop: ``gain`` share of the predicted error removed per
-    period, ``band_pa`` error beyond which the valves start, ``fine_band_pa`` that within which
-    they rest again; where this is 0 they never open together for a dose smaller than the
-    shortest pulse.
+    Valves: ISO 6358 ``conductance_m3_per_s_pa`` and ``critical_ratio``, ``supply_pa`` (absolute,
+    used where no supply is measured), ``open_time_s`` and ``close_time_s``, ``dead_time_s`` from
+    duty to pressure. Volumes include the dead volume and hold at 0 and at 600 kPa gauge. Loop:
+    ``gain`` is the share of the predicted error removed per period, ``band_pa`` the error beyond
+    which the valves start, ``fine_band_pa`` that within which they rest again. If it is 0, they
+    never open together for a dose smaller than the shortest pulse.
     """
 
     period_s: float = number(0.010, 0.002, 0.01, 'PWM period')

@@ -18,12 +18,11 @@ Compiled core of the HSV pressure loop: the choice of the next pulses.
 The opening of the next PWM period is the mass-flow inverse of the error left at the end of
 the prediction of ``hsv_model`` over the openings under way.
 
-The valves rest, both duties exactly 0, once the predicted error is inside the fine band,
-and until it leaves the set-point band, so that the noise of the sensor does not wake them.
-Where less is wanted than the shortest possible pulse does, both
-valves open in the same period and the difference of their pulses is the dose
-(``hsv_pulses``). Where that would take pulses too long, at low pressure, an error below a
-part of the shortest pulse's effect is left alone.
+Once the predicted error is inside the fine band, the valves rest with both duties exactly 0. They
+rest until it leaves the set-point band, so that sensor noise does not start them. Where less is
+wanted than the shortest possible pulse does, both valves open in the same period and the
+difference of their pulses is the dose (``hsv_pulses``). Where that would take pulses too long, at
+low pressure, an error below a part of the shortest pulse's effect is left alone.
 """
 
 from collections.abc import Callable

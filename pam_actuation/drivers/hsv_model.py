@@ -178,10 +178,9 @@ def _learn_delay(state: np.record, par: np.record, error: float) -> None:
     """
     Move the dead time where a change of the flow shows earlier or later than expected.
 
-    With the dead time a period too long a reading is off by the latest changes of the flow,
-    as far as the observer has not made up for them: a gradient step, normalised. Only the
-    quick part of them tells: the slow one goes with the motion of the load, whose volume the
-    model knows less well.
+    With a dead time one period too long, a reading is wrong by the latest changes of the flow that
+    the observer has not corrected. This is a normalised gradient step. Only the quick part of them
+    tells: the slow one goes with the motion of the load, whose volume the model knows less well.
     """
     state.dead_time_effect_mean_pa += _DELAY_MEAN * (
         state.dead_time_effect_pa - state.dead_time_effect_mean_pa)

@@ -15,10 +15,10 @@
 """
 Pulses of a pair of on/off valves: duty and effective opening, and two pulses as one dose.
 
-A pulse of length on is open from the on-delay to on + the off-delay, and not at all if
-shorter than the on-delay, so a single valve has a shortest pulse. Where less air is wanted
-both valves get a pulse in the same period and what counts is the difference, which may be
-as small as one likes. All openings and times are parts of a PWM period.
+A pulse of length on is open from the on-delay to on + the off-delay. A pulse shorter than the
+on-delay does not open, so a single valve has a shortest pulse. Where less air is wanted both
+valves get a pulse in the same period and what counts is the difference, which may be as small as
+one likes. All openings and times are parts of a PWM period.
 """
 
 from pam_sim.compiled import compiled

@@ -48,9 +48,9 @@ class Channel:
     """
     The newest valid reading of one pressure topic and why later ones were refused.
 
-    Attributes: ``stamp_ns`` and ``pressure_pa`` of the newest valid reading (None
-    before the first), ``problem`` of the newest refused one ('' if none since),
-    ``refused`` how many were refused, ``received`` how many came.
+    Attributes: ``stamp_ns`` and ``pressure_pa`` belong to the newest valid reading (None before
+    the first), ``problem`` to the newest refused one ('' if none since). ``refused`` and
+    ``received`` count readings.
     """
 
     def __init__(self, oldest_s: float, ahead_s: float, lowest_pa: float,

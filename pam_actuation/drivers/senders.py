@@ -15,9 +15,9 @@
 """
 Who sends on a topic: one writer, one after another, or several at once.
 
-Told by the messages that arrive, each with the GID of its writer, not by the graph: there a
-node that was killed stands for up to 20 s more. No clock and no ROS; a writer is anything that
-can be a key of a dictionary, None where it is not known, which is not judged.
+The arriving messages show it, each with the GID of its writer. The graph does not: it still lists
+a killed node for up to 20 s. No clock and no ROS; a writer is anything that can be a key of a
+dictionary, None where it is not known, which is not judged.
 """
 
 from collections.abc import Callable, Hashable

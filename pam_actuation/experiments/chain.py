@@ -37,9 +37,9 @@ class Domain:
     """
     What a value means.
 
-    ``unit`` is its suffix in files, ``rest`` the rest value, ``lower``..``upper`` its
-    range and ``fastest`` the highest rate per second of a value that does not jump
-    (a design value: beyond what any muscle or valve of this kind follows).
+    ``unit`` is its suffix in files, ``rest`` the rest value and ``lower``..``upper`` its range.
+    ``fastest`` is the highest rate per second of a value that does not jump. It is a design value,
+    beyond what any muscle or valve of this kind follows.
     """
 
     name: str

@@ -15,9 +15,8 @@
 """
 One experiment under a series of loads, simulated: what ``pam characterise`` starts from.
 
-The chapter loads its muscle with 0 to 150 N in steps of 10 N. A mass is never
-nothing, so the first run hangs a hook of 0.1 kg on the muscle; its weight is
-read off the load cell like every other load.
+The chapter loads its muscle with 0 to 150 N in steps of 10 N. A mass is never zero, so the first
+run hangs a hook of 0.1 kg on the muscle. The load cell measures its weight like every other load.
 """
 
 from collections.abc import Callable, Iterable

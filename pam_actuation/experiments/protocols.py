@@ -15,10 +15,10 @@
 """
 Plan a measurement: which effects protocols could tell apart on a rig, and the best 60 s.
 
-Pieces of some seconds, each made to show one kind of effect, are simulated once. Every
-choice of them that fits into a minute is judged by the sizes from which on it would show
-and name the effects (:mod:`pam_sim.gap.plan`); the best one becomes an experiment, is
-simulated as a whole and judged again.
+Pieces of some seconds, each made to show one kind of effect, are simulated once. Every choice of
+them that fits into a minute is judged by the smallest sizes at which it would show and name the
+effects (:mod:`pam_sim.gap.plan`). The best one becomes an experiment, is simulated as a whole and
+judged again.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence

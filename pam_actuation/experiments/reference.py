@@ -136,8 +136,8 @@ class ReferenceLoop:
         """
         Return the next 0.6 s of the reference as one message.
 
-        Its points lie on the grid of the experiment, its stamp is the one before now: a jump
-        has the same time in every message, however late the tick is.
+        Its points lie on the grid of the experiment, and its stamp is the grid point before now. A
+        jump therefore has the same time in every message, however late the tick is.
         """
         start_ns = now_ns if self.start_ns is None else self.start_ns
         begin_ns = now_ns - (now_ns - start_ns) % POINT_NS

@@ -15,13 +15,12 @@
 """
 The experiment that tells rivals apart, when a recording could not.
 
-Every experiment of a small menu is simulated with the likeliest rival as the truth; the
-others are fitted to what it would record, numbers and all, and judged as `pam gap` will
-judge them. Of the experiments that decide beyond doubt, the one that leaves the nearest of
-them farthest off is the one to run (T-optimality: Atkinson and Fedorov, 1975, Biometrika
-62(1)). One edge may leave a rival far off and yet decide nothing: what time blocks agree
-on counts. A load cell is asked for where none was there and the rivals stay together
-without it.
+Every experiment of a small menu is simulated with the most likely rival as the truth. The others
+are fitted to that simulated recording, with all parameters, and judged as `pam gap` will judge
+them. Of the experiments that decide beyond doubt, the one that leaves the nearest of them farthest
+off is the one to run (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). One edge may
+leave a rival far off and yet decide nothing: what time blocks agree on counts. A load cell is
+asked for where none was there and the rivals stay together without it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

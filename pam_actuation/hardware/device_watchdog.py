@@ -16,9 +16,9 @@
 The last word at a device: a small process that vents when the valve driver can not.
 
 A device holds its last signal when the process that drives it is killed or stopped. The driver
-therefore starts this module as a process of its own, tells it once what venting means, as
-attributes to write, and with every signal whether the muscle may be under pressure. The process
-knows nothing else, needs neither ROS nor a network, and ends when the driver has ended.
+therefore starts this module as a separate process. It tells the process once which attributes to
+write to vent, and with every signal whether the muscle may be under pressure. The process knows
+nothing else, needs neither ROS nor a network, and ends when the driver has ended.
 
 What it can not cover is a computer that stands still or loses its power: see
 docs/explanation/safety.md.

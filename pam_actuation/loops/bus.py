@@ -15,10 +15,10 @@
 """
 Loops on one virtual clock, joined by messages.
 
-A live node takes messages when they arrive and ticks when its timer is due. Here a heap of
-due ticks is the timer and a queue is the middleware: a message arrives ``transport_ns`` after
-it was sent, and every tick first hands over what has arrived. Loops that are due at the same
-time tick in the order in which they were added.
+A live node takes messages when they arrive and ticks when its timer is due. Here a heap of due
+ticks is the timer and a queue is the middleware. A message arrives ``transport_ns`` after it was
+sent, and every tick first delivers what has arrived. Loops that are due at the same time tick in
+the order in which they were added.
 """
 
 from collections import deque

@@ -15,11 +15,11 @@
 """
 The health of a node on ``/diagnostics``.
 
-One status per node: its name is the full node name, its message the reason for its
-level. It is sent at a steady pace and at once when level or message change, and then stands on
-the terminal, too, where something is wrong or no longer wrong. The
-values hold how many messages each publisher of the node has sent
-(``published.<topic>``), by which a recording proves that it is complete.
+One status per node: its name is the full node name, its message the reason for its level. It is
+sent at a steady rate, and at once when level or message change. Such a change is also printed on
+the terminal if something is wrong or no longer wrong. The values hold how many messages each
+publisher of the node has sent (``published.<topic>``), by which a recording proves that it is
+complete.
 """
 
 import re

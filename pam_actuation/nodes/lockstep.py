@@ -15,12 +15,11 @@
 """
 Lockstep: all nodes of a rig go through the same ticks, none ahead of what it needs.
 
-Each node ticks once per message on ``/clock``, and only when what the tick needs has
-arrived. The plant sends measurements and clock, the controller waits for both and for
-the reference of the tick before, the driver for the command, the plant for the
-valve signal before it goes on. So every node uses the same inputs in the same tick in
-every run, however long messages take. A node that stays silent is left out after a
-while, so that time goes on and its loss has the consequences it has in life.
+Each node ticks once per message on ``/clock``, and only when what the tick needs has arrived. The
+plant sends measurements and clock. The controller waits for both and for the reference of the tick
+before. The driver waits for the command, and the plant for the valve signal. So every node uses
+the same inputs in the same tick in every run, however long messages take. A node that stays silent
+is left out after a while, so that time goes on and its loss has the consequences it has in life.
 """
 
 import time

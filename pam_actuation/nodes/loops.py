@@ -15,10 +15,10 @@
 """
 Periodic work on the steady clock (or a simulated one), without an executor's cost per tick.
 
-rclpy's executor rebuilds its list of everything a node owns for every wake-up, which
-takes longer than a tick of a control loop. The loops of a node therefore run in the main
-thread on plain sleeps, and the executor serves services and parameters in a
-thread of its own, asleep until something is asked. A lock keeps the two apart.
+rclpy's executor rebuilds its list of everything a node owns for every wake-up, which takes longer
+than a tick of a control loop. The loops of a node therefore run in the main thread on plain
+sleeps. The executor serves services and parameters in a second thread, which sleeps until a
+request arrives. A lock keeps the two apart.
 """
 
 import threading

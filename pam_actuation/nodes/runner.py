@@ -48,10 +48,10 @@ class _Stopper(threading.Thread):
     """
     Learn of a signal in a thread of its own and ask the main thread to end.
 
-    Python runs a handler only between two steps of the main thread, which may hang
-    inside the middleware; the wake-up file tells this thread at once, whichever thread the
-    system chose to interrupt. If the main thread does not end its work within
-    the node's ``STUCK_AFTER_S``, this thread makes the output safe itself and ends the process.
+    Python runs a handler only between two steps of the main thread, which may hang inside the
+    middleware. The wake-up file informs this thread at once, whichever thread the system
+    interrupted. If the main thread does not end its work within the node's ``STUCK_AFTER_S``, this
+    thread makes the output safe itself and ends the process.
     """
 
     def __init__(self):

@@ -16,12 +16,11 @@
 How Fast DDS, below ROS 2, moves the messages of a process: by UDP, not through shared memory.
 
 Fast DDS guards each shared-memory port by a lock that lies in the shared memory itself. A process
-that is killed or stopped while it holds the lock holds up all who send there for 1 s (fixed when
-Fast DDS is built: ``BOOST_INTERPROCESS_TIMEOUT_WHEN_LOCKING_DURATION_MS`` in its
-``boostconfig.hpp``), one that only starts may hold them up for a third of a second (until its
-port looks healthy), and one that takes the place of a killed one may never be heard (Fast DDS
-issues 5053, 5469). A driver must not be held up by a node that has died, nor by one that listens;
-UDP has no such lock.
+that is killed or stopped while it holds the lock blocks all who send there for 1 s. The build of
+Fast DDS fixes that time (``BOOST_INTERPROCESS_TIMEOUT_WHEN_LOCKING_DURATION_MS`` in its
+``boostconfig.hpp``). A process that only starts may block them for a third of a second, until its
+port looks healthy. One that replaces a killed one may never be heard (Fast DDS issues 5053, 5469).
+Neither a dead node nor a listening one may block a driver; UDP has no such lock.
 
 A reliable writer asks its readers from time to time what has arrived, by default every 3 s.
 The answers free all messages of those 3 s at once, up to the depth of the publisher: for 0.5 ms
@@ -47,10 +46,10 @@ def prepare_middleware(environment=os.environ):
     Set how participants that are created later in this process talk.
 
     Without a range of discovery they look at this machine only. With that range rmw_fastrtps adds
-    shared memory, whatever transports are chosen; so the range is left to the profile, which
-    looks at this machine only as well, by UDP alone. A profile file of the user's own stays, with
-    all that it leaves to Fast DDS, and so does his choice of transports. Other middleware keeps
-    the range and ignores profile and transports.
+    shared memory, whatever transports are chosen. The profile therefore sets the range: it looks
+    at this machine only as well, by UDP alone. A profile file of the user's own stays, with all
+    that it leaves to Fast DDS, and so does his choice of transports. Other middleware keeps the
+    range and ignores profile and transports.
 
     Parameters
     ----------

@@ -15,10 +15,10 @@
 """
 The messages of a bag in the order in which a node met them.
 
-A node acts on what has arrived, which is not the order of the header stamps: a message is
-stamped when it is measured and arrives later. A bag keeps the time at which the recorder
-received each message. For a simulated bag this is exactly when the loops got it; for a live
-one it is another process's receive time, near that of the node but not the same.
+A node acts on what has arrived, which is not the order of the header stamps: a message is stamped
+when it is measured and arrives later. A bag keeps the time at which the recorder received each
+message. For a simulated bag this is exactly when the loops got it. For a live bag it is the
+receive time of another process, near that of the node but not equal.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator

@@ -15,11 +15,10 @@
 """
 Repeat a recorded experiment in simulation: controller, driver and plant in a closed loop.
 
-Only the reference (or, in an experiment without a controller, the command), the disturbance
-force and the moments of all ticks come from the recording; everything else is computed anew.
-With the recording's own controller this is the experiment repeated, a simulated one to the
-bit; with another controller it is the experiment as it would have gone with that one on the
-model.
+Only reference, disturbance force and the times of all ticks come from the recording; without a
+controller, the command replaces the reference. Everything else is computed anew. With the
+controller of the recording this repeats the experiment, a simulated one to the bit. With another
+controller it shows how the experiment would have gone with that one on the model.
 """
 
 from array import array

@@ -15,9 +15,9 @@
 """
 Step a controller offline on the inputs a recording says it used, and compare.
 
-Every tick recorded in ``controller_state`` names the stamps of the messages it
-used; the replay fetches exactly these measurements from their topics, steps a
-fresh controller and compares commands and internals bit for bit.
+Every tick recorded in ``controller_state`` names the stamps of the messages it used. The replay
+takes exactly these measurements from their topics and steps a new controller. It compares commands
+and internals bit for bit.
 """
 
 from collections.abc import Callable

@@ -15,11 +15,11 @@
 """
 Step a valve driver offline on the messages a recording holds, and compare valve signals.
 
-Ticks are taken at the header stamps of the recorded ``valve_signal``; each tick is given
-what had arrived by then. A simulated bag is reproduced to the bit. Of a live bag three things
-are not in the recording: the exact moment a message reached the driver (the recorder's
-receive time stands in for it, so that near a tick a message may count one tick early or late),
-calls of the services emergency_stop and reset, and the signal that vents when the node stops.
+Ticks are taken at the header stamps of the recorded ``valve_signal``; each tick is given what had
+arrived by then. A simulated bag is reproduced to the bit. A live bag lacks three things. One is
+the exact moment at which a message reached the driver. The receive time of the recorder replaces
+it, so near a tick a message may count one tick early or late. The others are calls of the services
+emergency_stop and reset, and the signal that vents when the node stops.
 """
 
 from array import array

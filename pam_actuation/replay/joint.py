@@ -15,10 +15,10 @@
 """
 Replay the recording of a joint: controller, drivers and plant, each by itself or chained.
 
-All parts are the live loops on a bus. A part that is replayed by itself ticks when it did in
-the recording and is given what had arrived by then; what the other parts sent comes from the
-recording. A simulated bag is reproduced to the bit. Of a live one the moment at which a message
-reached a node is not recorded: near a tick a message may count one tick early or late.
+All parts are the live loops on a bus. A part that is replayed alone ticks at the recorded times
+and gets what had arrived by then. The messages of the other parts come from the recording. A
+simulated bag is reproduced to the bit. Of a live one the moment at which a message reached a node
+is not recorded: near a tick a message may count one tick early or late.
 """
 
 from dataclasses import dataclass, field

@@ -15,10 +15,10 @@
 """
 Fast CDR for the few fixed message layouts of the rig, without any ROS.
 
-CDR here is the little-endian plain encoding that ROS 2 middlewares send: four
-bytes of encapsulation, then the fields in order, each aligned to its own size
-counted from the end of the encapsulation; a string is a length (final NUL
-included), the bytes and the NUL; a sequence is a count and its items.
+CDR here is the little-endian plain encoding of ROS 2 middlewares. Four bytes of encapsulation come
+first, then the fields in order. Each is aligned to its own size, counted from the end of the
+encapsulation. A string is a length (final NUL included), the bytes and the NUL. A sequence is a
+count and its items.
 """
 
 from collections.abc import Mapping, Sequence

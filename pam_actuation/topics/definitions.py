@@ -15,8 +15,8 @@
 """
 Message definitions and RIHS01 hashes of ROS 2 Jazzy, from the ``rosbags`` package.
 
-Nothing here needs a ROS installation. The type store takes a third of a second to read, so it
-is read when it is first asked for: a node that only sends and receives never does.
+Nothing here needs a ROS installation. The type store takes a third of a second to read, so it is
+read at its first use. A node that only sends and receives never reads it.
 """
 
 import functools

@@ -15,10 +15,10 @@
 """
 Quality of service of the topics, in this one place.
 
-Reliable and volatile with a short history, and nothing requested that a default
-publisher would not offer (no deadline, lifespan or liveliness), so that any
-publisher or subscriber with default settings matches. Time-outs are done in the
-nodes, which build what rclpy needs of this (``nodes/qos.py``).
+It is reliable and volatile with a short history. Nothing is requested that a default publisher
+would not offer, such as deadline, lifespan or liveliness. Any publisher or subscriber with default
+settings therefore matches. Time-outs are done in the nodes, which build what rclpy needs of this
+(``nodes/qos.py``).
 """
 
 from dataclasses import dataclass

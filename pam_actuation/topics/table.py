@@ -15,10 +15,10 @@
 """
 The table of topics: one row each, from which nodes, recorder, loader, bag checks and docs follow.
 
-A row says what the topic carries, and with it ROS type, plain message, bytes and columns of
-arrays; who speaks and who listens; its quality of service; what a bag of it is checked for.
-A topic may be given by its short name (``pressure``) or in full
-(``/left_knee/flexor/pressure``); the last part decides.
+A row gives the content of the topic, and with it ROS type, plain message, bytes and columns of
+arrays. It also gives publishers, subscribers, quality of service, and the checks of a bag. A topic
+may be given by its short name (``pressure``) or in full (``/left_knee/flexor/pressure``); the last
+part decides.
 """
 
 from collections.abc import Mapping

@@ -27,8 +27,8 @@ def tracking_cost_mm(error_m: FloatArray, start_tick: int = 0) -> float:
     """
     Return the cost [mm] of one run.
 
-    Root mean square error of the last part of the run, plus a quarter of that of the whole
-    run (learning fast counts), plus a tenth of the worst late error.
+    It is the root mean square error of the last part of the run. A quarter of that of the whole
+    run and a tenth of the worst late error are added. The quarter rewards fast learning.
 
     Parameters
     ----------

@@ -15,11 +15,10 @@
 """
 The rules a tuned controller begins with: learned on the model, not drawn by hand.
 
-On every rig the controller tracks the experiments one after the other, the last
-one first, and keeps what it learns: list slow ones first, they then refine what
-fast ones taught roughly. Three tables are then compared by what the tuned settings cost
-when they start from them: the one from before, the one of the first (nominal)
-rig, and the mean over all rigs.
+On every rig the controller tracks the experiments one after the other, the last one first, and
+keeps what it learns. List slow ones first: they then refine what fast ones taught roughly. Three
+tables are then compared: the old one, the one of the first (nominal) rig, and the mean over all
+rigs. The criterion is the cost of the tuned settings that start from them.
 """
 
 from typing import TYPE_CHECKING

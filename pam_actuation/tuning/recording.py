@@ -15,10 +15,10 @@
 """
 What a recording says about a tuning: is the model good enough, what would have been commanded.
 
-Two checks. The model is run freely on the recorded valve signal; a tuning is
-worth no more than the model it was made on. The tuned controller is stepped
-over the recorded inputs, its rules frozen: the muscle did not follow *its*
-commands, so the comparison shows how differently it acts, not how well.
+Two checks. The model is run freely on the recorded valve signal; a tuning is worth no more than
+the model it was made on. The tuned controller is stepped over the recorded inputs with frozen
+rules. The muscle did not follow *its* commands, so the comparison shows how differently it acts,
+not how well.
 """
 
 from dataclasses import asdict, dataclass, field, replace

@@ -15,10 +15,9 @@
 """
 Offline tuning: settings and initial rules of a controller, over closed-loop rollouts.
 
-The settings are searched in the unit cube of ``space`` (``search``); then the
-controller learns the rules it is to begin with (``initial_rules``); both are
-judged on runs that were never searched. The same seed gives the same result
-with any number of ``workers``.
+The settings are searched in the unit cube of ``space`` (``search``). Then the controller learns
+its initial rules (``initial_rules``). Both are judged on runs that were not part of the search.
+The same seed gives the same result with any number of ``workers``.
 """
 
 from collections.abc import Callable

@@ -65,9 +65,8 @@ def supplied_kg(record: 'Record', rig: 'Rig') -> FloatArray:
     """
     Return the air [kg] taken from the supply since the start of a record, per sample.
 
-    HSV: what flowed through the fill valve. PPR: every rise of the air mass and, where
-    the rig leaks, the leak as far as the pressure is held against it; what a regulator
-    bleeds for itself is not modelled.
+    HSV: what flowed through the fill valve. PPR: every rise of the air mass and, if the rig leaks,
+    the leak against which the pressure is held. The bleed of the regulator itself is not modelled.
     """
     if rig.valve == 'hsv':
         return record.filled_kg - record.filled_kg[0]

@@ -15,10 +15,10 @@
 """
 Human limbs as numbers of a joint, from body mass and height.
 
-D. A. Winter, Biomechanics and Motor Control of Human Movement, Table 4.1 (segment
-"foot and leg", femoral condyles to medial malleolus) and the segment lengths of
-Drillis and Contini (1966) given there: knee 0.285 H and ankle 0.039 H above ground.
-Averages over people; one person may differ by ten percent and more.
+D. A. Winter, Biomechanics and Motor Control of Human Movement, Table 4.1 (segment "foot and leg",
+femoral condyles to medial malleolus). The segment lengths are those of Drillis and Contini (1966)
+given there: knee 0.285 H and ankle 0.039 H above ground. Averages over people; one person may
+differ by ten percent and more.
 """
 
 from pam_sim.errors import InputError

@@ -15,11 +15,10 @@
 """
 Many simulations at once: parameter sets on records, on all cores.
 
-The compiled rollout holds no lock, so threads share the work; each takes the
-next run when it has done one and reuses one buffer, so that memory grows with
-what is kept and not with what is simulated. A run does not depend on the
-others: results equal those of ``Rig.simulate`` to the bit, in order, with any
-number of workers.
+The compiled rollout holds no lock, so threads share the work. Each takes the next run when it has
+done one, and reuses one buffer. Memory therefore grows with what is kept, not with what is
+simulated. A run does not depend on the others: results equal those of ``Rig.simulate`` to the bit,
+in order, with any number of workers.
 """
 
 from concurrent.futures import ThreadPoolExecutor

@@ -15,12 +15,12 @@
 """
 The calls of effects and force laws in a step, written from what is registered.
 
-Which functions these are is known at run time only, and numba compiles no call through a
-table of functions without losing its cache or the speed of a direct call. So the calls are
-written as text, one function per hook, and imported as a module. ``hooks`` is that module:
-``hooks.volume(volume_m3, pressure_pa, contraction_m, beyond, state, par)`` has the arguments
-of the hook, whether the rig is ``beyond`` the nominal one, and its records. Where it is not,
-the compiler leaves nothing of the call.
+These functions are known at run time only. numba cannot compile a call through a table of
+functions without losing its cache or the speed of a direct call. So the calls are written as text,
+one function per hook, and imported as a module. ``hooks`` is that module:
+``hooks.volume(volume_m3, pressure_pa, contraction_m, beyond, state, par)`` has the arguments of
+the hook, whether the rig is ``beyond`` the nominal one, and its records. Where it is not, the
+compiler leaves nothing of the call.
 """
 
 from collections.abc import Iterator

@@ -24,8 +24,8 @@ changed or not. Further arguments it may name:
 * ``plant``, the state of the rig itself, ``layout.STATE``.
 
 Pressures are absolute Pa unless called gauge; ``dx_m`` is the travel since the start of the
-physics step and ``elapsed_s`` the time since then, so that a memory can be evaluated inside a
-step and advanced once, in ``commit``.
+physics step and ``elapsed_s`` the time since then. A memory can thus be evaluated inside a step
+and advanced once, in ``commit``.
 """
 
 from collections.abc import Callable

@@ -15,9 +15,9 @@
 """
 Pair of high-speed on/off valves (HSV): fill from the supply, vent to atmosphere.
 
-Two fidelities. Averaged: the mean opening equals the duty. Switching: each
-valve is open or shut; a PWM period latches the duty at its start, and the
-share of a 0.1 ms step in which a valve is open is exact.
+There are two fidelities. Averaged: the mean opening equals the duty. Switching: each valve is open
+or shut. A PWM period latches the duty at its start. The share of a 0.1 ms step in which a valve is
+open is exact.
 """
 
 from pam_sim.compiled import inlined

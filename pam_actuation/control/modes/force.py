@@ -15,11 +15,11 @@
 """
 Force mode: the law tracks a force, with the contraction held or driven by something else.
 
-One newton counts as 1/K metres, K a nominal stiffness of the muscle at constant
-pressure, so that every setting and rule of the law keeps its meaning. The static inverse is
-the pressure that gives the wanted force at the contraction the muscle will have when the
-command arrives: measured, and carried on with its rate over the preview. A small wanted
-force is no fault; a tendon that hangs loose where a force is wanted is, and freezes learning.
+One newton counts as 1/K metres, K a nominal stiffness of the muscle at constant pressure, so that
+every setting and rule of the law keeps its meaning. The static inverse is the pressure for the
+wanted force at the contraction that the muscle will have when the command arrives. That is the
+measured contraction, extrapolated with its rate over the preview. A small wanted force is no
+fault; a tendon that hangs loose where a force is wanted is, and freezes learning.
 """
 
 from collections.abc import Callable

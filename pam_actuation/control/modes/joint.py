@@ -15,10 +15,10 @@
 """
 Joint mode: the law tracks the angle of a joint that two muscles turn against each other.
 
-The angle counts as the contraction it gives the flexor, x = x0 + r theta, so that every
-setting and rule of the law keeps its meaning. What the law commands is the difference of
-two pressures about a co-contraction, written as one pressure with the limits of one muscle
-(``joint_statics``): its limits, and with them the anti-windup, are those of the real pair.
+The angle counts as the contraction it gives the flexor, x = x0 + r theta, so that every setting
+and rule of the law keeps its meaning. The law commands the difference of two pressures about a
+co-contraction, written as one pressure with the limits of one muscle (``joint_statics``). Its
+limits, and thus the anti-windup, are those of the real pair.
 """
 
 from collections.abc import Callable, Mapping, Sequence

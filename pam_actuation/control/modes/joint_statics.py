@@ -15,11 +15,11 @@
 """
 Pressures that hold an antagonistic joint at an angle, as the static inverse of a law.
 
-A pair of pressures (gauge) is written as one: u = middle + difference, with
-p_flexor = p0 + difference and p_extensor = p0 - difference. The middle is half way between
-lowest and highest pressure, so that u has the limits of one muscle: at either of them one
-muscle is vented and the other one full. The co-contraction p0 gives way where both pressures
-could not be kept within limits otherwise.
+A pair of pressures (gauge) is written as one: u = middle + difference, with p_flexor = p0 +
+difference and p_extensor = p0 - difference. The middle is half way between lowest and highest
+pressure, so u has the limits of one muscle. At either limit one muscle is vented and the other one
+full. The co-contraction p0 gives way where both pressures could not be kept within limits
+otherwise.
 """
 
 import numpy as np

@@ -15,14 +15,12 @@
 """
 Delayed credit: which rules were active when the present error was caused.
 
-A pneumatic muscle answers a command after dead time, valve lag and filter
-delay. A ring buffer keeps the firing strengths of the last ticks; the
-performance index of now belongs to the rules of ``delay`` ticks ago, or, when
-the delay is not known well, to those of ``delay - spread .. delay + spread``
-ticks ago with triangular weights that sum to 1. Each set of active rules is
-judged once, when all of the indices that belong to it are known: ``delay +
-spread`` ticks later. A spread also keeps fast swings of the error out of the
-rules, without a shift in phase.
+A pneumatic muscle answers a command after dead time, valve lag and filter delay. A ring buffer
+keeps the firing strengths of the last ticks. The present performance index belongs to the rules of
+``delay`` ticks ago. If the delay is not known well, it belongs to those of ``delay - spread ..
+delay + spread`` ticks ago, with triangular weights that sum to 1. Each set of active rules is
+judged once, when all of the indices that belong to it are known: ``delay + spread`` ticks later. A
+spread also keeps fast swings of the error out of the rules, without a shift in phase.
 """
 
 from typing import TypeAlias

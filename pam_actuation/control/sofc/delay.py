@@ -15,12 +15,11 @@
 """
 Credit delay from a recording: how long after a command the muscle moves.
 
-The changes of command and contraction are correlated over a range of delays, block by
-block. Changes rather than values, for a slow motion alike in both says nothing about
-the delay. The place of the largest correlation is the delay at which most of the answer
-comes, dead time, lag of the valve and swing of the load together, which is what the
-credit delay stands for. Where blocks disagree the delay is uncertain, and the credit is to
-be spread.
+The changes of command and contraction are correlated over a range of delays, block by block.
+Changes rather than values, for a slow motion alike in both says nothing about the delay. The
+largest correlation is at the delay of most of the response: dead time, lag of the valve and swing
+of the load together. This is what the credit delay means. Where blocks disagree the delay is
+uncertain, and the credit is to be spread.
 """
 
 from dataclasses import dataclass

@@ -15,18 +15,17 @@
 """
 Feed-forward from known dynamics, and jumps of the reference made smooth moves.
 
-The pressure that holds the reference where it will be one preview from now comes
-from the static inverse; moving the load takes more: damping times rate and mass
-times acceleration, over the force one pascal makes, and then what the lag of the
-valve swallows::
+The static inverse gives the pressure that holds the reference one preview ahead. Moving the load
+takes more: damping times rate and mass times acceleration, divided by the force per pascal. The
+lag of the valve is compensated as well::
 
     p = p_static(r) + k_v dr/dt + k_a d2r/dt2,   command = p + T_valve dp/dt
 
-A jump of the reference has no acceleration to feed forward. It is turned into a
-move of fixed duration along ``s = 10 q^3 - 15 q^4 + 6 q^5``, which starts and ends
-at rest with no acceleration (minimum jerk, Flash and Hogan 1985), or along
-``s = 35 q^4 - 84 q^5 + 70 q^6 - 20 q^7``, whose jerk is nothing there as well: the
-lag of a valve asks for the change of pressure, and that has the jerk in it.
+A jump of the reference has no acceleration to feed forward. It becomes a move of fixed duration
+along ``s = 10 q^3 - 15 q^4 + 6 q^5``. That move starts and ends at rest without acceleration
+(minimum jerk, Flash and Hogan 1985). The form ``s = 35 q^4 - 84 q^5 + 70 q^6 - 20 q^7`` has no
+jerk there either. To compensate the lag of a valve, the change of pressure is needed, and that
+contains the jerk.
 """
 
 import numpy as np

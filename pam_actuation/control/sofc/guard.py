@@ -15,17 +15,16 @@
 """
 How fast to learn: slower once the error no longer falls, and back when it grows.
 
-The squared error is collected over windows of whole movements to and fro; windows
-of about the same mean speed are compared with the best one, which keeps a copy of
-the rules.
+The squared error is collected over windows of complete movements to and fro. Windows of about the
+same mean speed are compared with the best one, which keeps a copy of the rules.
 
-* A window that is no better anneals the learning rate, so that the noise of single
-  passes averages out; one beyond ``guard_ratio`` times the best brings the full rate
-  back, for then the plant has changed.
-* Two such windows in a row, the second clearly worse than the first, mean that
-  learning itself spoils the rules (after a change of the plant the error falls from
-  window to window): the copy comes back and the full rate is halved until there is a
-  new best. So do five of them that grow slowly; five without growth are the new normal.
+* A window that is no better anneals the learning rate, so that the noise of single passes averages
+  out. One beyond ``guard_ratio`` times the best restores the full rate, because then the plant has
+  changed.
+* Two such windows in a row, the second clearly worse than the first, mean that learning itself
+  spoils the rules. After a change of the plant, the error would fall from window to window. The
+  copy is restored and the full rate is halved until there is a new best. So do five of them that
+  grow slowly; five without growth are the new normal.
 """
 
 import math

@@ -15,16 +15,15 @@
 """
 Rule modification and the reasons to leave the rules alone.
 
-The rules that were active one credit delay ago change in proportion to their
-firing strength and to the performance index (Procyk and Mamdani 1979; local
-memory as in fuzzy model reference learning control, Layne and Passino). With a
-partition of unity this is the gradient law ``theta' = gamma s xi``, hence the
-usual protections: bounds, a limit per tick, a dead zone, and a leak towards the
-initial rules on visited rules only.
+The rules that were active one credit delay ago change in proportion to their firing strength and
+to the performance index (Procyk and Mamdani 1979). The local memory is that of fuzzy model
+reference learning control (Layne and Passino). With a partition of unity this is the gradient law
+``theta' = gamma s xi``. It has the usual protections: bounds, a limit per tick, a dead zone, and a
+leak of visited rules towards the initial rules.
 
-Feedback rules learn by time. Feed-forward and motion rules learn by passes: a
-tick counts by how far the reference moved over the knots, so that a rule mends
-the same share of the error whether the reference passes it fast or slowly.
+Feedback rules learn by time. Feed-forward and motion rules learn by passes: a tick counts by how
+far the reference moved over the knots. A rule then corrects the same share of the error in fast
+and slow passes.
 """
 
 from pam_sim.annotations import FloatArray

@@ -56,10 +56,10 @@ def gaussian_degree(degree: float, width: float) -> float:
     """
     Return the degree of the upper set when both active sets are Gaussian.
 
-    ``degree`` is the place between the peaks of two neighbouring sets, 0 to 1, ``width``
-    their standard deviation in distances of the peaks. The two are divided by their sum
-    (a logistic function of the place) and what is left of the other set at a peak is taken
-    off, so that the degrees are continuous over the whole universe.
+    ``degree`` is the place between the peaks of two neighbouring sets, 0 to 1, ``width`` their
+    standard deviation in distances of the peaks. The two are divided by their sum, which gives a
+    logistic function of the place. The rest of the other set at a peak is subtracted, so that the
+    degrees are continuous over the whole universe.
     """
     steepness = 1.0 / (width * width)
     least = 1.0 / (1.0 + math.exp(0.5 * steepness))

@@ -19,8 +19,8 @@ The output is the wanted correction of the *output* [m]: positive means that the
 muscle should have contracted more. Zero along ``e + tau de/dt = 0``, the wanted
 first-order decay of the error. Two forms:
 
-* linear: ``p = clip(e + tau de, -limit, limit)`` (Jantzen's linear form),
-* table: the 13-level table of Procyk and Mamdani (Automatica 15, 1979) as it is
+* linear: ``p = clip(e + tau de, -limit, limit)`` (Jantzen's linear form).
+* table: The 13-level table of Procyk and Mamdani (Automatica 15, 1979) as it is
   commonly reproduced, on quantised error and change of error, scaled to ``limit``.
 """
 

@@ -15,10 +15,10 @@
 """
 Files of learned rules: written atomically, checked, refused whole if anything differs.
 
-A rule file is JSON text: schema version, shapes, scaling (what the numbers
-mean and for which rig they were learned), the rules, their initial values, how
-often each fired, and a sha256 over all of that in canonical form. Nothing of a
-file is used before all of it has been checked.
+A rule file is JSON text with schema version, shapes and scaling (the meaning of the numbers and
+the rig for which they were learned). It has the rules, their initial values and how often each
+fired. A sha256 covers all of that in canonical form. Nothing of a file is used before all of it
+has been checked.
 """
 
 import hashlib

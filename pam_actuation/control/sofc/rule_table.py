@@ -24,9 +24,8 @@ the two branches. Shortly after a reversal both are active in part. Motion rules
 ``motion[m, n]`` [Pa] of "if the reference is near r_m and moves at about v_n then
 add c_mn"; the rates are dense about zero, where the muscle turns round.
 
-Inference is product and weighted mean; degrees sum to 1, so the mean needs no
-division (zero-order Sugeno form of the rule table of Procyk and Mamdani,
-Automatica 15, 1979).
+Inference is product and weighted mean; degrees sum to 1, so the mean needs no division. This is
+the zero-order Sugeno form of the rule table of Procyk and Mamdani (Automatica 15, 1979).
 """
 
 from dataclasses import dataclass, field

@@ -15,10 +15,10 @@
 """
 One tick of the self-organizing fuzzy controller, compiled, without allocation.
 
-Order of a tick: smooth jumps; error and filtered change of error; fuzzification;
-the rule tables, static inverse and dynamics, trim; limits with back-calculation;
-memory of the firing strengths; modification of the rules that were active one
-credit delay ago; roll-back.
+A tick first smooths jumps and computes error and filtered change of error. Fuzzification, rule
+tables, static inverse, dynamics and trim follow, then limits with back-calculation. Last are the
+memory of the firing strengths, the modification of the rules that were active one credit delay
+ago, and roll-back.
 """
 
 import math
@@ -196,10 +196,10 @@ def _passes(par: np.record, st: np.record, knot_place: float, motion_place: floa
     """
     Return which part of a pass over the feed-forward and the motion rules this tick was.
 
-    A pass is the way from one knot to the next; standing still for ``pass_time_s`` also
-    counts as one, just after a jump as ``settling_passes``: what is missing there is an
-    error of the rules, later it is creep. Motion rules do not know from which side the
-    muscle came to rest, so less of that may count for them (``motion_at_rest``).
+    A pass is the way from one knot to the next. Standing still for ``pass_time_s`` also counts as
+    one, just after a jump as ``settling_passes``. There the error is one of the rules; later it is
+    creep. Motion rules do not know from which side the muscle came to rest, so less of that may
+    count for them (``motion_at_rest``).
     """
     still = par.period_s / par.pass_time_s
     if st.move.left_s > 0.0:

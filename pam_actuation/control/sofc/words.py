@@ -15,9 +15,9 @@
 """
 Rules in words, for any table of a rule base.
 
-A rule over sets with names reads "if error is small positive and change of error
-is about zero (contracting) then raise pressure a little (+1.2 kPa)", a rule over
-places "near 14 mm, extending: add 6.3 kPa". How much is said by size:
+A rule over named sets reads "if error is small positive and change of error is about zero
+(contracting) then raise pressure a little (+1.2 kPa)". A rule over places reads "near 14 mm,
+extending: add 6.3 kPa". How much is said by size:
 
 =====================  =======================================================
 below 0.05 kPa         leave pressure as it is
@@ -26,8 +26,8 @@ below 2 kPa            a little
 10 kPa and more        much
 =====================  =======================================================
 
-The muscle of 5 mm under 5 kg moves 0.04 to 0.11 mm per kPa, so that a little is
-about a tenth of a millimetre and much about a whole one.
+The 5 mm muscle under 5 kg moves 0.04 to 0.11 mm per kPa. So a little is about a tenth of a
+millimetre, and much is about a whole one.
 """
 
 from dataclasses import dataclass
@@ -54,9 +54,9 @@ class SpokenRule:
     """
     One rule: where it stands, what it adds, how often it fired, and how it reads.
 
-    ``value_pa`` and ``initial_pa`` are its output now and at first [Pa], ``fired_s`` the
-    sum of its firing strengths times the period [s], ``importance_pa_s`` the product of
-    ``fired_s`` and the size of the output.
+    ``value_pa`` and ``initial_pa`` are its present and initial output [Pa]. ``fired_s`` is the sum
+    of its firing strengths times the period [s]. ``importance_pa_s`` is the product of ``fired_s``
+    and the size of the output.
     """
 
     table: str

@@ -15,11 +15,11 @@
 """
 Walk: the contraction of a knee flexor over strides.
 
-The curve is a design profile, not measured data: five harmonics drawn through the
-landmarks of level walking that every text on gait shows (for instance D. A. Winter,
-Biomechanics and Motor Control of Human Movement, chapter 3): a nearly straight leg at
-heel contact, a small flexion of about 19 degrees while the leg is loaded, 6 degrees in
-mid-stance, a large one of about 61 degrees in swing, 3 degrees just before the next contact.
+The curve is a design profile, not measured data: five harmonics drawn through the landmarks of
+level walking that every text on gait shows (for instance D. A. Winter, Biomechanics and Motor
+Control of Human Movement, chapter 3). The leg is nearly straight at heel contact and flexes by
+about 19 degrees while it is loaded. 6 degrees follow in mid-stance, about 61 degrees in swing and
+3 degrees just before the next contact.
 """
 
 from dataclasses import dataclass
