@@ -14,6 +14,7 @@
 
 """Parallel elastic force of the tube: F -> F - k x."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -41,6 +42,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_output(tension_n, contraction_m, par):
+def map_output(tension_n: float, contraction_m: float, par: np.record) -> float:
     """Return the tension less that of the tube."""
     return tension_n - par.stiffness_n_per_m * contraction_m

@@ -14,6 +14,7 @@
 
 """Parallel elastic force of a tube that stiffens: F -> F - k x (1 + x / x_h)."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.bladder_stiffness import EFFECT as _SIBLING
 from pam_sim.effects.effect import Effect
@@ -39,6 +40,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_output(tension_n, contraction_m, par):
+def map_output(tension_n: float, contraction_m: float, par: np.record) -> float:
     """Return the tension less that of the tube."""
     return tension_n - spring_n(contraction_m, par)

@@ -35,19 +35,26 @@ The load of a crossing grows with sin(2 alpha), its effective radius falls with 
 the patch grows with pressure only, and the friction falls with the length.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import braid
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
+if TYPE_CHECKING:
+    from pam_sim.muscle.muscle import Muscle
+
 _REFERENCE_PA, _REFERENCE_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
-def _constants(values, muscle):
+def _constants(values: Mapping[str, float], muscle: 'Muscle') -> tuple[float, float, float]:
     """Return (friction over a p_g L [1/m], a^3 over p_g [m^3/Pa], strand radius [m])."""
     thread_m, turns = braid(muscle.length_m, muscle.bore_m, muscle.braid_angle_rad)
     radius_m = 0.5 * values['strand_width_m']
@@ -56,14 +63,15 @@ def _constants(values, muscle):
     return 3.0 * math.pi / 16.0 * values['friction_coefficient'] / turns, patch, radius_m
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     factor, patch, radius_m = _constants(values, numbers.muscle)
     return {'friction_per_pa_m': factor, 'patch_m3_per_pa': patch, 'radius_m': radius_m,
             'length_m': numbers.muscle.length_m, 'atmosphere_pa': numbers.parameters['p_atm']}
 
 
 @compiled
-def friction_n(gauge_pa, length_m, factor, patch, radius_m):
+def friction_n(gauge_pa: float, length_m: float, factor: float, patch: float,
+               radius_m: float) -> float:
     """Return the friction level [N] at a length; arguments 3 to 5 as packed."""
     if gauge_pa <= 0.0:
         return 0.0
@@ -104,7 +112,8 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, contraction_m, par):
+def muscle_friction(level_n: float, pressure_pa: float, contraction_m: float,
+                    par: np.record) -> float:
     """Return the friction level with this part added."""
     return level_n + friction_n(
         pressure_pa - par.atmosphere_pa, par.length_m - contraction_m, par.friction_per_pa_m,

@@ -14,6 +14,7 @@
 
 """Offset of the contraction sensor: the reading is x + b."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting
@@ -37,6 +38,7 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, par):
+def sensor(pressure_pa: float, contraction_m: float, force_n: float,
+           par: np.record) -> tuple[float, float, float]:
     """Return the readings with the offset."""
     return pressure_pa, contraction_m + par.bias_m, force_n

@@ -14,14 +14,19 @@
 
 """The contraction sensor is slower than the others: tau dy/dt = x - y."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import advance_sampled, pack_sampled, READING, SAMPLED
 from pam_sim.parameters import Parameter
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'reading': numbers.contraction_m, 'true': numbers.contraction_m}
 
 
@@ -51,12 +56,12 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor_commit(contraction_m, state, par):
+def sensor_commit(contraction_m: float, state: np.record, par: np.record) -> None:
     """Advance the lagged reading by one step."""
     advance_sampled(contraction_m, state, par)
 
 
 @compiled
-def sensor(pressure_pa, force_n, state):
+def sensor(pressure_pa: float, force_n: float, state: np.record) -> tuple[float, float, float]:
     """Return the readings with the lag."""
     return pressure_pa, state.reading, force_n

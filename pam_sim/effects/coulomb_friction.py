@@ -14,6 +14,7 @@
 
 """Constant dry friction inside the muscle: |F_f| <= F_c, full and against motion when sliding."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -36,6 +37,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_friction(level_n, par):
+def muscle_friction(level_n: float, par: np.record) -> float:
     """Return the friction level with this part added."""
     return level_n + par.force_n

@@ -20,23 +20,31 @@ Viscoelastic drift of the rubber: two relaxing springs beside the muscle.
 Generalised Maxwell solid, e.g. Findley, Lai, Onaran (1976), ch. 5.
 """
 
+from collections.abc import Mapping
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
-def _initial(values, numbers):
+
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     # Relaxed at the start.
     return {'anchor_1_m': numbers.contraction_m, 'anchor_2_m': numbers.contraction_m}
 
 
-def _relaxing_stiffness(values, rig):
+def _relaxing_stiffness(values: Mapping[str, float], rig: 'Rig') -> float:
     return values['stiffness_1_n_per_m'] + values['stiffness_2_n_per_m']
 
 
-def _creep_fraction(values, rig):
+def _creep_fraction(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return relaxing over static stiffness at 400 kPa gauge and 8.9 mm (5 kg at rest)."""
     length, x, d = rig.muscle.length_m, 8.86e-3, 1e-5
     near, far = rig.muscle.law.law.force_n(400e3, [(x - d) / length, (x + d) / length], 'allow')
@@ -79,14 +87,16 @@ EFFECT = Effect(
 
 
 @compiled
-def relaxed(anchor_m, contraction_m, dx_m, elapsed_s, time_constant_s):
+def relaxed(anchor_m: float, contraction_m: float, dx_m: float, elapsed_s: float,
+            time_constant_s: float) -> float:
     """Return the anchor after ``elapsed_s`` with x rising linearly by dx (trapezoidal rule)."""
     middle = contraction_m - 0.5 * dx_m
     return anchor_m + elapsed_s / (time_constant_s + 0.5 * elapsed_s) * (middle - anchor_m)
 
 
 @compiled
-def muscle_force(force_n, contraction_m, dx_m, elapsed_s, state, par):
+def muscle_force(force_n: float, contraction_m: float, dx_m: float, elapsed_s: float,
+                 state: np.record, par: np.record) -> float:
     """Return the force less that of the relaxing springs."""
     q1 = relaxed(state.anchor_1_m, contraction_m, dx_m, elapsed_s, par.time_constant_1_s)
     q2 = relaxed(state.anchor_2_m, contraction_m, dx_m, elapsed_s, par.time_constant_2_s)
@@ -95,7 +105,8 @@ def muscle_force(force_n, contraction_m, dx_m, elapsed_s, state, par):
 
 
 @compiled
-def commit(contraction_m, dx_m, elapsed_s, state, par):
+def commit(contraction_m: float, dx_m: float, elapsed_s: float, state: np.record,
+           par: np.record) -> None:
     """Advance the anchors of the springs."""
     state.anchor_1_m = relaxed(
         state.anchor_1_m, contraction_m, dx_m, elapsed_s, par.time_constant_1_s)

@@ -14,6 +14,7 @@
 
 """More volume beside the muscle than modelled: V -> V + V_extra."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -38,6 +39,6 @@ EFFECT = Effect(
 
 
 @compiled
-def volume(volume_m3, par):
+def volume(volume_m3: float, par: np.record) -> float:
     """Return the air volume with the extra one."""
     return volume_m3 + par.extra_volume_m3

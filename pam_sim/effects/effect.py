@@ -14,13 +14,18 @@
 
 """What an effect file declares."""
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.parameters import check_parameters
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
@@ -53,8 +58,8 @@ class Numbers:
     substep_s: float
     valve: str
     fidelity: str
-    parameters: dict
-    signal: tuple = (0.0, 0.0)
+    parameters: Mapping[str, float]
+    signal: tuple[float, ...] = (0.0, 0.0)
     pressure_pa: float = 0.0
     contraction_m: float = 0.0
     force_n: float = 0.0
@@ -71,16 +76,23 @@ class Reported:
 
     name: str
     unit: str
-    function: object
-    valves: tuple = ('ppr', 'hsv')
+    function: Callable[[Mapping[str, float], Any], float]
+    valves: tuple[str, ...] = ('ppr', 'hsv')
 
 
-def _as_they_are(values, numbers):
+# Numbers of an effect from its parameters and those of the rig.
+Packing = Callable[[Mapping[str, float], Numbers], Mapping[str, Any]]
+
+
+def _as_they_are(values: Mapping[str, float], numbers: Numbers) -> Mapping[str, float]:
     return values
 
 
-def _at_zero(values, numbers):
+def _at_zero(values: Mapping[str, float], numbers: Numbers) -> dict[str, float]:
     return {}
+
+
+_BY_PARAMETERS = np.dtype([])     # stands for the record of the parameters
 
 
 @dataclass(frozen=True)
@@ -131,25 +143,25 @@ class Effect:
     subsystem: str
     sentence: str
     source: str
-    parameters: tuple
-    amplitude: tuple
-    reported: tuple = ()
+    parameters: tuple[Parameter, ...]
+    amplitude: tuple[str, ...]
+    reported: tuple[Reported, ...] = ()
     equation: str = ''
     variant_of: str = ''
-    relative_of: tuple = ()
-    states: np.dtype = None
-    packed: np.dtype = None
-    pack: object = _as_they_are
-    initial: object = _at_zero
-    valves: tuple = ('ppr', 'hsv')
+    relative_of: tuple[str, ...] = ()
+    states: np.dtype[Any] | None = None
+    packed: np.dtype[Any] = field(default_factory=lambda: _BY_PARAMETERS)
+    pack: Packing = _as_they_are
+    initial: Packing = _at_zero
+    valves: tuple[str, ...] = ('ppr', 'hsv')
     order: int = 50
-    active: object = None
+    active: Callable[[Mapping[str, float], Numbers], bool] | None = None
     fitting: Fitting = Fitting()
-    hooks: dict = field(default_factory=dict, compare=False)
+    hooks: dict[str, Callable[..., Any]] = field(default_factory=dict, compare=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Fill in the record of the packed values and check the declaration."""
-        if self.packed is None:
+        if self.packed is _BY_PARAMETERS:
             object.__setattr__(self, 'packed', record(*(p.name for p in self.parameters)))
         known = {parameter.name for parameter in self.parameters}
         if self.subsystem not in SUBSYSTEMS or not self.amplitude or set(self.amplitude) - known:
@@ -166,13 +178,14 @@ class Effect:
                           p.lower, p.upper)
             for p in self.parameters if p.name in self.amplitude)
 
-    def values(self, given=(), where=''):
+    def values(self, given: Mapping[str, Any] | Iterable[tuple[str, Any]] = (),
+               where: str = '') -> dict[str, float]:
         """Return all parameter values, checked; nominal where not given (see Parameter)."""
         return check_parameters(
-            self.parameters, dict(given) if not hasattr(given, 'items') else given,
+            self.parameters, given if isinstance(given, Mapping) else dict(given),
             f'parameter of effect `{self.name}`', where)
 
-    def is_active(self, values, numbers):
+    def is_active(self, values: Mapping[str, float], numbers: Numbers) -> bool:
         """Return whether the effect acts with these values on this rig."""
         if numbers.valve not in self.valves:
             return False
@@ -180,7 +193,8 @@ class Effect:
             return bool(self.active(values, numbers))
         return any(values[name] != 0.0 for name in self.amplitude)
 
-    def pack_into(self, values, numbers, par, place, state, state_place):
+    def pack_into(self, values: Mapping[str, float], numbers: Numbers, par: FloatArray, place: int,
+                  state: FloatArray, state_place: int) -> bool:
         """
         Write packed parameters and initial states, if the effect acts.
 
@@ -208,7 +222,8 @@ class Effect:
             put_some(state, self.states, self.initial(values, numbers), state_place)
         return True
 
-    def report(self, values, rig):
+    def report(self, values: Mapping[str, float],
+               rig: 'Rig | None') -> dict[str, tuple[float, str]]:
         """Return reported name -> (value, unit) for a rig; all of them without one."""
         return {item.name: (item.function(values, rig), item.unit) for item in self.reported
                 if rig is None or rig.valve in item.valves}

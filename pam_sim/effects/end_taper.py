@@ -14,12 +14,20 @@
 
 """Ends that are not cylindrical make the braid work at a larger strain: F(p, k eps)."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.parameters import Parameter
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
-def force_change_n(values, rig):
+
+def force_change_n(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return the change of tension at 500 kPa gauge and 10 mm, N."""
     strain = 10e-3 / rig.muscle.length_m
     force_n = rig.muscle.law.law.force_n
@@ -47,6 +55,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, par):
+def map_input(gauge_pa: float, strain: float, par: np.record) -> tuple[float, float]:
     """Return the strain scaled."""
     return gauge_pa, strain * (1.0 + par.k_minus_1)

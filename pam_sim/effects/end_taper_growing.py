@@ -14,16 +14,24 @@
 
 """Ends that taper the more the muscle contracts: F(p, k eps), k = 1 + a + b eps."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.end_taper import EFFECT as _SIBLING, force_change_n
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 _AT_M = 10e-3                # contraction for which the factor is stated
 
 
-def _there(values, rig):
+def _there(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return the strain factor less one at 10 mm."""
     return values['k_minus_1'] + values['k_per_strain'] * _AT_M / rig.muscle.length_m
 
@@ -57,6 +65,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, par):
+def map_input(gauge_pa: float, strain: float, par: np.record) -> tuple[float, float]:
     """Return the strain scaled."""
     return gauge_pa, strain * (1.0 + par.k_minus_1 + par.k_per_strain * strain)

@@ -22,9 +22,14 @@ gauge, x = 10 mm and nominal supply, so that r_f and r_v are the caps there; p_s
 is the rig's own supply.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -37,7 +42,7 @@ _NO_LIMIT = 1e30
 _RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     volume = numbers.parameters['V_dead'] + numbers.muscle.volume_m3(_CONTRACTION_M)
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
@@ -85,7 +90,8 @@ EFFECT = Effect(
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+                  par: np.record) -> float:
     """Return the pressure rate within what the orifices let through."""
     volume = air_volume_m3(contraction_m, par)
     if rate_pa_per_s > 0.0:

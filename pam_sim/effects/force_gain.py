@@ -14,6 +14,7 @@
 
 """Scale of the load cell: the reading is (1 + e) F."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting
@@ -36,6 +37,7 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor(pressure_pa, contraction_m, force_n, par):
+def sensor(pressure_pa: float, contraction_m: float, force_n: float,
+           par: np.record) -> tuple[float, float, float]:
     """Return the readings with the scale."""
     return pressure_pa, contraction_m, force_n * (1.0 + par.gain_error)

@@ -14,6 +14,7 @@
 
 """Dry friction of rail or joint, outside the load cell's muscle side: the cell carries it."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -37,6 +38,6 @@ EFFECT = Effect(
 
 
 @compiled
-def load_friction(level_n, par):
+def load_friction(level_n: float, par: np.record) -> float:
     """Return the friction level of the guide with this part added."""
     return level_n + par.force_n

@@ -16,6 +16,8 @@
 
 from functools import partial
 
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -38,7 +40,7 @@ EFFECT = Effect(
     parameters=(*_SIBLING.parameters, *PARAMETERS),
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
-    packed=record(*PACKED, *_SIBLING.packed.names),
+    packed=record(*PACKED, *(_SIBLING.packed.names or ())),
     states=BENDING,
     pack=partial(pack_presliding, _SIBLING),
     fitting=Fitting(
@@ -48,13 +50,15 @@ EFFECT = Effect(
 
 
 @compiled
-def load_force(force_n, velocity_m_per_s, dx_m, elapsed_s, state, par):
+def load_force(force_n: float, velocity_m_per_s: float, dx_m: float, elapsed_s: float,
+               state: np.record, par: np.record) -> float:
     """Return the force against contraction with the bent contact's added."""
     return force_n + par.force_n * share_of_sliding(
         velocity_m_per_s, dx_m, elapsed_s, state, par)
 
 
 @compiled
-def commit(velocity_m_per_s, dx_m, elapsed_s, state, par):
+def commit(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.record,
+           par: np.record) -> None:
     """Advance the bending of the contact."""
     advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, par)

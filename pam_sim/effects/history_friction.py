@@ -31,10 +31,14 @@ points carries the memory as in Swevers, Al-Bender, Ganseman, Prajogo (2000), IE
 Trans. Automatic Control 45(4). It depends on the travel alone, not on the rate.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
@@ -45,12 +49,12 @@ from pam_sim.records import record
 _DEPTH = 8              # turning points remembered, the start included
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**pack_level(values, numbers), 'inverse_width_per_m': 1.0 / values['width_m'],
             'dry_share': values['dry_share']}
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'count': 1.0, 'turn_m': [numbers.contraction_m] + [0.0] * (_DEPTH - 1)}
 
 
@@ -84,7 +88,8 @@ EFFECT = Effect(
 
 
 @compiled
-def on_branch(x_m, direction, count, state, inverse_width):
+def on_branch(x_m: float, direction: float, count: int, state: np.record,
+              inverse_width: float) -> float:
     """Return h at x on the branch that starts at the last of ``count`` remembered points."""
     last = count - 1
     widths = abs(x_m - state.turn_m[last]) * inverse_width
@@ -94,7 +99,7 @@ def on_branch(x_m, direction, count, state, inverse_width):
 
 
 @compiled
-def still_open(x_m, direction, count, state):
+def still_open(x_m: float, direction: float, count: int, state: np.record) -> int:
     """Return how many points are left once those that the travel to x has closed are gone."""
     while count > 2 and (x_m - state.turn_m[count - 2]) * direction >= 0.0:
         count -= 2
@@ -106,7 +111,8 @@ def still_open(x_m, direction, count, state):
 
 
 @compiled
-def travelled(x_m, dx_m, state, inverse_width):
+def travelled(x_m: float, dx_m: float, state: np.record,
+              inverse_width: float) -> tuple[float, int, float, bool]:
     """
     Return what a travel ``dx_m`` that ends at x leads to, without noting it.
 
@@ -137,14 +143,15 @@ def travelled(x_m, dx_m, state, inverse_width):
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, par):
+def muscle_friction(level_n: float, pressure_pa: float, par: np.record) -> float:
     """Return the friction level with the dry share added."""
     full = loop_level_n(pressure_pa, par)
     return level_n + par.dry_share * max(full, 0.0)
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, contraction_m, dx_m, state, par):
+def muscle_force(force_n: float, pressure_pa: float, contraction_m: float, dx_m: float,
+                 state: np.record, par: np.record) -> float:
     """Return the force less the share with memory."""
     full = loop_level_n(pressure_pa, par)
     if full <= 0.0:
@@ -154,7 +161,7 @@ def muscle_force(force_n, pressure_pa, contraction_m, dx_m, state, par):
 
 
 @compiled
-def commit(contraction_m, dx_m, state, par):
+def commit(contraction_m: float, dx_m: float, state: np.record, par: np.record) -> None:
     """Remember a turn, forget the cycles that have closed."""
     _, count, direction, turn = travelled(contraction_m, dx_m, state, par.inverse_width_per_m)
     if turn:

@@ -21,8 +21,13 @@ Generalised Maxwell slip, Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
 Automatic Control 50(11); for muscles Vo-Minh et al. (2011), Mechatronics 21.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
@@ -36,7 +41,7 @@ WEIGHTS = (0.25, 0.30, 0.25, 0.20)
 _ELEMENTS = len(WIDTHS_M)
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     scale = values['width_scale']
     return {**pack_level(values, numbers),
             'inverse_width_per_m': [1.0 / (width * scale) for width in WIDTHS_M],
@@ -67,7 +72,8 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, dx_m, state, par):
+def muscle_force(force_n: float, pressure_pa: float, dx_m: float, state: np.record,
+                 par: np.record) -> float:
     """Return the force less the slip elements' share at travel ``dx_m`` from the step start."""
     level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
@@ -80,7 +86,7 @@ def muscle_force(force_n, pressure_pa, dx_m, state, par):
 
 
 @compiled
-def commit(dx_m, state, par):
+def commit(dx_m: float, state: np.record, par: np.record) -> None:
     """Advance the slip states."""
     for j in range(_ELEMENTS):
         z = state.slip[j] + dx_m * par.inverse_width_per_m[j]

@@ -25,8 +25,13 @@ of Ikhouane and Rodellar (2007), Systems with Hysteresis, where z stays within
 large one does not close on itself, unlike Maxwell slip.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
@@ -38,7 +43,7 @@ _LONGEST = 0.05         # of one midpoint step, in widths: z is good to 0.002
 _FAR = 20.0             # widths after which z no longer depends on where it began
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**pack_level(values, numbers), 'inverse_width_per_m': 1.0 / values['width_m'],
             'exponent': values['exponent'], 'back': 2.0 * values['sigma'] - 1.0}
 
@@ -71,7 +76,7 @@ EFFECT = Effect(
 
 
 @compiled
-def slope(z, exponent, back):
+def slope(z: float, exponent: float, back: float) -> float:
     """Return W dz/ds for a travel s in the direction of positive z."""
     size = abs(z)
     if exponent != 1.0:         # a power costs more than all the rest
@@ -80,7 +85,7 @@ def slope(z, exponent, back):
 
 
 @compiled
-def loaded(z, widths, exponent, back):
+def loaded(z: float, widths: float, exponent: float, back: float) -> float:
     """Return z after a signed travel of so many widths (midpoint rule in short steps)."""
     sign = 1.0 if widths > 0.0 else -1.0
     left = min(abs(widths), _FAR)
@@ -94,7 +99,8 @@ def loaded(z, widths, exponent, back):
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, dx_m, state, par):
+def muscle_force(force_n: float, pressure_pa: float, dx_m: float, state: np.record,
+                 par: np.record) -> float:
     """Return the force less the loop's share at travel ``dx_m`` from the step start."""
     level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
@@ -104,7 +110,7 @@ def muscle_force(force_n, pressure_pa, dx_m, state, par):
 
 
 @compiled
-def commit(dx_m, state, par):
+def commit(dx_m: float, state: np.record, par: np.record) -> None:
     """Advance the loop's state."""
     state.share = loaded(
         state.share, dx_m * par.inverse_width_per_m, par.exponent, par.back)

@@ -29,10 +29,14 @@ does not depend on the rate. It forgets: a small cycle inside a large one drifts
 instead of closing.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
@@ -45,14 +49,14 @@ from pam_sim.records import record
 _NARROW_M, _AT_PA = 1e-4, 4e5      # a loop that is narrower at this pressure is dry friction
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**pack_level(values, numbers), 'stiffness_n_per_m': values['stiffness_n_per_m'],
             'bristle_damping_n_s_per_m': values['bristle_damping_n_s_per_m'],
             'static_excess': values['static_ratio'] - 1.0,
             'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s']}
 
 
-def _is_dry(values):
+def _is_dry(values: Mapping[str, float]) -> bool:
     """
     Return whether bristles slip after so short a way that they are dry friction.
 
@@ -97,7 +101,7 @@ EFFECT = Effect(
 
 
 @compiled
-def bending_when_sliding(pressure_pa, velocity_m_per_s, par):
+def bending_when_sliding(pressure_pa: float, velocity_m_per_s: float, par: np.record) -> float:
     """Return the bristles' bending [m] in steady sliding, g / sigma0; 0 without friction."""
     level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
@@ -109,7 +113,8 @@ def bending_when_sliding(pressure_pa, velocity_m_per_s, par):
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, velocity_m_per_s, dx_m, state, par):
+def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float, dx_m: float,
+                 state: np.record, par: np.record) -> float:
     """Return the force less that of the bristles at travel ``dx_m`` from the step start."""
     sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
     if sliding_m <= 0.0:
@@ -120,7 +125,8 @@ def muscle_force(force_n, pressure_pa, velocity_m_per_s, dx_m, state, par):
 
 
 @compiled
-def commit(pressure_pa, velocity_m_per_s, dx_m, state, par):
+def commit(pressure_pa: float, velocity_m_per_s: float, dx_m: float, state: np.record,
+           par: np.record) -> None:
     """Advance the bending of the bristles."""
     sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
     state.bending_m = bent(state.bending_m, dx_m, sliding_m) if sliding_m > 0.0 else 0.0

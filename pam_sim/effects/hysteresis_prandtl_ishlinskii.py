@@ -30,11 +30,19 @@ has a loop, which Maxwell slip has not. On a hanging load cycled by pressure bot
 give the same kind of loop. Both return to the point where a minor loop began.
 """
 
+from collections.abc import Mapping
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 # Half width of each play over that of the loop, and its weight: design values.
 # The weights add to one and the products to one.
@@ -44,16 +52,16 @@ _PLAYS = len(RATIOS)
 _AT_PA, _AT_M = 400e3, 8.86e-3        # 5 kg at rest on a DMSP-5-300
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**values, 'atmosphere_pa': numbers.parameters['p_atm']}
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     # All centred.
     return {'play_pa': [numbers.pressure_pa - numbers.parameters['p_atm']] * _PLAYS}
 
 
-def _half_width_n(values, rig):
+def _half_width_n(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return half the force between the branches at 400 kPa gauge and 8.86 mm."""
     half = values['half_width_pa'] + _AT_PA * values['half_width_per_pa']
     rising, falling = rig.muscle.law.law.force_n(
@@ -94,13 +102,14 @@ EFFECT = Effect(
 
 
 @compiled
-def played(y, gauge_pa, half_width_pa):
+def played(y: float, gauge_pa: float, half_width_pa: float) -> float:
     """Return the output of one play at an input of ``gauge_pa``."""
     return min(max(y, gauge_pa - half_width_pa), gauge_pa + half_width_pa)
 
 
 @compiled
-def map_input(gauge_pa, strain, state, par):
+def map_input(gauge_pa: float, strain: float, state: np.record,
+              par: np.record) -> tuple[float, float]:
     """Return the pressure behind the plays."""
     half = max(par.half_width_pa + par.half_width_per_pa * gauge_pa, 0.0)
     shift = 0.0
@@ -110,7 +119,7 @@ def map_input(gauge_pa, strain, state, par):
 
 
 @compiled
-def commit(pressure_pa, state, par):
+def commit(pressure_pa: float, state: np.record, par: np.record) -> None:
     """Advance the plays."""
     gauge_pa = pressure_pa - par.atmosphere_pa
     half = max(par.half_width_pa + par.half_width_per_pa * gauge_pa, 0.0)

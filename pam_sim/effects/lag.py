@@ -19,9 +19,14 @@ Two exact steps, for what is known of u within a step: a sensor's signal is take
 as linear between its samples, a command as held.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Numbers
 from pam_sim.records import record
 
 SAMPLED = record('decay', 'steps')          # of samples: exp(-dt / tau); tau / dt
@@ -31,13 +36,13 @@ HELD = record('decay', 'mean_share')        # of a held input, over a physics st
 _MEAN = 1                           # of a held input, behind the decay over a physics step
 
 
-def pack_sampled(values, numbers):
+def pack_sampled(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     """Return the packed values of a lag of samples: decay over a step, steps per tau."""
     steps = values['time_constant_s'] / numbers.dt_s
     return {'decay': math.exp(-1.0 / steps), 'steps': steps}
 
 
-def pack_held(values, numbers):
+def pack_held(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     """Return the packed values of a lag of a held input: decay over a physics step, its mean."""
     ratio = numbers.substep_s / values['time_constant_s']
     decay = math.exp(-ratio)
@@ -45,7 +50,7 @@ def pack_held(values, numbers):
 
 
 @compiled
-def advance_sampled(true, state, par):
+def advance_sampled(true: float, state: np.record, par: np.record) -> None:
     """Advance the lagged reading, a ``READING``, to the sample ``true``."""
     slope = (true - state.true) * par.steps
     state.reading = true - slope + (
@@ -54,7 +59,7 @@ def advance_sampled(true, state, par):
 
 
 @compiled
-def mean_of_held(u, lagged, par):
+def mean_of_held(u: float, lagged: float, par: np.record) -> tuple[float, float]:
     """Return (mean of a lagged value over a physics step, its value at the end)."""
     distance = lagged - u
     return u + distance * par.mean_share, u + distance * par.decay

@@ -19,9 +19,14 @@ HSV: the flow is missing in the muscle. PPR: the regulator makes up for it and i
 left with a small droop.
 """
 
+from collections.abc import Mapping
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -29,17 +34,20 @@ from pam_sim.units import (
     GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 CRITICAL_RATIO = 0.5
 _KG_PER_S_PA = RHO_REFERENCE * (T_REFERENCE_K / TEMPERATURE_K) ** 0.5
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'conductance_kg_per_s_pa': values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
             'atmosphere_pa': P_ATM_PA, 'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K,
             **pack_volume(numbers)}
 
 
-def flow_at_400kpa(values, rig):
+def flow_at_400kpa(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return the mass flow of the orifice at 400 kPa gauge [kg/s]."""
     return float(mass_flow_kg_per_s(
         400e3 + P_ATM_PA, P_ATM_PA, values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
@@ -71,14 +79,15 @@ EFFECT = Effect(
 
 
 @compiled
-def mass_flow(flow_kg_per_s, pressure_pa, par):
+def mass_flow(flow_kg_per_s: float, pressure_pa: float, par: np.record) -> float:
     """Return the net flow less the leak."""
     return flow_kg_per_s - mass_flow_kg_per_s(
         pressure_pa, par.atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+                  par: np.record) -> float:
     """Return the pressure rate behind the PPR less the leak's share."""
     lost = mass_flow_kg_per_s(
         pressure_pa, par.atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)

@@ -19,10 +19,14 @@ The flow of a slit is laminar and grows with p^2 - p_atm^2, where that of a chok
 grows with p.
 """
 
+from collections.abc import Mapping
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import Number
 from pam_sim.compiled import compiled
 from pam_sim.effects.air_volume import air_volume_m3
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.leakage import CRITICAL_RATIO, EFFECT as _SIBLING, flow_at_400kpa
 from pam_sim.parameters import Parameter
@@ -30,24 +34,27 @@ from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 _SQUARED = (400e3 + P_ATM_PA) ** 2 - P_ATM_PA**2
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**_SIBLING.pack(values, numbers),
             'slit_kg_per_s_pa2': values['slit_flow_at_400kpa_kg_per_s'] / _SQUARED}
 
 
-def slit_share(pressure_pa):
+def slit_share(pressure_pa: Number) -> Number:
     """Return the flow of a slit at pressures [Pa absolute], as a share of that at 400 kPa."""
     return np.maximum(np.square(pressure_pa) - P_ATM_PA**2, 0.0) / _SQUARED
 
 
-def _flow_at_400kpa(values, rig):
+def _flow_at_400kpa(values: Mapping[str, float], rig: 'Rig') -> float:
     return flow_at_400kpa(values, rig) + values['slit_flow_at_400kpa_kg_per_s']
 
 
-def _conductance(values, rig):
+def _conductance(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return the conductance of an orifice that loses as much at 400 kPa."""
     return _flow_at_400kpa(values, rig) / flow_at_400kpa({'conductance_m3_per_s_pa': 1.0}, rig)
 
@@ -71,7 +78,7 @@ EFFECT = Effect(
         Reported('conductance_m3_per_s_pa', 'm3/(s Pa)', _conductance),
         Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', _flow_at_400kpa),
     ),
-    packed=record('slit_kg_per_s_pa2', *_SIBLING.packed.names),
+    packed=record('slit_kg_per_s_pa2', *(_SIBLING.packed.names or ())),
     pack=_pack,
     fitting=Fitting(
         free=(
@@ -81,7 +88,7 @@ EFFECT = Effect(
 
 
 @compiled
-def lost_kg_per_s(pressure_pa, par):
+def lost_kg_per_s(pressure_pa: float, par: np.record) -> float:
     """Return the mass flow of orifice and slit [kg/s]."""
     atmosphere_pa = par.atmosphere_pa
     lost = mass_flow_kg_per_s(
@@ -93,13 +100,14 @@ def lost_kg_per_s(pressure_pa, par):
 
 
 @compiled
-def mass_flow(flow_kg_per_s, pressure_pa, par):
+def mass_flow(flow_kg_per_s: float, pressure_pa: float, par: np.record) -> float:
     """Return the net flow less the leak."""
     return flow_kg_per_s - lost_kg_per_s(pressure_pa, par)
 
 
 @compiled
-def pressure_rate(rate_pa_per_s, pressure_pa, contraction_m, par):
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+                  par: np.record) -> float:
     """Return the pressure rate behind the PPR less the leak's share."""
     volume = air_volume_m3(contraction_m, par)
     return rate_pa_per_s - par.rt_j_per_kg / volume * lost_kg_per_s(pressure_pa, par)

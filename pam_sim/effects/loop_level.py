@@ -19,8 +19,13 @@ An effect lists ``level_parameters`` among its parameters and packs the fields `
 ``pack_level``.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Reported
+from pam_sim.effects.effect import Numbers, Reported
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 
@@ -34,7 +39,7 @@ LEVEL_FREE = (FreeParameter('force_n', 1.0, 0.0, 50.0, starts=(1.0,)),
               FreeParameter('force_per_pa', 4e-6, 0.0, 2e-4, starts=(2e-6,)))
 
 
-def level_parameters(what='half width of the loop'):
+def level_parameters(what: str = 'half width of the loop') -> tuple[Parameter, Parameter]:
     """Return the two Parameters of the level, for people called ``what``."""
     return (
         Parameter('force_n', 'N', 0.5, 0.0, 50.0,
@@ -44,13 +49,13 @@ def level_parameters(what='half width of the loop'):
     )
 
 
-def pack_level(values, numbers):
+def pack_level(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     """Return the packed values of the level."""
     return {'force_n': values['force_n'], 'force_per_pa': values['force_per_pa'],
             'atmosphere_pa': numbers.parameters['p_atm']}
 
 
 @compiled
-def loop_level_n(pressure_pa, par):
+def loop_level_n(pressure_pa: float, par: np.record) -> float:
     """Return the level [N] at an absolute pressure [Pa]; it may be negative far below one bar."""
     return par.force_n + par.force_per_pa * (pressure_pa - par.atmosphere_pa)

@@ -14,6 +14,7 @@
 
 """Elastic load beside the mass, relaxed at zero contraction: k x against contraction."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.parameters import Parameter
@@ -36,6 +37,6 @@ EFFECT = Effect(
 
 
 @compiled
-def load_force(force_n, contraction_m, par):
+def load_force(force_n: float, contraction_m: float, par: np.record) -> float:
     """Return the force against contraction with the spring's added."""
     return force_n + par.stiffness_n_per_m * contraction_m

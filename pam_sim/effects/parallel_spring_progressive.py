@@ -14,6 +14,7 @@
 
 """A spring beside the mass that stiffens: the load pulls with k x (1 + x / x_h) more."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -40,6 +41,6 @@ EFFECT = Effect(
 
 
 @compiled
-def load_force(force_n, contraction_m, par):
+def load_force(force_n: float, contraction_m: float, par: np.record) -> float:
     """Return the force against contraction with the spring's added."""
     return force_n + spring_n(contraction_m, par)

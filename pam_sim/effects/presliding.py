@@ -26,9 +26,14 @@ Over the travel dx of a step the equation of z is linear and solved exactly, so 
 stable however short the way.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -54,7 +59,8 @@ BENDING = record('bending_m')
 _SLIDING = 40.0             # square of a relative speed; beyond, less than the last bit
 
 
-def pack_presliding(plain, values, numbers):
+def pack_presliding(plain: Effect, values: Mapping[str, float],
+                    numbers: Numbers) -> dict[str, Any]:
     """Return the packed values: those of presliding, then those of the ``plain`` effect."""
     return {'presliding_m': values['presliding_m'], 'bristle_time_s': values['bristle_time_s'],
             'static_excess': values['static_excess'],
@@ -63,7 +69,7 @@ def pack_presliding(plain, values, numbers):
 
 
 @compiled
-def bent(z_m, dx_m, sliding_m):
+def bent(z_m: float, dx_m: float, sliding_m: float) -> float:
     """Return the bending [m] after a travel ``dx_m``, exact for a constant ``sliding_m``."""
     if dx_m == 0.0:
         return z_m
@@ -74,7 +80,8 @@ def bent(z_m, dx_m, sliding_m):
 
 
 @compiled
-def bent_there_and_back(z_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m):
+def bent_there_and_back(z_m: float, dx_m: float, velocity_m_per_s: float, elapsed_s: float,
+                        sliding_m: float) -> float:
     """Return the same for a travel that may hold a turn: its net length would leave that out."""
     if elapsed_s <= 0.0:
         return z_m
@@ -86,14 +93,15 @@ def bent_there_and_back(z_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m):
 
 
 @compiled
-def at_rest(velocity_m_per_s, par):
+def at_rest(velocity_m_per_s: float, par: np.record) -> float:
     """Return how much a velocity is as rest: 1 at none, 0 far above the Stribeck speed."""
     square = (velocity_m_per_s * par.inverse_stribeck_s_per_m) ** 2
     return math.exp(-square) if square < _SLIDING else 0.0
 
 
 @compiled
-def bending(velocity_m_per_s, dx_m, elapsed_s, state, par):
+def bending(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.record,
+            par: np.record) -> tuple[float, float, float]:
     """Return (bending, that in steady sliding [m], how much it is at rest) at travel ``dx_m``."""
     rest = at_rest(velocity_m_per_s, par)
     sliding_m = par.presliding_m * (1.0 + par.static_excess * rest)
@@ -102,7 +110,8 @@ def bending(velocity_m_per_s, dx_m, elapsed_s, state, par):
 
 
 @compiled
-def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, par):
+def share_of_sliding(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.record,
+                     par: np.record) -> float:
     """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
     z, sliding_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)
     if rest > 0.0:
@@ -112,6 +121,7 @@ def share_of_sliding(velocity_m_per_s, dx_m, elapsed_s, state, par):
 
 
 @compiled
-def advance_bending(velocity_m_per_s, dx_m, elapsed_s, state, par):
+def advance_bending(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.record,
+                    par: np.record) -> None:
     """Advance the bending by the travel of a step."""
     state.bending_m = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)[0]

@@ -14,8 +14,13 @@
 
 """Dry friction of thread on thread, growing with gauge pressure: |F_f| <= F400 p_g / 400 kPa."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -24,7 +29,7 @@ from pam_sim.units import P_ATM_PA
 _REFERENCE_PA = 400e3
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'force_per_pa': values['force_at_400kpa_n'] / _REFERENCE_PA, 'atmosphere_pa': P_ATM_PA}
 
 
@@ -50,6 +55,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_friction(level_n, pressure_pa, par):
+def muscle_friction(level_n: float, pressure_pa: float, par: np.record) -> float:
     """Return the friction level with this part added."""
     return level_n + par.force_per_pa * max(pressure_pa - par.atmosphere_pa, 0.0)

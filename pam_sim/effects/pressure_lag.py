@@ -14,14 +14,19 @@
 
 """The pressure sensor is slower than the others: tau dy/dt = p - y."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import advance_sampled, pack_sampled, READING, SAMPLED
 from pam_sim.parameters import Parameter
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'reading': numbers.pressure_pa, 'true': numbers.pressure_pa}
 
 
@@ -51,12 +56,12 @@ EFFECT = Effect(
 
 
 @compiled
-def sensor_commit(pressure_pa, state, par):
+def sensor_commit(pressure_pa: float, state: np.record, par: np.record) -> None:
     """Advance the lagged reading by one step."""
     advance_sampled(pressure_pa, state, par)
 
 
 @compiled
-def sensor(contraction_m, force_n, state):
+def sensor(contraction_m: float, force_n: float, state: np.record) -> tuple[float, float, float]:
     """Return the readings with the lag."""
     return state.reading, contraction_m, force_n

@@ -18,8 +18,13 @@ A spring that stiffens, F = k x (1 + x / x_h), as the effects of this kind share
 The first term of any hardening law; ``stiffness_n_per_m`` is the first parameter of an effect.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Reported
+from pam_sim.effects.effect import Numbers, Reported
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -35,14 +40,14 @@ SECANT_REPORTED = (Reported(
 PROGRESSIVE = record('stiffness_n_per_m', 'inverse_hardening_per_m')
 
 
-def pack_progressive(values, numbers):
+def pack_progressive(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     """Return the packed values: stiffness, inverse hardening."""
     return {'stiffness_n_per_m': values['stiffness_n_per_m'],
             'inverse_hardening_per_m': 1.0 / values['hardening_m']}
 
 
 @compiled
-def spring_n(contraction_m, par):
+def spring_n(contraction_m: float, par: np.record) -> float:
     """Return the force of the spring [N] at a contraction."""
     return par.stiffness_n_per_m * contraction_m * (
         1.0 + contraction_m * par.inverse_hardening_per_m)

@@ -28,13 +28,13 @@ _NOT_EFFECTS = ('effect', 'fitting', 'registry')
 _SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive')
 
 
-def effect_files():
+def effect_files() -> list[Path]:
     """Return the source files of all effects and of what they share, sorted by name."""
     return plugin_files(_OWN_FOLDER, 'PAM_EFFECTS_PATH', _NOT_EFFECTS)
 
 
 @lru_cache(maxsize=None)
-def effects():
+def effects() -> dict[str, Effect]:
     """
     Return all effects in kernel order: name -> Effect with its hooks.
 
@@ -44,7 +44,7 @@ def effects():
         A file without ``EFFECT``, a name defined twice, or a hook that names what it has not.
 
     """
-    found = {}
+    found: dict[str, Effect] = {}
     for path in effect_files():
         if path.parent == _OWN_FOLDER and path.stem in _SHARED:
             continue
@@ -63,7 +63,7 @@ def effects():
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
 
 
-def get_effect(name, where=''):
+def get_effect(name: str, where: str = '') -> Effect:
     """
     Return an effect by name.
 

@@ -21,10 +21,14 @@ it is dry friction, but at rest nothing holds and the muscle creeps until the fo
 2 mm/s.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, loop_level_n, pack_level)
@@ -32,7 +36,7 @@ from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**pack_level(values, numbers), 'inverse_speed_s_per_m': 1.0 / values['speed_m_per_s']}
 
 
@@ -61,7 +65,8 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, pressure_pa, velocity_m_per_s, par):
+def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float,
+                 par: np.record) -> float:
     """Return the force less that of the contact."""
     return force_n - loop_level_n(pressure_pa, par) * math.tanh(
         velocity_m_per_s * par.inverse_speed_s_per_m)

@@ -21,8 +21,13 @@ The compressor starts when p_s has fallen to the nominal supply less the band
 and stops at the nominal supply. Isothermal; at the start the reservoir is full.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
@@ -32,7 +37,7 @@ from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 _SMALLEST_M3 = 1e-6         # below, one step would empty it
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     volume, full = values['reservoir_volume_m3'], numbers.parameters['supply_pa']
     if volume < _SMALLEST_M3:
         raise InputError(f'`reservoir_volume_m3` is {volume:g}; allowed 0 (no reservoir) or at '
@@ -42,7 +47,7 @@ def _pack(values, numbers):
             'low_pa': full - values['band_pa'], 'high_pa': full}
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'pressure_pa': numbers.parameters['supply_pa']}
 
 
@@ -79,13 +84,13 @@ EFFECT = Effect(
 
 
 @compiled
-def supply(state):
+def supply(state: np.record) -> float:
     """Return the pressure of the reservoir at the middle of the step, by the last change."""
     return state.pressure_pa + 0.5 * state.change_pa
 
 
 @compiled
-def commit(elapsed_s, state, par, plant):
+def commit(elapsed_s: float, state: np.record, par: np.record, plant: np.record) -> None:
     """Take what the fill valve let through out of the reservoir."""
     used = plant.filled_kg - state.filled_kg
     given = par.compressor_flow_kg_per_s * elapsed_s if state.compressor_runs != 0.0 else 0.0

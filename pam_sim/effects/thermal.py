@@ -24,10 +24,14 @@ The vent flow grows with sqrt(T_0 / T) (ISO 6358). A time constant of zero is
 the isothermal rig, a very long one the adiabatic one.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -39,13 +43,13 @@ CV = GAS_CONSTANT_AIR / (GAMMA - 1.0)
 _SMALL_LOSS = 0.02
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     # hA / cv and R T_0.
     return {'conductance_kg_per_s': REFERENCE_MASS_KG / values['heat_exchange_time_s'],
             'ambient_rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K}
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     ambient = GAS_CONSTANT_AIR * TEMPERATURE_K
     return {'rt_j_per_kg': ambient, 'stage_rt_j_per_kg': ambient}
 
@@ -82,8 +86,8 @@ EFFECT = Effect(
 
 
 @compiled
-def air_rt(mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa, volume_m3, elapsed_s, state,
-           par):
+def air_rt(mass_kg: float, inflow_kg_per_s: float, outflow_kg_per_s: float, pressure_pa: float,
+           volume_m3: float, elapsed_s: float, state: np.record, par: np.record) -> float:
     """Return R T of the air ``elapsed_s`` into the step."""
     before = state.rt_j_per_kg
     start_m3 = mass_kg * before / pressure_pa
@@ -107,7 +111,8 @@ def air_rt(mass_kg, inflow_kg_per_s, outflow_kg_per_s, pressure_pa, volume_m3, e
 
 
 @compiled
-def valve_flow(fill_kg_per_s, vent_kg_per_s, state, par):
+def valve_flow(fill_kg_per_s: float, vent_kg_per_s: float, state: np.record,
+               par: np.record) -> tuple[float, float]:
     """Return the vent flow of air at its temperature."""
     if vent_kg_per_s > 0.0:
         return fill_kg_per_s, vent_kg_per_s * math.sqrt(
@@ -116,6 +121,6 @@ def valve_flow(fill_kg_per_s, vent_kg_per_s, state, par):
 
 
 @compiled
-def commit(state):
+def commit(state: np.record) -> None:
     """Keep the temperature of the end of the step."""
     state.rt_j_per_kg = state.stage_rt_j_per_kg

@@ -21,10 +21,14 @@ The heat of friction is proportional to the distance travelled per time; w is 1
 in the steady state of 20 mm/s. Cold at the start.
 """
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
@@ -32,7 +36,7 @@ from pam_sim.records import record
 _REFERENCE_M_PER_S = 0.020
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'gain_loss_at_20mm_per_s': values['gain_loss_at_20mm_per_s'],
             'decay': math.exp(-numbers.substep_s / values['time_constant_s']),
             'substep_s': numbers.substep_s}
@@ -65,13 +69,13 @@ EFFECT = Effect(
 
 
 @compiled
-def map_output(tension_n, state, par):
+def map_output(tension_n: float, state: np.record, par: np.record) -> float:
     """Return the tension with the gain lost by warmth, never below zero."""
     return tension_n * max(1.0 - par.gain_loss_at_20mm_per_s * state.warmth, 0.0)
 
 
 @compiled
-def commit(dx_m, state, par):
+def commit(dx_m: float, state: np.record, par: np.record) -> None:
     """Advance the warmth, exact for the mean speed of the step."""
     drive = abs(dx_m) / (par.substep_s * _REFERENCE_M_PER_S)
     state.warmth = drive + (state.warmth - drive) * par.decay

@@ -14,6 +14,7 @@
 
 """Pressure needed before the bladder touches the braid: F(p - p_th, eps)."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -39,6 +40,6 @@ EFFECT = Effect(
 
 
 @compiled
-def map_input(gauge_pa, strain, par):
+def map_input(gauge_pa: float, strain: float, par: np.record) -> tuple[float, float]:
     """Return the pressure less the threshold."""
     return gauge_pa - par.pressure_pa, strain

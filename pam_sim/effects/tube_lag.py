@@ -21,8 +21,13 @@ PPR: y is the set point that reaches the regulator. HSV: y is the opening of
 each valve. The mean of y over a physics step is used, exact for a held u.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.parameters import Parameter
@@ -31,7 +36,7 @@ from pam_sim.valve.hsv import clip_duty
 from pam_sim.valve.ppr import set_point_pa
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     if numbers.valve == 'ppr':
         voltage, *_ = numbers.signal
         return {'set_point_pa': set_point_pa(
@@ -65,14 +70,16 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, state, par):
+def set_point(set_point_pa: float, time_constant_s: float, state: np.record,
+              par: np.record) -> tuple[float, float]:
     """Return the lagged set point of the PPR."""
     mean_pa, state.set_point_pa = mean_of_held(set_point_pa, state.set_point_pa, par)
     return mean_pa, time_constant_s
 
 
 @compiled
-def flow_opening(fill, vent, state, par):
+def flow_opening(fill: float, vent: float, state: np.record,
+                 par: np.record) -> tuple[float, float]:
     """Return the lagged openings of the HSV pair."""
     mean_fill, state.fill_opening = mean_of_held(fill, state.fill_opening, par)
     mean_vent, state.vent_opening = mean_of_held(vent, state.vent_opening, par)

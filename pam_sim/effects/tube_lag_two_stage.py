@@ -20,8 +20,13 @@ Line and pilot stage in series: two first order lags, stated as their sum.
 PPR: y is the set point that reaches the regulator. HSV: y is the opening of each valve.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
+from pam_sim.effects.effect import Effect, Numbers
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.effects.tube_lag import EFFECT as _SIBLING
@@ -29,20 +34,21 @@ from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
 _SHORTEST_S = 1e-9             # of a stage that is not there
+_NAMES = () if _SIBLING.states is None else _SIBLING.states.names or ()
 _STAGES = 'first', 'second'
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     at_rest = _SIBLING.initial(values, numbers)
     return {f'{stage}_{name}': value for stage in _STAGES for name, value in at_rest.items()}
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     whole_s, second = values['time_constant_s'], values['second_stage_share']
-    packed = {}
+    packed: dict[str, Any] = {}
     for stage, share in zip(_STAGES, (1.0 - second, second)):
         held = pack_held({'time_constant_s': max(share * whole_s, _SHORTEST_S)}, numbers)
-        packed[stage] = [held[name] for name in HELD.names]
+        packed[stage] = [held[name] for name in HELD.names or ()]
     return packed
 
 
@@ -62,7 +68,7 @@ EFFECT = Effect(
     ),
     amplitude=_SIBLING.amplitude,
     reported=_SIBLING.reported,
-    states=record(*(f'{stage}_{name}' for stage in _STAGES for name in _SIBLING.states.names)),
+    states=record(*(f'{stage}_{name}' for stage in _STAGES for name in _NAMES)),
     packed=record(*((stage, HELD) for stage in _STAGES)),
     pack=_pack,
     initial=_initial,
@@ -76,7 +82,8 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, state, par):
+def set_point(set_point_pa: float, time_constant_s: float, state: np.record,
+              par: np.record) -> tuple[float, float]:
     """Return the set point of the PPR behind both stages."""
     mean_pa, state.first_set_point_pa = mean_of_held(
         set_point_pa, state.first_set_point_pa, par.first)
@@ -86,7 +93,8 @@ def set_point(set_point_pa, time_constant_s, state, par):
 
 
 @compiled
-def flow_opening(fill, vent, state, par):
+def flow_opening(fill: float, vent: float, state: np.record,
+                 par: np.record) -> tuple[float, float]:
     """Return the openings of the HSV pair behind both stages."""
     mean_fill, state.first_fill_opening = mean_of_held(fill, state.first_fill_opening, par.first)
     mean_vent, state.first_vent_opening = mean_of_held(vent, state.first_vent_opening, par.first)

@@ -14,10 +14,14 @@
 
 """Pure delay from valve command to pressure: a ring buffer with fractional delay."""
 
+from collections.abc import Mapping
 import math
+from typing import Any
+
+import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
@@ -26,7 +30,7 @@ from pam_sim.records import record
 SLOTS = 1024                # samples remembered of each command
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     steps = values['delay_s'] / numbers.dt_s
     if steps > SLOTS - 2:
         raise InputError(
@@ -40,7 +44,7 @@ def _pack(values, numbers):
             'switching': numbers.fidelity == 'switching'}
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     signal_0, signal_1, *_ = (*numbers.signal, 0.0)
     return {'signal_0': signal_0, 'signal_1': signal_1}      # all of them
 
@@ -69,7 +73,8 @@ EFFECT = Effect(
 
 
 @compiled
-def command(signal_0, signal_1, state, par):
+def command(signal_0: float, signal_1: float, state: np.record,
+            par: np.record) -> tuple[float, float]:
     """Return the command of ``delay_s`` ago; ``position`` is the one written last."""
     position = (int(state.position) + 1) % SLOTS
     state.position = position
@@ -88,6 +93,6 @@ def command(signal_0, signal_1, state, par):
 
 
 @compiled
-def clock_shift(shift_s, par):
+def clock_shift(shift_s: float, par: np.record) -> float:
     """Return how late the PWM clock of the switching valves is."""
     return shift_s + par.delay_s

@@ -20,8 +20,12 @@ exceeds a threshold (overlap of its main valve). HSV: opening and closing times
 swallow short pulses, and a valve not yet shut at the next pulse stays open.
 """
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 
@@ -33,7 +37,7 @@ SWITCHING_FREE = tuple(FreeParameter(name, 1e-3, 0.0, 9e-3, starts=_TRIED_S, val
                        for name in SWITCHING_EDGES)
 
 
-def _active(values, numbers):
+def _active(values: Mapping[str, float], numbers: Numbers) -> bool:
     if numbers.valve == 'ppr':
         return values['half_width_pa'] != 0.0
     return values['open_time_s'] != 0.0 or values['close_time_s'] != 0.0
@@ -72,7 +76,8 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, par):
+def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
+              par: np.record) -> tuple[float, float]:
     """Return the set point less the threshold; the lag towards it stays exact."""
     distance = set_point_pa - pressure_pa
     width = par.half_width_pa
@@ -80,7 +85,7 @@ def set_point(set_point_pa, time_constant_s, pressure_pa, par):
 
 
 @compiled
-def mean_opening(duty, period_s, open_s, close_s):
+def mean_opening(duty: float, period_s: float, open_s: float, close_s: float) -> float:
     """Return the mean opening of one valve driven with a constant duty."""
     pulse = duty * period_s
     if pulse <= 0.0:
@@ -93,13 +98,13 @@ def mean_opening(duty, period_s, open_s, close_s):
 
 
 @compiled
-def opening(fill, vent, period_s, par):
+def opening(fill: float, vent: float, period_s: float, par: np.record) -> tuple[float, float]:
     """Return the mean openings of the averaged pair."""
     return (mean_opening(fill, period_s, par.open_time_s, par.close_time_s),
             mean_opening(vent, period_s, par.open_time_s, par.close_time_s))
 
 
 @compiled
-def switch_times(open_s, close_s, par):
+def switch_times(open_s: float, close_s: float, par: np.record) -> tuple[float, float]:
     """Return the delays of the switching pair."""
     return open_s + par.open_time_s, close_s + par.close_time_s

@@ -26,6 +26,8 @@ pulse that ends before it is whole opens partially and closes sooner.
 
 import math
 
+import numpy as np
+
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -69,7 +71,8 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, par):
+def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
+              par: np.record) -> tuple[float, float]:
     """Return the set point less what the overlap swallows of the distance."""
     distance = set_point_pa - pressure_pa
     width = par.half_width_pa
@@ -79,7 +82,8 @@ def set_point(set_point_pa, time_constant_s, pressure_pa, par):
 
 
 @compiled
-def mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s):
+def mean_opening_with_lift(duty: float, period_s: float, open_s: float, close_s: float,
+                           rise_s: float, fall_s: float) -> float:
     """
     Return the mean opening of one valve driven with a constant duty, its lift on ramps.
 
@@ -101,7 +105,7 @@ def mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s):
 
 
 @compiled
-def opening(fill, vent, period_s, par):
+def opening(fill: float, vent: float, period_s: float, par: np.record) -> tuple[float, float]:
     """Return the mean openings of the averaged pair."""
     open_s, close_s = par.open_time_s, par.close_time_s
     ramp_s = min(par.ramp_s, 2.0 * open_s, 2.0 * close_s)
@@ -110,6 +114,6 @@ def opening(fill, vent, period_s, par):
 
 
 @compiled
-def switch_times(open_s, close_s, par):
+def switch_times(open_s: float, close_s: float, par: np.record) -> tuple[float, float]:
     """Return the delays of the switching pair, which has no partial lift."""
     return open_s + par.open_time_s, close_s + par.close_time_s

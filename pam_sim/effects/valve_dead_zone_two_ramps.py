@@ -19,6 +19,7 @@ The lift rises evenly over t_rise around t_open and falls over t_fall around t_c
 that ends before it is whole opens partially and closes sooner.
 """
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -61,7 +62,7 @@ EFFECT = Effect(
 
 
 @compiled
-def opening(fill, vent, period_s, par):
+def opening(fill: float, vent: float, period_s: float, par: np.record) -> tuple[float, float]:
     """Return the mean openings of the averaged pair."""
     open_s, close_s, rise_s, fall_s = (
         par.open_time_s, par.close_time_s, par.rise_s, par.fall_s)
@@ -70,6 +71,6 @@ def opening(fill, vent, period_s, par):
 
 
 @compiled
-def switch_times(open_s, close_s, par):
+def switch_times(open_s: float, close_s: float, par: np.record) -> tuple[float, float]:
     """Return the delays of the switching pair, which has no partial lift."""
     return open_s + par.open_time_s, close_s + par.close_time_s

@@ -14,15 +14,20 @@
 
 """Play of a regulator: the output follows the command only after the play is used up."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 from pam_sim.valve.ppr import set_point_pa
 
 
-def _initial(values, numbers):
+def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     voltage, *_ = numbers.signal
     return {'set_point_pa': set_point_pa(
         voltage, numbers.parameters['K_m'], numbers.parameters['p_atm'])}
@@ -51,8 +56,10 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, state, par):
+def set_point(set_point_pa: float, time_constant_s: float, state: np.record,
+              par: np.record) -> tuple[float, float]:
     """Return the set point behind the play."""
     width = par.half_width_pa
-    state.set_point_pa = min(max(state.set_point_pa, set_point_pa - width), set_point_pa + width)
-    return state.set_point_pa, time_constant_s
+    played_pa: float = min(max(state.set_point_pa, set_point_pa - width), set_point_pa + width)
+    state.set_point_pa = played_pa
+    return played_pa, time_constant_s

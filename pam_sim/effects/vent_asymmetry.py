@@ -19,14 +19,19 @@ PPR: the time constant is longer by the ratio while the pressure falls towards
 its set point. HSV: the flow through the vent valve is smaller by the ratio.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     ratio = 1.0 + values['ratio_minus_1']
     return {'ratio': ratio, 'inverse_ratio': 1.0 / ratio}
 
@@ -55,7 +60,8 @@ EFFECT = Effect(
 
 
 @compiled
-def set_point(set_point_pa, time_constant_s, pressure_pa, par):
+def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
+              par: np.record) -> tuple[float, float]:
     """Return the time constant longer while venting."""
     if set_point_pa < pressure_pa:
         return set_point_pa, time_constant_s * par.ratio
@@ -63,6 +69,6 @@ def set_point(set_point_pa, time_constant_s, pressure_pa, par):
 
 
 @compiled
-def valve_flow(fill_kg_per_s, vent_kg_per_s, par):
+def valve_flow(fill_kg_per_s: float, vent_kg_per_s: float, par: np.record) -> tuple[float, float]:
     """Return the vent flow smaller."""
     return fill_kg_per_s, vent_kg_per_s * par.inverse_ratio

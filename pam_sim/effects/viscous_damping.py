@@ -14,6 +14,7 @@
 
 """Velocity-dependent force beside the nominal damping: F -> F - c v."""
 
+import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -40,6 +41,6 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, velocity_m_per_s, par):
+def muscle_force(force_n: float, velocity_m_per_s: float, par: np.record) -> float:
     """Return the force less that of the damper."""
     return force_n - par.damping_n_s_per_m * velocity_m_per_s

@@ -19,22 +19,30 @@ Shear thinning as of Cross (1965), J. Colloid Science 20(5), with an exponent of
 linear below the speed v0, ever less above it.
 """
 
+from collections.abc import Mapping
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Reported
+from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.viscous_damping import EFFECT as _SIBLING
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 _AT_M_PER_S = 0.05
 
 
-def _pack(values, numbers):
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'damping_n_s_per_m': values['damping_n_s_per_m'],
             'inverse_speed_s_per_m': 1.0 / values['speed_m_per_s']}
 
 
-def _reported(values, rig):
+def _reported(values: Mapping[str, float], rig: 'Rig') -> float:
     return values['damping_n_s_per_m'] * _AT_M_PER_S / (
         1.0 + _AT_M_PER_S / values['speed_m_per_s'])
 
@@ -65,7 +73,7 @@ EFFECT = Effect(
 
 
 @compiled
-def muscle_force(force_n, velocity_m_per_s, par):
+def muscle_force(force_n: float, velocity_m_per_s: float, par: np.record) -> float:
     """Return the force less that of the damper."""
     return force_n - par.damping_n_s_per_m * velocity_m_per_s / (
         1.0 + abs(velocity_m_per_s) * par.inverse_speed_s_per_m)

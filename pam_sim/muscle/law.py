@@ -14,12 +14,17 @@
 
 """What every muscle law has in common: parameters, named sets, ranges, static inverses."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 import warnings
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.compiled import Compiled
 from pam_sim.errors import InputError
-from pam_sim.parameters import check_parameters
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record
 
 # The chapter's rules of PAM behaviour (section 4.1, after Daerden and Lefeber).
@@ -49,8 +54,8 @@ class Validity:
 
     """
 
-    pressure_gauge_pa: tuple = (0.0, 600e3)
-    strain: tuple = (0.0, 0.25)
+    pressure_gauge_pa: tuple[float, float] = (0.0, 600e3)
+    strain: tuple[float, float] = (0.0, 0.25)
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class ParameterSet:
 
     """
 
-    values: dict = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
     rests_on: str = ''
     validity: Validity = Validity()
 
@@ -118,22 +123,23 @@ class MuscleLaw:
     EQUATION = ''
     FORMULA = ''
     SOURCE = ''
-    PARAMETERS = ()
-    SETS = {'default': ParameterSet()}
-    CLAIMS = ()
+    PARAMETERS: tuple[Parameter, ...] = ()
+    SETS: dict[str, ParameterSet] = {'default': ParameterSet()}
+    CLAIMS: tuple[int, ...] = ()
     # The same formula for the compiled rig, put here by the registry from the law's file.
-    COMPILED = None
-    COMPILED_DAMPER = None
+    COMPILED: Compiled[..., float] | None = None
+    COMPILED_DAMPER: Compiled[..., float] | None = None
     EXTRAPOLATES = True
     PACKED = record()
 
-    def __init_subclass__(cls, **kwargs):
+    def __init_subclass__(cls, **kwargs: Any) -> None:
         """Let the record of a law that states none hold its parameters."""
         super().__init_subclass__(**kwargs)
         if 'PACKED' not in vars(cls):
             cls.PACKED = record(*(parameter.name for parameter in cls.PARAMETERS))
 
-    def __init__(self, values=None, muscle=None, where=''):
+    def __init__(self, values: Mapping[str, float] | None = None, muscle: str | None = None,
+                 where: str = '') -> None:
         muscle = next(iter(self.SETS)) if muscle is None else muscle
         if muscle not in self.SETS:
             raise InputError(f'law `{self.NAME}` has no set `{muscle}`; '
@@ -146,37 +152,41 @@ class MuscleLaw:
             self.PARAMETERS, {**self.SETS[muscle].values, **own}, where=where)
         self._check(where)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         """Raise InputError where the parameters together make no muscle."""
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the formula's value [N], negative where the muscle would push."""
         raise NotImplementedError(f'{type(self).__name__} states no force')
 
-    def pack(self):
+    def pack(self) -> Mapping[str, Any]:
         """Return what the record ``PACKED`` holds, by name."""
         return self.values
 
-    def outside(self, pressure_gauge_pa, strain):
+    def outside(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike) -> BoolArray:
         """Return True where the point is outside the range of the numbers; arrays broadcast."""
         low_p, high_p = self.validity.pressure_gauge_pa
         low_e, high_e = self.validity.strain
-        pressure, strain = np.asarray(pressure_gauge_pa, float), np.asarray(strain, float)
-        return ((pressure < low_p * (1 - 1e-9)) | (pressure > high_p * (1 + 1e-9))
-                | (strain < low_e - 1e-9) | (strain > high_e + 1e-9))
+        pressure, contraction = np.asarray(pressure_gauge_pa, float), np.asarray(strain, float)
+        beyond: BoolArray = (
+            (pressure < low_p * (1 - 1e-9)) | (pressure > high_p * (1 + 1e-9))
+            | (contraction < low_e - 1e-9) | (contraction > high_e + 1e-9))
+        return beyond
 
-    def _judged(self, pressure_gauge_pa, strain, outside):
+    def _judged(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike,
+                outside: str) -> tuple[FloatArray, FloatArray]:
         pressure = np.asarray(pressure_gauge_pa, dtype=float)
-        strain = np.asarray(strain, dtype=float)
+        contraction = np.asarray(strain, dtype=float)
         if outside not in OUTSIDE:
             raise InputError(f'is {outside!r}; allowed: {", ".join(OUTSIDE)}', 'outside')
         if not np.all(np.isfinite(pressure)) or np.any(pressure < 0.0):
             raise InputError('gauge pressure must be finite and not negative',
                              'pressure_gauge_pa')
-        if not np.all((strain >= MIN_STRAIN) & (strain <= MAX_STRAIN)):
+        if not np.all((contraction >= MIN_STRAIN) & (contraction <= MAX_STRAIN)):
             raise InputError(
                 f'contraction must be a number from {MIN_STRAIN} to {MAX_STRAIN}', 'strain')
-        beyond = np.zeros(()) if outside == 'allow' else self.outside(pressure, strain)
+        beyond = np.zeros((), bool) if outside == 'allow' else self.outside(
+            pressure, contraction)
         if np.any(beyond):
             low_p, high_p = self.validity.pressure_gauge_pa
             low_e, high_e = self.validity.strain
@@ -186,13 +196,14 @@ class MuscleLaw:
             if outside == 'refuse':
                 raise InputError(text, 'force_n')
             warnings.warn(text, ExtrapolationWarning, stacklevel=3)
-        return pressure, strain
+        return pressure, contraction
 
-    def formula_n(self, pressure_gauge_pa, strain):
+    def formula_n(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike) -> FloatArray:
         """Return the unclipped value [N] of the formula, for fits; checked, never warned."""
         return self._tension_n(*self._judged(pressure_gauge_pa, strain, 'allow'))
 
-    def force_n(self, pressure_gauge_pa, strain, outside='warn'):
+    def force_n(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike,
+                outside: str = 'warn') -> FloatArray:
         """
         Return the static tension [N], never negative; arrays broadcast.
 
@@ -215,7 +226,7 @@ class MuscleLaw:
         force = self._tension_n(*self._judged(pressure_gauge_pa, strain, outside))
         return np.maximum(0.0, force)[()]
 
-    def max_strain(self, pressure_gauge_pa, load_n=0.0):
+    def max_strain(self, pressure_gauge_pa: ArrayLike, load_n: ArrayLike = 0.0) -> FloatArray:
         """
         Return the contraction at which the tension has fallen to a load; arrays broadcast.
 
@@ -231,7 +242,8 @@ class MuscleLaw:
             low, high = np.where(pulls, middle, low), np.where(pulls, high, middle)
         return np.where(self.formula_n(pressure, 0.0 * low) > load, 0.5 * (low + high), 0.0)[()]
 
-    def holding_pressure_pa(self, force_n, strain, upper_pa=2e6):
+    def holding_pressure_pa(self, force_n: ArrayLike, strain: ArrayLike,
+                            upper_pa: float = 2e6) -> FloatArray:
         """
         Return the gauge pressure [Pa] that gives a tension; arrays broadcast.
 
@@ -248,12 +260,12 @@ class MuscleLaw:
             Largest gauge pressure tried, Pa.
 
         """
-        force, strain = np.broadcast_arrays(
+        force, contraction = np.broadcast_arrays(
             np.asarray(force_n, float), np.asarray(strain, float))
         low, high = np.zeros(force.shape), np.full(force.shape, float(upper_pa))
         for _ in range(52):
             middle = 0.5 * (low + high)
-            short = self.formula_n(middle, strain) < force
+            short = self.formula_n(middle, contraction) < force
             low, high = np.where(short, middle, low), np.where(short, high, middle)
-        found = np.where(self.formula_n(high, strain) < force, np.inf, 0.5 * (low + high))
-        return np.where(self.formula_n(0.0 * low, strain) >= force, 0.0, found)[()]
+        found = np.where(self.formula_n(high, contraction) < force, np.inf, 0.5 * (low + high))
+        return np.where(self.formula_n(0.0 * low, contraction) >= force, 0.0, found)[()]

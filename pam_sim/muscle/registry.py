@@ -16,8 +16,10 @@
 
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-from pam_sim.compiled import named_arguments
+from pam_sim.compiled import Compiled, named_arguments
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
 from pam_sim.plugins import pick, plugin_files, plugin_module
@@ -26,13 +28,13 @@ _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
 
 
-def law_files():
+def law_files() -> list[Path]:
     """Return the source files of all laws, sorted by name."""
     return plugin_files(_OWN_FOLDER, 'PAM_MUSCLE_LAWS_PATH')
 
 
 @lru_cache(maxsize=None)
-def laws():
+def laws() -> dict[str, type[MuscleLaw]]:
     """
     Return all laws: name -> subclass of MuscleLaw, sorted by name.
 
@@ -42,7 +44,7 @@ def laws():
         A file without ``LAW``, a name defined twice, or a formula of other arguments.
 
     """
-    found = {}
+    found: dict[str, type[MuscleLaw]] = {}
     for path in law_files():
         module = plugin_module(path, _OWN_FOLDER, 'pam_sim.muscle.laws', 'pam_muscle_law')
         law = getattr(module, 'LAW', None)
@@ -58,9 +60,10 @@ def laws():
     return found
 
 
-def _formula(module, name, arguments, path):
+def _formula(module: ModuleType, name: str, arguments: tuple[str, ...],
+             path: Path) -> Compiled[..., float] | None:
     """Return a compiled function of a law's file, None where it has none."""
-    function = getattr(module, name, None)
+    function: Compiled[..., float] | None = getattr(module, name, None)
     if function is not None and len(named_arguments(function)) != len(arguments):
         raise InputError(
             f'`{name}` takes {len(named_arguments(function))} arguments; write `def '
@@ -69,7 +72,7 @@ def _formula(module, name, arguments, path):
     return function
 
 
-def get_law(name, where=''):
+def get_law(name: str, where: str = '') -> type[MuscleLaw]:
     """
     Return a law's class by name.
 
@@ -82,9 +85,12 @@ def get_law(name, where=''):
     return pick(laws(), name, 'muscle law', where)
 
 
-def make_law(name, values=None, muscle=None, where=''):
+def make_law(name: str, values: Any = None, muscle: str | None = None,
+             where: str = '') -> MuscleLaw:
     """
     Return a law by name, with a named parameter set and values that differ from it.
+
+    ``values`` is a mapping of parameters; for the law ``lookup`` a ``LookupTable``.
 
     Raises
     ------

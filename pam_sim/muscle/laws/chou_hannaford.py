@@ -20,8 +20,10 @@ Caldwell et al. (1994). Force and volume belong to each other: F = -p dV/dL.
 """
 
 import math
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
@@ -34,20 +36,21 @@ _EFFECTIVE = ('effective diameter, chosen so that the force at rest is the {} of
               'sheet; the bore gives about half; braid angle 28.6 degrees')
 
 
-def shape(values):
+def shape(values: dict[str, float]) -> tuple[float, float, float]:
     """Return (force per pressure [m^2], a, b) of F = p S (a (1 - eps)^2 - b)."""
     angle = values['braid_angle_rad']
     return (0.25 * math.pi * values['diameter_m'] ** 2,
             3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2)
 
 
-def diameter_for(force_n, pressure_gauge_pa, angle_rad=ANGLE_RAD):
+def diameter_for(force_n: float, pressure_gauge_pa: float, angle_rad: float = ANGLE_RAD) -> float:
     """Return the diameter [m] that gives a force at rest at a gauge pressure."""
     _, a, b = shape({'braid_angle_rad': angle_rad, 'diameter_m': 1.0})
     return math.sqrt(force_n / (pressure_gauge_pa * 0.25 * math.pi * (a - b)))
 
 
-def _sized(length_m, force_n, pressure_pa, strain=0.25):
+def _sized(length_m: float, force_n: float, pressure_pa: float,
+           strain: float = 0.25) -> ParameterSet:
     return ParameterSet(
         {'length_m': length_m, 'diameter_m': diameter_for(force_n, pressure_pa),
          'braid_angle_rad': ANGLE_RAD},
@@ -74,13 +77,13 @@ GEOMETRY = (
 
 
 @compiled
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return p S (a (1 - eps)^2 - b) [N], one point."""
     ratio = 1.0 - strain
     return gauge_pa * par.area_m2 * (par.a * ratio * ratio - par.b)
 
 
-def check_angle(values, where):
+def check_angle(values: dict[str, float], where: str) -> None:
     """Raise InputError where the braid angle gives no contraction at all."""
     _, a, b = shape(values)
     if a <= b:
@@ -100,18 +103,18 @@ class ChouHannaford(MuscleLaw):
     CLAIMS = (1, 2, 3, 4)
     PACKED = record(*CYLINDER)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         check_angle(self.values, where)
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         area, a, b = shape(self.values)
         return pressure * area * (a * (1.0 - strain) ** 2 - b)
 
-    def pack(self):
+    def pack(self) -> dict[str, Any]:
         """Return force per pressure [m^2], a and b."""
         return dict(zip(CYLINDER, shape(self.values)))
 
-    def volume_m3(self, pressure_gauge_pa, strain):
+    def volume_m3(self, pressure_gauge_pa: float, strain: FloatArray) -> FloatArray:
         """Return the inner volume [m^3]; the pressure does not change it. Arrays broadcast."""
         pressure, strain = self._judged(pressure_gauge_pa, strain, 'allow')
         angle = self.values['braid_angle_rad']
@@ -120,7 +123,7 @@ class ChouHannaford(MuscleLaw):
         return at_rest * ratio * (1.0 / math.cos(angle) ** 2 - ratio ** 2) \
             / math.tan(angle) ** 2 + 0.0 * pressure
 
-    def strain_limit(self):
+    def strain_limit(self) -> float:
         """Return the contraction of zero force and largest volume, at any pressure."""
         _, a, b = shape(self.values)
         return 1.0 - np.sqrt(b / a)

@@ -21,7 +21,11 @@ pressures p0 + dp/2 and p0 - dp/2 the joint is, linearised about the middle,
 J phi'' + c phi' + k phi = g dp; without friction model, as in the paper.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet
 from pam_sim.muscle.laws.chou_hannaford import CYLINDER, GEOMETRY_SETS, shape, tension_n
@@ -32,7 +36,7 @@ __all__ = ['InouePair', 'tension_n']
 _SOURCE = 'Inoue 1988, Rubbertuators and applications for robots'
 
 
-def _braid(name):
+def _braid(name: str) -> ParameterSet:
     """Return the set whose single muscle equals eq. 4.6 with that set's geometry."""
     base = GEOMETRY_SETS[name]
     area, a, b = shape(base.values)
@@ -68,23 +72,24 @@ class InouePair(MuscleLaw):
     CLAIMS = (2, 3, 4)
     PACKED = record(*CYLINDER)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         value = self.values
         if value['a'] * (1.0 - value['middle_strain']) ** 2 <= value['b']:
             raise InputError('`a` (1 - `middle_strain`)^2 must exceed `b`, or neither muscle '
                              'pulls in the middle', where)
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         value = self.values
         return pressure * value['diameter_m'] ** 2 * (
             value['a'] * (1.0 - strain) ** 2 - value['b'])
 
-    def pack(self):
+    def pack(self) -> dict[str, Any]:
         """Return D^2 [m^2], a and b of the single muscle; its formula is that of eq. 4.6."""
         return {'area_m2': self.values['diameter_m'] ** 2, 'a': self.values['a'],
                 'b': self.values['b']}
 
-    def torque_n_m(self, first_pa, second_pa, angle_rad, outside='warn'):
+    def torque_n_m(self, first_pa: ArrayLike, second_pa: ArrayLike, angle_rad: ArrayLike,
+                   outside: str = 'warn') -> FloatArray:
         """
         Return the torque [N m] of both muscles; arrays broadcast.
 
@@ -105,27 +110,28 @@ class InouePair(MuscleLaw):
             self.force_n(first_pa, middle + turn, outside)
             - self.force_n(second_pa, middle - turn, outside))
 
-    def stiffness_n_m_per_rad(self):
+    def stiffness_n_m_per_rad(self) -> float:
         """Return k [N m/rad]: minus the slope of the torque over the angle, at the middle."""
         value = self.values
         slope = 2.0 * value['diameter_m'] ** 2 * value['a'] * (1.0 - value['middle_strain'])
         return 2.0 * value['pulley_radius_m'] ** 2 / value['length_m'] \
             * value['middle_pressure_pa'] * slope
 
-    def gain_n_m_per_pa(self):
+    def gain_n_m_per_pa(self) -> float:
         """Return g [N m/Pa]: torque per pressure difference at the middle."""
         value = self.values
         return value['pulley_radius_m'] * value['diameter_m'] ** 2 * (
             value['a'] * (1.0 - value['middle_strain']) ** 2 - value['b'])
 
-    def second_order(self):
+    def second_order(self) -> tuple[float, float, float]:
         """Return (rad per Pa at rest, natural frequency [rad/s], damping ratio)."""
         inertia, stiffness = self.values['inertia_kg_m2'], self.stiffness_n_m_per_rad()
         frequency = np.sqrt(stiffness / inertia)
         return (self.gain_n_m_per_pa() / stiffness, frequency,
                 self.values['damping_n_m_s'] / (2.0 * inertia * frequency))
 
-    def acceleration_rad_per_s2(self, difference_pa, angle_rad, velocity_rad_per_s):
+    def acceleration_rad_per_s2(self, difference_pa: ArrayLike, angle_rad: ArrayLike,
+                                velocity_rad_per_s: ArrayLike) -> FloatArray:
         """Return phi'' [rad/s^2] of the linear joint; arrays broadcast."""
         value = self.values
         return (self.gain_n_m_per_pa() * np.asarray(difference_pa, float)

@@ -22,15 +22,22 @@ of the overshoot that would make a muscle lengthen under rising pressure.
 compute one from another law.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 import warnings
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
 from pam_sim.records import part, record, size_of
+
+if TYPE_CHECKING:
+    from scipy.interpolate._rgi import RegularGridInterpolator
 
 STRAIN_POINTS = 41
 SHIPPED = Path(__file__).parent.parent / 'lookup_tables'
@@ -42,7 +49,8 @@ _HEAD_SIZE, _ISOBAR_SIZE = size_of(HEAD), size_of(ISOBAR)
 
 
 @compiled
-def hermite(y0, y1, slope0, slope1, width, share):
+def hermite(y0: float, y1: float, slope0: float, slope1: float, width: float,
+            share: float) -> float:
     """Return the cubic between two points at ``share`` of the way; slopes per unit of width."""
     rest = 1.0 - share
     return (rest * rest * ((1.0 + 2.0 * share) * y0 + share * width * slope0)
@@ -50,7 +58,7 @@ def hermite(y0, y1, slope0, slope1, width, share):
 
 
 @compiled
-def middle_slope(width0, width1, slope0, slope1):
+def middle_slope(width0: float, width1: float, slope0: float, slope1: float) -> float:
     """Return the monotone slope (Fritsch and Carlson 1980) between two intervals."""
     if slope0 * slope1 <= 0.0:
         return 0.0
@@ -60,7 +68,7 @@ def middle_slope(width0, width1, slope0, slope1):
 
 
 @compiled
-def end_slope(width0, width1, slope0, slope1):
+def end_slope(width0: float, width1: float, slope0: float, slope1: float) -> float:
     """Return the slope at the outer end of interval 0, three points, kept monotone."""
     slope = ((2.0 * width0 + width1) * slope0 - width0 * slope1) / (width0 + width1)
     if slope * slope0 <= 0.0:
@@ -71,20 +79,20 @@ def end_slope(width0, width1, slope0, slope1):
 
 
 @compiled
-def row_force(isobar, column, share, width):
+def row_force(isobar: np.record, column: int, share: float, width: float) -> float:
     """Return F [N] of one tabulated pressure within a strain interval."""
     return hermite(isobar.force_n[column], isobar.force_n[column + 1], isobar.slope_n[column],
                    isobar.slope_n[column + 1], width, share)
 
 
 @compiled
-def isobar_of(par, row):
+def isobar_of(par: np.record, row: int) -> np.record:
     """Return the tabulated values of one pressure, an ``ISOBAR``; they stand behind the head."""
     return part(par, _HEAD_SIZE + row * _ISOBAR_SIZE, ISOBAR)
 
 
 @compiled
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """
     Return F(eps, P) [N], one point; PCHIP along contraction, then along pressure.
 
@@ -128,7 +136,7 @@ def tension_n(gauge_pa, strain, par):
     return hermite(y0, y1, slope0, slope1, h, (pressure - low.pressure_pa) / h)
 
 
-def _isobar(strain, load):
+def _isobar(strain: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return (strain ascending, load) of the points on which the muscle moves at one pressure.
 
@@ -178,14 +186,15 @@ class Lookup(MuscleLaw):
     EXTRAPOLATES = False
     PACKED = HEAD
 
-    def __init__(self, table=None, muscle=None, where=''):
+    def __init__(self, table: LookupTable | Path | str | Mapping[str, float] | None = None,
+                 muscle: str | None = None, where: str = '') -> None:
         table = None if table == {} else table
         if muscle is None:
             muscle = 'dmsp_5_300' if table is None else 'table'
         super().__init__(None, muscle, where)
         # Imported when a table is used: it takes longer than all other laws together.
         from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
-        if isinstance(table, dict) or (table is None) == (muscle == 'table'):
+        if isinstance(table, Mapping) or (table is None) == (muscle == 'table'):
             raise InputError('law `lookup` takes no parameters but a table: a LookupTable or '
                              'the path of a CSV file, and no other set with it', where)
         table = SHIPPED / f'{muscle}.csv' if table is None else table
@@ -208,17 +217,17 @@ class Lookup(MuscleLaw):
         strain = np.linspace(0.0, limit, STRAIN_POINTS)
         force = np.array([self._pulls(row, strain) for row in self.table.strain])
         slope = np.array([PchipInterpolator(strain, row).derivative()(strain) for row in force])
-        self.PACKED = record(*HEAD.names, ('isobars', (ISOBAR, pressure.size)))
+        self.PACKED = record(*(HEAD.names or ()), ('isobars', (ISOBAR, pressure.size)))
         self._packed = {
             'pressures': pressure.size, 'points_per_strain': (STRAIN_POINTS - 1) / limit,
             'isobars': np.column_stack([pressure, force, slope])}
         self._force = RegularGridInterpolator((pressure, strain), force, 'pchip')
 
-    def pack(self):
+    def pack(self) -> dict[str, Any]:
         """Return the head, then pressures, forces and their slopes along contraction."""
         return self._packed
 
-    def _pulls(self, strain_of_load, strain):
+    def _pulls(self, strain_of_load: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the force [N] of one tabulated pressure on a grid of contractions."""
         from scipy.interpolate import PchipInterpolator
         eps, pull = _isobar(strain_of_load, self.table.load_n)
@@ -228,20 +237,26 @@ class Lookup(MuscleLaw):
         inside = np.clip(strain, 0.0, eps[-1])
         return np.where(strain > eps[-1], 0.0, PchipInterpolator(eps, pull[first])(inside))
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         low, high = self.validity.pressure_gauge_pa
         return self._at(self._force, np.clip(pressure, low, high),
                         np.clip(strain, 0.0, self.validity.strain[1]))
 
     @staticmethod
-    def _at(surface, first, second):
+    def _at(surface: 'RegularGridInterpolator', first: FloatArray,
+            second: FloatArray) -> FloatArray:
         first, second = np.broadcast_arrays(first, second)
         points = np.stack([first.ravel(), second.ravel()], axis=-1)
         return surface(points).reshape(first.shape)
 
-    def _kept(self, value, low, high, name, outside):
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Return lowest and highest pressure, and load, of the table."""
+        return self.table.pressure_gauge_pa[[0, -1]], self.table.load_n[[0, -1]]
+
+    def _kept(self, values: ArrayLike, low: FloatArray, high: FloatArray,
+              name: str, outside: str) -> FloatArray:
         """Return the values moved into the table; warn or refuse where that moved any."""
-        value = np.asarray(value, dtype=float)
+        value = np.asarray(values, dtype=float)
         if outside not in OUTSIDE:
             raise InputError(f'is {outside!r}; allowed: {", ".join(OUTSIDE)}', 'outside')
         if not np.all(np.isfinite(value)):
@@ -255,25 +270,27 @@ class Lookup(MuscleLaw):
             warnings.warn(text, ExtrapolationWarning, stacklevel=3)
         return np.clip(value, low, high)
 
-    def strain_at(self, pressure_gauge_pa, load_n, outside='warn'):
+    def strain_at(self, pressure_gauge_pa: ArrayLike, load_n: ArrayLike,
+                  outside: str = 'warn') -> FloatArray:
         """Return eps(P, load); arrays broadcast; ``outside`` as in ``force_n``."""
-        table = self.table
-        return self._at(self._strain, *np.broadcast_arrays(
-            self._kept(pressure_gauge_pa, *table.pressure_gauge_pa[[0, -1]],
-                       'pressure_gauge_pa', outside),
-            self._kept(load_n, *table.load_n[[0, -1]], 'load_n', outside)))[()]
+        (low, high), (least, most) = self._ends()
+        return self._at(
+            self._strain, self._kept(pressure_gauge_pa, low, high, 'pressure_gauge_pa', outside),
+            self._kept(load_n, least, most, 'load_n', outside))[()]
 
-    def air_mass_kg(self, pressure_gauge_pa, load_n, outside='warn'):
+    def air_mass_kg(self, pressure_gauge_pa: ArrayLike, load_n: ArrayLike,
+                    outside: str = 'warn') -> FloatArray:
         """Return the air mass [kg] at a gauge pressure [Pa] and load [N]; arrays broadcast."""
-        table = self.table
-        return self._at(self._mass, *np.broadcast_arrays(
-            self._kept(pressure_gauge_pa, *table.pressure_gauge_pa[[0, -1]],
-                       'pressure_gauge_pa', outside),
-            self._kept(load_n, *table.load_n[[0, -1]], 'load_n', outside)))[()]
+        (low, high), (least, most) = self._ends()
+        return self._at(
+            self._mass, self._kept(pressure_gauge_pa, low, high, 'pressure_gauge_pa', outside),
+            self._kept(load_n, least, most, 'load_n', outside))[()]
 
-    def pressure_gauge_pa(self, air_mass_kg, load_n, outside='warn'):
+    def pressure_gauge_pa(self, air_mass_kg: ArrayLike, load_n: ArrayLike,
+                          outside: str = 'warn') -> FloatArray:
         """Return P(air mass, load), gauge [Pa]; arrays broadcast."""
-        load = self._kept(load_n, *self.table.load_n[[0, -1]], 'load_n', outside)
+        _, (least, most) = self._ends()
+        load = self._kept(load_n, least, most, 'load_n', outside)
         low, high = self._lowest(load), self._highest(load)
         mass = self._kept(air_mass_kg, low, high, 'air_mass_kg', outside)
         return self._at(self._pressure, (mass - low) / (high - low), load)[()]

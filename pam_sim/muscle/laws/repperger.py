@@ -22,6 +22,8 @@ in gauge pressure; the spring's slope may change once, and it may stiffen with x
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
@@ -33,12 +35,13 @@ _SOURCE = 'Repperger et al. 1999; Reynolds et al. 2003, doi 10.1114/1.1554921'
 _KPA = 1e-3          # per Pa; the published numbers are per kPa and per mm
 
 
-def _number(name, unit, nominal, lower, upper, text):
+def _number(name: str, unit: str, nominal: float, lower: float, upper: float,
+            text: str) -> Parameter:
     return Parameter(name, unit, nominal, lower, upper, 0.05, text, _SOURCE)
 
 
 @compiled
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return F_ce - K x [N], one point."""
     x = strain * par.length_m
     bend = par.k_pressure_pa
@@ -48,7 +51,8 @@ def tension_n(gauge_pa, strain, par):
 
 
 @compiled
-def damper_force_n(velocity_m_per_s, gauge_pa, strain, par):
+def damper_force_n(velocity_m_per_s: float, gauge_pa: float, strain: float,
+                   par: np.record) -> float:
     """Return B v [N], one point; never pushes the way the muscle moves."""
     if velocity_m_per_s >= 0.0:
         damper = par.b0_n_s_per_m + par.b1_n_s_per_m_pa * gauge_pa
@@ -96,7 +100,7 @@ class Repperger(MuscleLaw):
     }
     CLAIMS = (2, 3, 4)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         low, high = self.validity.pressure_gauge_pa
         pressure = np.array([low, high])
         if np.any(self.damper_n_s_per_m(pressure, 1.0) < 0.0) or np.any(
@@ -111,7 +115,8 @@ class Repperger(MuscleLaw):
             raise InputError('these coefficients let force fall with pressure while the muscle '
                              'pulls; raise `f1_n_per_pa` or lower the slopes of K', where)
 
-    def spring_n_per_m(self, pressure_gauge_pa, contraction_m):
+    def spring_n_per_m(self, pressure_gauge_pa: FloatArray,
+                       contraction_m: ArrayLike) -> FloatArray:
         """Return K [N/m] at a gauge pressure [Pa] and contraction [m]; arrays broadcast."""
         value = self.values
         pressure = np.asarray(pressure_gauge_pa, dtype=float)
@@ -120,7 +125,8 @@ class Repperger(MuscleLaw):
                 + value['k2_n_per_m_pa'] * np.maximum(pressure - bend, 0.0)
                 + value['k_x_n_per_m2'] * np.asarray(contraction_m, dtype=float))
 
-    def damper_n_s_per_m(self, pressure_gauge_pa, velocity_m_per_s):
+    def damper_n_s_per_m(self, pressure_gauge_pa: ArrayLike,
+                         velocity_m_per_s: ArrayLike) -> FloatArray:
         """Return B [N s/m]: one value contracting (v >= 0), another relaxing; arrays broadcast."""
         value, pressure = self.values, np.asarray(pressure_gauge_pa, dtype=float)
         return np.where(
@@ -128,12 +134,13 @@ class Repperger(MuscleLaw):
             value['b0_n_s_per_m'] + value['b1_n_s_per_m_pa'] * pressure,
             value['c0_n_s_per_m'] + value['c1_n_s_per_m_pa'] * pressure)
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         x = strain * self.values['length_m']
         return (self.values['f0_n'] + self.values['f1_n_per_pa'] * pressure
                 - self.spring_n_per_m(pressure, x) * x)
 
-    def moving_force_n(self, pressure_gauge_pa, strain, velocity_m_per_s, outside='warn'):
+    def moving_force_n(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike,
+                       velocity_m_per_s: ArrayLike, outside: str = 'warn') -> FloatArray:
         """
         Return the tension [N] of the moving muscle, never negative; arrays broadcast.
 
@@ -143,14 +150,15 @@ class Repperger(MuscleLaw):
             As ``force_n``, or a velocity that is not finite.
 
         """
-        pressure, strain = self._judged(pressure_gauge_pa, strain, outside)
+        pressure, shortened = self._judged(pressure_gauge_pa, strain, outside)
         velocity = np.asarray(velocity_m_per_s, dtype=float)
         if not np.all(np.isfinite(velocity)):
             raise InputError('must be finite', 'velocity_m_per_s')
-        return np.maximum(0.0, self._tension_n(pressure, strain)
+        return np.maximum(0.0, self._tension_n(pressure, shortened)
                           - self.damper_n_s_per_m(pressure, velocity) * velocity)[()]
 
-    def acceleration_m_per_s2(self, pressure_gauge_pa, contraction_m, velocity_m_per_s, mass_kg):
+    def acceleration_m_per_s2(self, pressure_gauge_pa: ArrayLike, contraction_m: ArrayLike,
+                              velocity_m_per_s: ArrayLike, mass_kg: float) -> FloatArray:
         """Return x'' [m/s^2] of a hanging mass [kg], eq. 4.1; contraction positive, no stops."""
         force = self.moving_force_n(
             pressure_gauge_pa, np.asarray(contraction_m) / self.values['length_m'],

@@ -24,6 +24,8 @@ data sheet.
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import inlined
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
@@ -42,21 +44,21 @@ _SOURCE = 'Sarosi 2012, New approximation algorithm for the force of fluidic mus
 _PUBLISHED = 'published fit as quoted in a public model comparison; original paper not seen'
 
 
-def _si(coefficients, pressure_unit_pa):
+def _si(coefficients: tuple[float, ...], pressure_unit_pa: float) -> dict[str, float]:
     """Return the SI values of coefficients stated for a pressure unit and percent."""
     a1, a2, a3, a4, a5, a6 = coefficients
     return dict(zip(_NAMES, (a1 / pressure_unit_pa, a2, 100.0 * a3,
                              100.0 * a4 / pressure_unit_pa, a5 / pressure_unit_pa, a6)))
 
 
-def _scaled(coefficients, factor):
+def _scaled(coefficients: tuple[float, ...], factor: float) -> dict[str, float]:
     """Return the SI values of a map with every force multiplied."""
     return {name: value if name == 'a3' else factor * value
             for name, value in zip(_NAMES, coefficients)}
 
 
 @inlined
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return the formula's value [N], one point."""
     return ((par.a1_n_per_pa * gauge_pa + par.a2_n) * math.exp(par.a3 * strain)
             + (par.a4_n_per_pa * strain + par.a5_n_per_pa) * gauge_pa + par.a6_n)
@@ -110,7 +112,7 @@ class Sarosi(MuscleLaw):
         Validity((35e3, 600e3), (0.0, 0.25)))
     CLAIMS = (2, 3, 4)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         # The rules hold where force rises with pressure and falls with contraction.
         a1, a2, a3, a4, a5, _ = self.values.values()
         top = self.validity.pressure_gauge_pa[1]
@@ -119,17 +121,18 @@ class Sarosi(MuscleLaw):
                 f'`a1_n_per_pa` and `a2_n` let force rise with contraction below {top:g} Pa; '
                 f'a1 p + a2 must not be negative', where)
         strain = np.linspace(0.0, self.validity.strain[1], 101)
-        pulls = self._tension_n(top, strain) > 0.0
+        pulls = self._tension_n(np.asarray(top), strain) > 0.0
         if np.any((a1 * np.exp(a3 * strain) + a4 * strain + a5)[pulls] <= 0.0):
             raise InputError('these coefficients let force fall with pressure while the muscle '
                              'pulls; raise `a5_n_per_pa` or `a1_n_per_pa`', where)
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         a1, a2, a3, a4, a5, a6 = self.values.values()
         return ((a1 * pressure + a2) * np.exp(a3 * strain)
                 + (a4 * strain + a5) * pressure + a6)
 
-    def pressure_gauge_pa(self, force_n, strain):
+    def pressure_gauge_pa(self, force_n: ArrayLike,
+                          strain: ArrayLike) -> FloatArray:
         """
         Return the gauge pressure [Pa] that gives a force; arrays broadcast.
 
@@ -141,7 +144,8 @@ class Sarosi(MuscleLaw):
         decay = np.exp(a3 * strain)
         return (np.asarray(force_n, float) - a2 * decay - a6) / (a1 * decay + a4 * strain + a5)
 
-    def holding_pressure_pa(self, force_n, strain, upper_pa=2e6):
+    def holding_pressure_pa(self, force_n: ArrayLike, strain: ArrayLike,
+                            upper_pa: float = 2e6) -> FloatArray:
         """Return the gauge pressure [Pa] that holds a tension, 0 or more; see MuscleLaw."""
         pressure = self.pressure_gauge_pa(force_n, strain)
         a1, _, a3, a4, a5, _ = self.values.values()

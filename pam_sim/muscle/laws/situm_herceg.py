@@ -20,13 +20,15 @@ order lag; gain and time constant are the rig's own regulator.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
 
 
-def _chosen(length_m, force_n, pressure_pa, shortest):
+def _chosen(length_m: float, force_n: float, pressure_pa: float, shortest: float) -> ParameterSet:
     return ParameterSet(
         {'length_m': length_m, 'shortest_length_m': shortest * length_m,
          'k_p_n_per_pa_m': force_n / (pressure_pa * (1.0 - shortest) * length_m)},
@@ -36,7 +38,7 @@ def _chosen(length_m, force_n, pressure_pa, shortest):
 
 
 @compiled
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return the formula's value [N], one point."""
     return par.k_p_n_per_pa_m * gauge_pa * (
         par.length_m * (1.0 - strain) - par.shortest_length_m)
@@ -67,23 +69,24 @@ class SitumHerceg(MuscleLaw):
     }
     CLAIMS = (2, 3, 4)
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         if self.values['shortest_length_m'] >= self.values['length_m']:
             raise InputError(
                 f'`shortest_length_m` is {self.values["shortest_length_m"]:g}; it must be below '
                 f'`length_m`, {self.values["length_m"]:g} m', where)
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         length = self.values['length_m'] * (1.0 - strain)
         return self.values['k_p_n_per_pa_m'] * pressure * (
             length - self.values['shortest_length_m'])
 
-    def pressure_rate_pa_per_s(self, signal_v, pressure_gauge_pa):
+    def pressure_rate_pa_per_s(self, signal_v: float, pressure_gauge_pa: float) -> float:
         """Return dp/dt [Pa/s] for a valve signal [V]: (Km u - p) / Tm; arrays broadcast."""
         return (self.values['k_m_pa_per_v'] * np.asarray(signal_v, float)
                 - np.asarray(pressure_gauge_pa, float)) / self.values['t_m_s']
 
-    def pressure_after_step_pa(self, time_s, signal_v, initial_pa=0.0):
+    def pressure_after_step_pa(self, time_s: ArrayLike, signal_v: ArrayLike,
+                               initial_pa: float = 0.0) -> FloatArray:
         """Return the gauge pressure [Pa] a time after a step of the signal [V], exactly."""
         final = self.values['k_m_pa_per_v'] * np.asarray(signal_v, float)
         return final + (initial_pa - final) * np.exp(

@@ -23,8 +23,10 @@ Lopez use k >= 1, which is what shortens the stroke. Both fit the bounds.
 """
 
 import math
+from typing import Any
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.muscle.laws.chou_hannaford import (
@@ -36,7 +38,7 @@ _CONSTANT = {'k0': 1.25, 'k_rise': 0.0, 'k_pressure_pa': 235e3}
 
 
 @compiled
-def tension_n(gauge_pa, strain, par):
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return the formula's value [N], one point."""
     factor = par.k0 + par.k_rise * math.exp(-gauge_pa * par.inverse_k_pressure_per_pa)
     left = max(0.0, 1.0 - factor * strain)
@@ -73,28 +75,28 @@ class TonduLopez(MuscleLaw):
     CLAIMS = (1, 2, 3, 4)
     PACKED = record(*CYLINDER, 'k0', 'k_rise', 'inverse_k_pressure_per_pa')
 
-    def _check(self, where):
+    def _check(self, where: str) -> None:
         check_angle(self.values, where)
 
-    def k(self, pressure_gauge_pa):
+    def k(self, pressure_gauge_pa: FloatArray) -> FloatArray:
         """Return the factor on the contraction at a gauge pressure [Pa]; arrays pass through."""
         return self.values['k0'] + self.values['k_rise'] * np.exp(
             -np.asarray(pressure_gauge_pa, float) / self.values['k_pressure_pa'])
 
-    def _tension_n(self, pressure, strain):
+    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         area, a, b = shape(self.values)
         # Beyond k eps = 1 the square would rise again; there the muscle has long stopped pulling.
         left = np.maximum(0.0, 1.0 - self.k(pressure) * strain)
         return pressure * area * (a * left ** 2 - b)
 
-    def pack(self):
+    def pack(self) -> dict[str, Any]:
         """Return force per pressure [m^2], a, b, k0, k_rise and 1 / k_pressure [1/Pa]."""
         value = self.values
         return {**dict(zip(CYLINDER, shape(value))), 'k0': value['k0'],
                 'k_rise': value['k_rise'],
                 'inverse_k_pressure_per_pa': 1.0 / value['k_pressure_pa']}
 
-    def volume_m3(self, pressure_gauge_pa, strain):
+    def volume_m3(self, pressure_gauge_pa: float, strain: FloatArray) -> FloatArray:
         """
         Return the volume [m^3] whose virtual work is the force; arrays broadcast.
 
