@@ -110,3 +110,14 @@ def test_the_key_tells_of_files_and_constants():
     assert {'hsv_kernel.py', 'flow.py'} <= {file.name for file in files}
     assert 'GAS_CONSTANT_AIR = 287.0' in ''.join(constants)
     assert source_key(hsv_step) == source_key(hsv_step)
+
+
+def test_the_steps_of_rig_and_joint_follow_effects_laws_and_records():
+    from pam_sim.joint.kernel import joint_step
+    from pam_sim.rollout.kernel import step
+    for entry in (step, joint_step):
+        files, constants = sources(entry)
+        names = {file.name for file in files}
+        assert {'creep.py', 'lag.py', 'sarosi.py', 'step.py', 'records.py'} <= names
+        assert any(name.startswith('pam_hooks_') for name in names)
+        assert {'STATE', 'PARAMETERS', 'PACKED'} <= {one.split(' = ')[0] for one in constants}
