@@ -25,7 +25,8 @@ EXAMPLE = 'pam report runs/first --out first.html'
 def add_arguments(parser):
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, nargs='+', help='bag directories or .mcap files')
-    parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
+    parser.add_argument(
+        '--namespace', default=None, help='namespace of the muscle or joint in the bags')
     parser.add_argument('--out', type=out_path, default=None, metavar='FILE',
                         help='page to write (default: report.html beside the first bag, made '
                         'again if it is the page of the same bags, else report_BAG.html)')
@@ -36,15 +37,17 @@ def add_arguments(parser):
 def run(args):
     """Load the bags and write the page."""
     from pam_actuation.bags.ending import early_sentences
-    from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.load_joint import load_recording, MEASURED
+    from pam_actuation.report.joint_page import joint_report
     from pam_actuation.report.origin import default_page, origin
     from pam_actuation.report.pages import bag_report
     out = args.out or default_page(args.bag, args.overwrite)
     if args.out:
         check_outputs(args, args.out)
-    runs = [load_run(bag, namespace=args.namespace, recover=args.recover) for bag in args.bag]
+    runs = [load_recording(bag, args.namespace, args.recover) for bag in args.bag]
     note_implausible(args, runs)
-    summary = bag_report(runs, out, of=origin(args.bag, out))
+    write = joint_report if any(MEASURED in run for run in runs) else bag_report
+    summary = write(runs, out, of=origin(args.bag, out))
     early = early_sentences(runs)
     emit(args, {'report': out, 'remarks': early, **summary},
          '\n'.join([*(f'remark: {text}' for text in early), f'report: {out}']))

@@ -96,16 +96,16 @@ def tracking_error(run):
     only the stretch in which both exist is used. Time counts from the first
     reference message, which is when the experiment starts.
     """
-    return _difference(signals.series(run, 'reference', 'contraction_m'),
-                       signals.series(run, 'contraction'))
+    return difference(signals.series(run, 'reference', 'contraction_m'),
+                      signals.series(run, 'contraction'))
 
 
 def force_error(run):
     """Return (time_s, error_n) with error = wanted - measured force, or None."""
-    return _difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
+    return difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
 
 
-def _difference(reference, measured):
+def difference(reference, measured):
     """Return (time_s, reference - measured) where both exist, or None."""
     if reference is None or measured is None or len(reference[0]) < 2:
         return None

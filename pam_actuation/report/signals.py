@@ -27,7 +27,7 @@ def stamps_s(run, topic):
 
 def start_ns(run):
     """Return the first reference stamp, else the first stamp of the valve or any topic."""
-    for topic in ('reference', 'pressure_command', 'valve_signal'):
+    for topic in ('reference', 'joint_reference', 'pressure_command', 'valve_signal'):
         series_ = run.topics.get(topic)
         if series_ is not None and len(series_.stamp_ns):
             return int(series_.stamp_ns[0])

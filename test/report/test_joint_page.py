@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page of a joint: its figures of merit, its plots, and what it refuses."""
+
+import json
+import re
+
+import numpy as np
+from pam_actuation.bags.load_joint import load_recording
+from pam_actuation.cli.main import main
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.report.joint_page import angle_error, joint_metrics, joint_report
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+import pytest
+from tracking_runs import tracking_run
+
+EXPERIMENT = """
+name: two_turns
+domain: joint_angle
+segments:
+  - ramp: {to_rad: 0.1, duration_s: 0.5}
+  - sine: {center_rad: 0.1, amplitude_rad: 0.2, frequency_hz: 1.0, cycles: 2}
+"""
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='hsv')
+    place = tmp_path_factory.mktemp('joint') / 'two_turns'
+    simulate_experiment(load_experiment(EXPERIMENT), joint,
+                        load_controller('sofc_joint_hsv', joint), place)
+    return place
+
+
+def test_merits_are_those_of_the_angle(bag):
+    run = load_recording(bag)
+    found, (time_s, error) = joint_metrics(run), angle_error(run)
+    assert found.rmse_rad == pytest.approx(np.sqrt(np.mean(error ** 2)))
+    assert found.max_error_rad == pytest.approx(np.abs(error).max())
+    wanted = [np.sqrt(np.mean(error[(time_s >= 0.5 + k) & (time_s < 1.5 + k)] ** 2))
+              for k in range(2)]
+    assert found.cycle_rmse_rad == pytest.approx(wanted)
+    assert 100e3 < found.co_contraction_pa < 310e3 and found.interruptions == (0, 0.0)
+    assert {one.topic for one in found.timing} >= {'joint_state', 'flexor/valve_signal'}
+
+
+def test_the_page_shows_angle_and_both_muscles(bag, tmp_path, capsys):
+    out = tmp_path / 'page.html'
+    assert main(['report', str(bag), '--out', str(out), '--json']) == 0
+    assert len(json.loads(capsys.readouterr().out)['two_turns']['cycle_rmse_rad']) == 2
+    content = out.read_text(encoding='utf-8')
+    assert 'Experiment two_turns' in content and 'Mean pressure of both muscles' in content
+    figure = json.loads(re.search(
+        r'<script type="application/json">(.*?)</script>', content, re.S)[1])
+    names = [trace['name'] for trace in figure['data']]
+    assert names[:3] == ['angle', 'reference', 'reference − angle']
+    assert {'flexor', 'extensor', 'flexor command', 'extensor command',
+            'extensor vent_duty'} <= set(names)
+
+
+def test_a_muscle_is_not_shown_on_the_page_of_a_joint(bag, tmp_path):
+    with pytest.raises(InputError, match='no recording of a joint'):
+        joint_report([load_recording(bag), tracking_run(np.full(2, 1e-3))], tmp_path / 'page.html')
+    assert main(['report', str(bag), '--namespace', '/knee/flexor',
+                 '--out', str(tmp_path / 'flexor.html')]) == 0
