@@ -130,7 +130,7 @@ def _fields(topic: Topic) -> list[str]:
 def _rules(topic: Topic) -> list[str]:
     held = ('The value is held until the next message' if topic.held
             else 'Between messages the value is interpolated')
-    missing = {'told': 'reported by every command that reads a bag',
+    missing = {'told': 'reported by every verb that reads a bag',
                'kept': 'ignored; the last value is held',
                'allowed': 'allowed'}[topic.missing]
     return [f'- {held} (`run.on_grid`).',
