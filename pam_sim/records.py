@@ -230,7 +230,6 @@ def _memory_from(seen: Any) -> FloatArray:
     return memory
 
 
-@type_callable(part)
 def _type_part(context: Any) -> Any:
     def typed(whole: Any, place: Any, dtype: Any) -> Any:
         if (isinstance(whole, (numba_types.Array, numba_types.Record))
@@ -241,15 +240,18 @@ def _type_part(context: Any) -> Any:
     return typed
 
 
-@lower_builtin(part, numba_types.Array, numba_types.Integer, numba_types.DType)
 def _part_of_array(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
     return _address(context, builder, signature, data, arguments[1])
 
 
-@lower_builtin(part, numba_types.Record, numba_types.Integer, numba_types.DType)
 def _part_of_record(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return _address(context, builder, signature, arguments[0], arguments[1])
+
+
+type_callable(part)(_type_part)
+lower_builtin(part, numba_types.Array, numba_types.Integer, numba_types.DType)(_part_of_array)
+lower_builtin(part, numba_types.Record, numba_types.Integer, numba_types.DType)(_part_of_record)
 
 
 def _address(context: Any, builder: Any, signature: Any, begin: Any, place: Any) -> Any:

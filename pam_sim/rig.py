@@ -346,7 +346,7 @@ class Rig:
             'initial_pressure_pa': initial_pressure_pa,
             'initial_contraction_m': initial_contraction_m, 'initial_signal': initial_signal})
 
-    def plant(self, seed: int = 0, dt_s: float = 0.001, **initial: float) -> 'Plant':
+    def plant(self, seed: int = 0, dt_s: float = 0.001, **initial: Any) -> 'Plant':
         """Return a live :class:`pam_sim.plant.Plant` of this rig."""
         from pam_sim.plant import Plant
         return Plant(self, seed, dt_s, **initial)

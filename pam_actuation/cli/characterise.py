@@ -14,16 +14,25 @@
 
 """``pam characterise``: lookup surfaces from recordings or tables of static points."""
 
+import argparse
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, add_seed_option, emit, EXIT_DONE,
     note_implausible, progress)
-from pam_actuation.cli.options import count, number, out_path, source
+from pam_actuation.cli.options import count, number, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_sim.characterise.characterise import Characterisation
+    from pam_sim.characterise.dimensions import Dimensions
+    from pam_sim.rig import Rig
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
 EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('source', type=source, nargs='*', metavar='BAG|CSV',
                         help='bags, one fixed load each, or one table measured by others')
@@ -58,7 +67,7 @@ def add_arguments(parser):
     add_recover_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Characterise and say what was written."""
     from pam_actuation import __version__
     from pam_actuation.report.characterise import FILES, save_characterisation, summary
@@ -80,7 +89,7 @@ def run(args):
     return EXIT_DONE
 
 
-def _simulated(args):
+def _simulated(args: argparse.Namespace) -> 'tuple[Rig, list[str]]':
     """Return (rig, bags) after simulating the series of loads."""
     from pathlib import Path
     from pam_actuation.experiments.load_series import LOADS_N, simulate_loads, with_sensor_noise
@@ -97,7 +106,7 @@ def _simulated(args):
     return rig, bags
 
 
-def _characterised(args, sources):
+def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characterisation':
     """Return the Characterisation of bags or of one table."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
@@ -121,11 +130,12 @@ def _characterised(args, sources):
         return result
     if len(sources) > 1:
         raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
-    return characterise_table(read_measured_table(tables[0]), _dimensions(args, []),
-                              args.load_step_n)
+    dimensions = _dimensions(args, [])
+    assert dimensions is not None       # without runs they are given, or missing
+    return characterise_table(read_measured_table(tables[0]), dimensions, args.load_step_n)
 
 
-def _dimensions(args, runs):
+def _dimensions(args: argparse.Namespace, runs: 'list[RecordedRun]') -> 'Dimensions | None':
     """Return the Dimensions that the options give, None where the bags shall say them."""
     from dataclasses import replace
     from pam_sim import load_rig
@@ -144,7 +154,7 @@ def _dimensions(args, runs):
     return Dimensions(**given)
 
 
-def _text(found):
+def _text(found: dict[str, Any]) -> str:
     """Return the summary for people."""
     low, high = found['pressure_range_kpa']
     lines = [

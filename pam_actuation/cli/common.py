@@ -14,16 +14,25 @@
 
 """What all verbs share: exit codes, output for people or programs, progress."""
 
+import argparse
 import json
 import os
 import sys
+from types import SimpleNamespace
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.options import (  # noqa: F401, the codes are for the verbs
-    count, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, HIGHEST_SEED, source)
+    count, EXIT_BAD_INPUT as EXIT_BAD_INPUT, EXIT_DONE as EXIT_DONE,
+    EXIT_FINDING as EXIT_FINDING, HIGHEST_SEED, Parser, source)
 from tqdm import tqdm
 
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
 
-def emit(args, payload, text):
+
+def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
     """
     Print the result of a verb.
 
@@ -45,7 +54,8 @@ def emit(args, payload, text):
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
 
 
-def note_implausible(args, runs, must_be_right=False):
+def note_implausible(args: argparse.Namespace, runs: 'list[RecordedRun]',
+                     must_be_right: bool = False) -> None:
     """
     Note what cannot be right in loaded bags: ``emit`` says it, and the verb ends with 1.
 
@@ -73,7 +83,8 @@ def note_implausible(args, runs, must_be_right=False):
         args.implausible = [*getattr(args, 'implausible', []), *found]
 
 
-def progress(args, total, unit='', description=''):
+def progress(args: argparse.Namespace, total: float, unit: str = '',
+             description: str = '') -> tqdm:
     """
     Return a tqdm bar on stderr; silent with ``--json`` or when stderr is no terminal.
 
@@ -85,7 +96,7 @@ def progress(args, total, unit='', description=''):
         bar_format='{desc}: {percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}')
 
 
-def add_rig_options(parser):
+def add_rig_options(parser: Parser) -> None:
     """Add the options that choose the rig, as used by several verbs."""
     parser.add_argument(
         '--rig', type=source, default='dmsp_5_300_realistic', metavar='NAME|FILE',
@@ -96,8 +107,9 @@ def add_rig_options(parser):
 
 
 def add_controller_options(
-        parser, default='sofc_ppr or sofc_hsv, after the valve; sofc_force_… for an experiment '
-        'in force'):
+        parser: Parser,
+        default: str = 'sofc_ppr or sofc_hsv, after the valve; sofc_force_… for an experiment '
+                       'in force') -> None:
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
         '--controller', type=source, default=None, metavar='NAME|FILE',
@@ -109,14 +121,14 @@ def add_controller_options(
     add_other_rig_option(parser)
 
 
-def add_other_rig_option(parser):
+def add_other_rig_option(parser: Parser) -> None:
     """Add the option that lets a controller run on a rig it was not made for."""
     parser.add_argument(
         '--accept-other-rig', action='store_true',
         help='take a controller that was made for another rig; the bag says so')
 
 
-def add_experiment_options(parser):
+def add_experiment_options(parser: Parser) -> None:
     """Add what ``run`` and ``simulate`` both need: experiment, rig, controller, seed."""
     parser.add_argument('experiment', type=source, help='experiment name or YAML file')
     add_rig_options(parser)
@@ -125,7 +137,7 @@ def add_experiment_options(parser):
     add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
 
 
-def load_setup(args):
+def load_setup(args: argparse.Namespace) -> 'tuple[Experiment, Rig, Any]':
     """
     Return (experiment, rig, controller) that the options name.
 
@@ -158,7 +170,9 @@ def load_setup(args):
     return experiment, rig, controller
 
 
-def tell_remarks(args, experiment, valve, rig=None, controller=None):
+def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experiment', valve: str,
+                 rig: 'Rig | None' = None,
+                 controller: Any = None) -> list[str]:
     """Return what a person should read before an experiment runs; say it on stderr."""
     remarks = list(experiment.remarks(valve, rig, controller))
     if not args.json:
@@ -167,23 +181,23 @@ def tell_remarks(args, experiment, valve, rig=None, controller=None):
     return remarks
 
 
-def default_controller(args, valve):
+def default_controller(args: argparse.Namespace, valve: str) -> Any:
     """Return the controller the options name, or the preset that fits the valve."""
     return args.controller or f'sofc_{valve}'
 
 
-def add_seed_option(parser, text):
+def add_seed_option(parser: Parser, text: str) -> None:
     """Add the option of the seed, said to be that of ``text``."""
     parser.add_argument(
         '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
 
 
-def add_overwrite_option(parser, what='files that are there already'):
+def add_overwrite_option(parser: Parser, what: str = 'files that are there already') -> None:
     """Add the option without which no verb replaces ``what``."""
     parser.add_argument('--overwrite', action='store_true', help=f'replace {what}')
 
 
-def check_outputs(args, *paths):
+def check_outputs(args: argparse.Namespace, *paths: str | None) -> None:
     """
     Look whether the files that the options name can be written, before the work starts.
 
@@ -209,7 +223,7 @@ def check_outputs(args, *paths):
             raise InputError('two results cannot go into one file', path)
 
 
-def add_recover_option(parser):
+def add_recover_option(parser: Parser) -> None:
     """Add the option that reads what a broken-off recording still holds."""
     parser.add_argument(
         '--recover', action='store_true',

@@ -18,18 +18,24 @@ Completion of the command line in a shell: verbs, options, and names of what the
 argcomplete starts ``pam`` at every press of the tab key, so nothing here imports the simulator.
 """
 
+import argparse
+from collections.abc import Callable
 import os
+from typing import Any, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pam_actuation.cli.options import Parser
 
 RIG, JOINT, MUSCLE = 'presets', 'joint/presets', 'muscle/sizes'      # folders of pam_sim
 ASKED = '_ARGCOMPLETE'      # in the environment while a shell asks
 
 
-def asked():
+def asked() -> bool:
     """Tell whether it is a shell that starts this process, to complete a command line."""
     return ASKED in os.environ
 
 
-def complete(parser):
+def complete(parser: 'Parser') -> None:
     """Answer the shell and end the process if it is a shell that asks; else do nothing."""
     if not asked():
         return
@@ -38,22 +44,25 @@ def complete(parser):
     argcomplete.autocomplete(parser)
 
 
-def _add_names(parser):
+def _add_names(parser: argparse.ArgumentParser) -> None:
     """Give every argument of every verb that takes a name the names there are."""
     for verb, sub in verbs_of(parser).items():
         for action in sub._actions:
             names = _names_for(verb, action.dest)
             if names is not None:
-                action.completer = _with_files(names)
+                setattr(action, 'completer', _with_files(names))  # noqa: B010, of argcomplete
 
 
-def verbs_of(parser):
+Names = Callable[[], list[str]]
+
+
+def verbs_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     """Return name to parser of all verbs."""
     return next(action.choices for action in parser._actions
                 if isinstance(action.choices, dict))
 
 
-def _names_for(verb, argument):
+def _names_for(verb: str, argument: str) -> Names | None:
     """Return the function that lists the names of an argument, None for one without names."""
     if argument == 'valve':
         return lambda: ['ppr', 'hsv']
@@ -74,19 +83,19 @@ def _names_for(verb, argument):
     return None
 
 
-def configured(kind):
+def configured(kind: str) -> list[str]:
     """Return the names in one folder of ``config``."""
     from pam_actuation.resources import list_config
     return list_config(kind)
 
 
-def presets(folder):
+def presets(folder: str) -> list[str]:
     """Return the names of presets in one folder of ``pam_sim``."""
     from pam_sim.named_files import NamedFiles
     return NamedFiles(folder).names()
 
 
-def nodes():
+def nodes() -> list[str]:
     """Return the names of the nodes, each a module with a main function."""
     from pathlib import Path
     folder = Path(__file__).resolve().parent.parent / 'nodes'
@@ -94,9 +103,9 @@ def nodes():
                   if '\ndef main(' in path.read_text(encoding='utf-8'))
 
 
-def _with_files(names):
+def _with_files(names: Names) -> Callable[..., list[str]]:
     """Return what argcomplete asks: names that fit, and files, which may stand for them."""
-    def completer(prefix, **_):
+    def completer(prefix: str, **_: Any) -> list[str]:
         from argcomplete.completers import FilesCompleter
         return [name for name in names() if name.startswith(prefix)] + list(
             FilesCompleter()(prefix))

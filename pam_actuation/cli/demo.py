@@ -14,18 +14,19 @@
 
 """``pam demo``: the real nodes for both valves, then everything a bag is good for."""
 
+import argparse
 import os
 import time
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
-from pam_actuation.cli.options import out_path
+from pam_actuation.cli.options import out_path, Parser
 
 HELP = ('Run the real nodes as separate processes on DDS for both valves: record, replay, tune, '
         'gap between model and recording, one HTML page. Takes about three minutes.')
 EXAMPLE = 'pam demo --out runs/demo'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='folder for bags and page (default: runs/demo-TIME)')
@@ -34,16 +35,16 @@ def add_arguments(parser):
                              'everything works')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Run the demo and print where the bags and the page are."""
     from pam_actuation.cli.common import progress
     from pam_actuation.demo import check_place, Demo
     out = args.out or os.path.join('runs', f'demo-{time.strftime("%Y%m%d-%H%M%S")}')
     check_place(out)
     with progress(args, 100, '%', 'demo') as bar:
-        said = []
+        said: list[str] = []
 
-        def report(share, what):
+        def report(share: float, what: str) -> None:
             bar.update(100 * share - bar.n)
             bar.set_description_str(f'{what:<28}')
             if bar.disable and not args.json and said[-1:] != [what]:

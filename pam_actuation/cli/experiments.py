@@ -14,11 +14,16 @@
 
 """``pam experiments``: the experiments, rigs and controllers that can be named."""
 
+import argparse
 import shutil
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import emit, EXIT_DONE
-from pam_actuation.cli.options import source
+from pam_actuation.cli.options import Parser, source
 from pam_actuation.cli.overview import wrapped
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
 
 HELP = 'List the experiments with length and what they track, and the names of rigs and ' \
     'controllers.'
@@ -29,13 +34,13 @@ TRACKS = {
     'pressure': '- (pressure)', 'ppr_voltage': '- (ppr voltage)', 'hsv_duty': '- (hsv duty)'}
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('name', type=source, nargs='?', default=None, metavar='NAME|FILE',
                         help='show this experiment in full')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """Print one line per experiment, or one experiment in full."""
     from pam_actuation.experiments import load_experiment
     from pam_actuation.resources import list_config
@@ -65,12 +70,12 @@ def run(args):
     return EXIT_DONE
 
 
-def shorten(line, wide):
+def shorten(line: str, wide: int) -> str:
     """Return a line that fits, cut between two words where it is too long."""
     return line if len(line) <= wide else f'{line[:wide - 2].rpartition(" ")[0]} …'
 
 
-def _summary(name, one):
+def _summary(name: str, one: 'Experiment') -> dict[str, Any]:
     """Return what a program may want to know of an experiment, as plain data."""
     return {'name': name, 'description': one.description, 'domain': one.domain,
             'tracks': one.domain if one.asks_for_motion else None,

@@ -14,12 +14,17 @@
 
 """``pam gap``: what a model misses in recordings, added to it and proved."""
 
+import argparse
 import json
 import os
+from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
-from pam_actuation.cli.options import number, out_path, source
+from pam_actuation.cli.options import number, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_sim.gap.result import GapResult
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
@@ -27,7 +32,7 @@ SECONDS = 120.0
 MODEL = 'dmsp_5_300_hanging_mass'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('run', type=source, nargs='*', help='recorded bags')
     parser.add_argument('--model', type=source, default=MODEL, metavar='NAME|FILE',
@@ -60,7 +65,7 @@ def add_arguments(parser):
     add_overwrite_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """Find the gap; exit code 1 where there is one."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.gap import FILES, write_gap
@@ -92,7 +97,7 @@ def run(args):
     return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
 
 
-def _next_lines(result, out):
+def _next_lines(result: 'GapResult', out: str) -> list[str]:
     """Return in words what to measure next and how; nothing where that is not known."""
     if not result.next_experiment:
         return []
@@ -102,7 +107,7 @@ def _next_lines(result, out):
             f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
 
 
-def _plan(args):
+def _plan(args: argparse.Namespace) -> int:
     """Judge protocols before anything is measured; write plan.json and experiment.yaml."""
     from pathlib import Path
 
@@ -132,7 +137,7 @@ def _plan(args):
     return EXIT_DONE
 
 
-def _explain(args):
+def _explain(args: argparse.Namespace) -> int:
     """Say what an effect is, from which size on it shows, and what looks like it."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.experiments.separating import identification_run

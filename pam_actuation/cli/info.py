@@ -14,16 +14,17 @@
 
 """``pam info``: what is in a bag, and whether it can be trusted."""
 
+import argparse
 from pathlib import Path
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
-from pam_actuation.cli.options import source
+from pam_actuation.cli.options import Parser, source
 
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
@@ -32,7 +33,7 @@ def add_arguments(parser):
              'metadata.yaml, so that every tool opens it; a whole bag stays as it is')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Print the facts; exit code 1 where messages were lost or remarks were made."""
     from pam_actuation.bags.info import bag_info, render_text
     recovery = None
@@ -48,5 +49,5 @@ def run(args):
     return EXIT_FINDING if info.has_findings else EXIT_DONE
 
 
-def _is_mcap(path):
+def _is_mcap(path: Path) -> bool:
     return path.suffix == '.mcap' or path.is_dir() and any(path.glob('*.mcap'))

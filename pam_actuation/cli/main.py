@@ -16,14 +16,19 @@
 """Entry point of ``pam``: finds the verbs, parses, runs, turns mistakes into exit code 2."""
 
 import argparse
+from collections.abc import Callable
 import importlib
 import os
 import sys
+from typing import TYPE_CHECKING
 
 from pam_actuation import interrupts
 
+if TYPE_CHECKING:
+    from pam_actuation.cli.options import Parser
 
-def build_parser():
+
+def build_parser() -> 'Parser':
     """Return the argument parser with one sub-parser per verb."""
     from pam_actuation import __version__
     from pam_actuation.cli.options import Parser
@@ -46,7 +51,7 @@ def build_parser():
     return parser
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     """
     Run one verb.
 
@@ -77,7 +82,7 @@ def main(argv=None):
     return code
 
 
-def _run_verb(argv, begin=lambda: None):
+def _run_verb(argv: list[str] | None, begin: Callable[[], object] = lambda: None) -> int:
     """Parse, call ``begin``, run the verb; return the exit code."""
     # Here and not above: an early Ctrl-C finds main() at work, see interrupts.
     from pam_actuation.cli import completion
@@ -96,7 +101,7 @@ def _run_verb(argv, begin=lambda: None):
         completion.complete(parser)
         args = parser.parse_args(argv)
     except SystemExit as ended:     # --help, or an option that is not allowed
-        return ended.code
+        return ended.code if isinstance(ended.code, int) else EXIT_BAD_INPUT
     begin()
     try:
         code = args.call(args)

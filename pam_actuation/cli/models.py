@@ -14,15 +14,18 @@
 
 """``pam models``: the laws, valves, loads, effects, sensors and rigs the simulator knows."""
 
+import argparse
+from typing import Any
+
 from pam_actuation.cli.common import (
     add_overwrite_option, check_outputs, emit, EXIT_DONE)
-from pam_actuation.cli.options import out_path, source
+from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = 'List muscle laws, valves, loads and effects with equations, parameters and sources.'
 EXAMPLE = 'pam models hysteresis'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('name', type=source, nargs='?', default=None,
                         help='show this entry in full')
@@ -34,7 +37,7 @@ def add_arguments(parser):
     add_overwrite_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """List the catalogue, or one entry in full; write the pages asked for."""
     from pam_actuation.models.text import in_full, overview
     from pam_sim.catalogue import catalogue, find
@@ -55,7 +58,7 @@ def run(args):
     return EXIT_DONE
 
 
-def _pages(args, entries):
+def _pages(args: argparse.Namespace, entries: list[dict[str, Any]]) -> list[str]:
     """Write the pages asked for; return their paths."""
     written = []
     if args.html is not None:

@@ -14,16 +14,17 @@
 
 """``pam nodes``: parameters, topics and services of every node, from the nodes themselves."""
 
+import argparse
 from pathlib import Path
 
 from pam_actuation.cli.common import add_overwrite_option, emit, EXIT_DONE
-from pam_actuation.cli.options import out_path, source
+from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = 'List the nodes with parameters, topics and services; write their pages.'
 EXAMPLE = 'pam nodes valve_driver'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('name', type=source, nargs='?', default=None,
                         help='show the page of this node')
@@ -37,7 +38,7 @@ def add_arguments(parser):
     add_overwrite_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Print the names, or one page; write the pages asked for."""
     from pam_sim.errors import did_you_mean, InputError
     from pam_sim.files import check_folder, whole_files, write_text
@@ -49,10 +50,11 @@ def run(args):
     if args.markdown is not None:
         check_folder(args.markdown)
     try:
-        from pam_actuation.nodes.pages import pages, VARIANTS
+        from pam_actuation.nodes.interfaces import VARIANTS
+        from pam_actuation.nodes.pages import pages
     except ImportError as error:
         from pam_actuation.ros_missing import ros_missing
-        raise InputError(ros_missing(error.name)) from None
+        raise InputError(ros_missing(error.name or 'rclpy')) from None
     if args.name is not None and args.name not in VARIANTS:
         raise InputError(f'no node {args.name!r}{did_you_mean(args.name, VARIANTS)}; known are '
                          f'{", ".join(VARIANTS)}', 'name')
@@ -74,7 +76,7 @@ def run(args):
     return EXIT_DONE
 
 
-def _write_topics(folder):
+def _write_topics(folder: Path) -> list[str]:
     """Write list and pages of the topics; return their paths."""
     from pam_actuation.models.topics import INDEX, pages
     from pam_sim.errors import InputError

@@ -20,11 +20,13 @@ one sentence and exit code 2, before anything is loaded.
 """
 
 import argparse
+from collections.abc import Callable, Sequence
 import json
 import math
 import os
 import re
 import sys
+from typing import Any, NoReturn
 
 from pam_sim.errors import did_you_mean
 from pam_sim.files import shown
@@ -43,7 +45,9 @@ class Parser(argparse.ArgumentParser):
 
     as_json = False
 
-    def parse_known_args(self, args=None, namespace=None):
+    def parse_known_args(  # type: ignore[override]  # one of the overloads, as pam calls it
+            self, args: Sequence[str] | None = None,
+            namespace: argparse.Namespace | None = None) -> tuple[argparse.Namespace, list[str]]:
         """Parse as always; note first whether mistakes are to be told as JSON."""
         words = sys.argv[1:] if args is None else list(args)
         self.as_json = any(len(word) > 2 and '--json'.startswith(word) for word in words)
@@ -54,13 +58,13 @@ class Parser(argparse.ArgumentParser):
             self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
         return found, unknown
 
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         """Tell the mistake and exit with code 2."""
         said = ' '.join(message.removeprefix('argument ').split())
         complain(said, EXIT_BAD_INPUT, self.prog, self.as_json)
         self.exit(EXIT_BAD_INPUT)
 
-    def _check_value(self, action, value):
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse what is not among the choices, with the nearest one of them."""
         if action.choices is not None and value not in action.choices:
             names = [str(one) for one in action.choices]
@@ -71,7 +75,7 @@ class Parser(argparse.ArgumentParser):
                 f'{str(value)!r} is {what}{did_you_mean(value, names)}; allowed: {shown}')
 
 
-def complain(sentence, code, program, as_json=False):
+def complain(sentence: str, code: int, program: str, as_json: bool = False) -> int:
     """
     Tell why a verb did not do its work; return the exit code.
 
@@ -84,7 +88,7 @@ def complain(sentence, code, program, as_json=False):
     return code
 
 
-def allowed_text(lowest=None, highest=None, unit=''):
+def allowed_text(lowest: float | None = None, highest: float | None = None, unit: str = '') -> str:
     """Return a range in words: ``0 to 5 s``, ``0 s or more``, ``at most 5 s``, ``any number``."""
     end = f' {unit}' if unit else ''
     if lowest is None and highest is None:
@@ -96,7 +100,8 @@ def allowed_text(lowest=None, highest=None, unit=''):
     return f'{lowest:.10g} to {highest:.10g}{end}'
 
 
-def number(lowest=None, highest=None, unit=''):
+def number(lowest: float | None = None, highest: float | None = None,
+           unit: str = '') -> Callable[..., Any]:
     """
     Return the type of an option that is a finite number.
 
@@ -110,7 +115,7 @@ def number(lowest=None, highest=None, unit=''):
     """
     allowed = allowed_text(lowest, highest, unit)
 
-    def read(text):
+    def read(text: str) -> float | None:
         try:
             value = float(text)
         except ValueError:
@@ -122,7 +127,8 @@ def number(lowest=None, highest=None, unit=''):
     return read
 
 
-def count(lowest=0, highest=None, also=None):
+def count(lowest: int = 0, highest: int | None = None,
+          also: dict[int, str] | None = None) -> Callable[..., Any]:
     """
     Return the type of an option that is a whole number.
 
@@ -138,7 +144,7 @@ def count(lowest=0, highest=None, also=None):
     allowed = ', or '.join([allowed_text(lowest, highest),
                             *(f'{value} for {meaning}' for value, meaning in also.items())])
 
-    def read(text):
+    def read(text: str) -> int | None:
         try:
             value = int(text)
         except ValueError:
@@ -149,7 +155,7 @@ def count(lowest=0, highest=None, also=None):
     return read
 
 
-def out_path(text):
+def out_path(text: str) -> str:
     """Return the path of a file or folder to write; refuse what can be none."""
     _check_text(text, 'give a file or folder')
     for name in text.split(os.sep):
@@ -161,25 +167,26 @@ def out_path(text):
     return text
 
 
-def source(text):
+def source(text: str) -> str:
     """Return the name or path of something to read; refuse what can be neither."""
     _check_text(text, 'give a name or a file')
     return text
 
 
-def _check_text(text, wanted):
+def _check_text(text: str, wanted: str) -> None:
     if not text.strip():
         raise argparse.ArgumentTypeError(f'is empty; {wanted}')
     if '\0' in text:
         raise argparse.ArgumentTypeError(f'holds a zero byte; {wanted}')
 
 
-def _check_range(value, text, lowest, highest, allowed):
+def _check_range(value: float, text: str, lowest: float | None, highest: float | None,
+                 allowed: str) -> None:
     if lowest is not None and value < lowest or highest is not None and value > highest:
         raise argparse.ArgumentTypeError(f'is {shown(text)}; allowed is {allowed}')
 
 
-def _refused(text, why, allowed):
+def _refused(text: str, why: str, allowed: str) -> argparse.ArgumentTypeError:
     """Return the error of a text that is no number of the kind wanted."""
     if _DECIMAL_COMMA.fullmatch(text.strip()):
         why += ': write a decimal point, not a comma'

@@ -45,7 +45,7 @@ GROUPS = {
 VERBS = tuple(verb for group in GROUPS.values() for verb in group)
 
 
-def overview():
+def overview() -> str:
     """Return the text that ``pam`` prints without arguments."""
     wide = max(len(command) for command, _ in FIRST_STEPS) + 2
     lines = ['Simulate, run, record, replay and tune a pneumatic muscle rig.', '', 'First steps']
@@ -55,11 +55,11 @@ def overview():
     return '\n'.join(lines)
 
 
-def one_line(verb):
+def one_line(verb: str) -> str:
     """Return the line of a verb."""
     return next(verbs[verb] for verbs in GROUPS.values() if verb in verbs)
 
 
-def wrapped(names):
+def wrapped(names: list[str]) -> str:
     """Return names as lines of a paragraph, set in by two columns."""
     return textwrap.fill(', '.join(names), 95, initial_indent='  ', subsequent_indent='  ')

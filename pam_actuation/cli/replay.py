@@ -14,17 +14,19 @@
 
 """``pam replay``: step controller, driver and plant offline on what was recorded."""
 
+import argparse
+
 from pam_actuation.cli.common import (
     add_other_rig_option, add_overwrite_option, add_recover_option, check_outputs, emit,
     EXIT_DONE, EXIT_FINDING, note_implausible)
-from pam_actuation.cli.options import out_path, source
+from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
         'chained, and compare with the recording.')
 EXAMPLE = 'pam replay runs/first --chain'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
@@ -49,7 +51,7 @@ def add_arguments(parser):
     add_recover_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.replay.compare import replay_run

@@ -14,15 +14,17 @@
 
 """``pam report``: one HTML page about one or several bags."""
 
+import argparse
+
 from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
-from pam_actuation.cli.options import out_path, source
+from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
 EXAMPLE = 'pam report runs/first --out first.html'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, nargs='+', help='bag directories or .mcap files')
     parser.add_argument(
@@ -34,7 +36,7 @@ def add_arguments(parser):
     add_recover_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Load the bags and write the page."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load_joint import load_recording, MEASURED

@@ -14,20 +14,27 @@
 
 """``pam rules``: what a controller's rules say, what changed, and which of them act."""
 
+import argparse
 import os
 import shutil
 import sys
+from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, add_rig_options, check_outputs, emit, EXIT_DONE,
     progress)
-from pam_actuation.cli.options import count, out_path, source
+from pam_actuation.cli.options import count, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.rules.source import FoundRules
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 HELP = 'Show the rules of a controller: tables, what changed, how often each fired, in words.'
 EXAMPLE = 'pam rules runs/first --top 20 --html rules.html'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('rules', type=source, metavar='FILE|BAG|CONTROLLER',
                         help='rule file (.json), bag, controller YAML or preset')
@@ -47,7 +54,7 @@ def add_arguments(parser):
     add_recover_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """Find the rules, show them, write what was asked for."""
     from pam_actuation.rules.text import as_text
     from pam_actuation.rules.view import view_of
@@ -76,17 +83,17 @@ def run(args):
     return EXIT_DONE
 
 
-def _find(args, name):
+def _find(args: argparse.Namespace, name: str) -> 'FoundRules':
     """Return the rules an argument names, with a bar while a recording is stepped through."""
     from pam_actuation.rules.source import find_rules
     with progress(args, 100, description='rules') as bar:
-        def done(share):
+        def done(share: float) -> None:
             bar.update(round(100 * share) - bar.n)
         return find_rules(
             name, lambda: _rig(args), args.namespace, args.recover, done)
 
 
-def _rig(args):
+def _rig(args: argparse.Namespace) -> 'JointRig | Rig':
     """Return the rig or joint that the options name."""
     from pam_sim import load_rig
     from pam_sim.joint import load_joint
@@ -95,7 +102,7 @@ def _rig(args):
     return load(args.rig, valve=args.valve)
 
 
-def _terminal():
+def _terminal() -> tuple[int, bool]:
     """Return the width of the terminal and whether it has colours."""
     coloured = sys.stdout.isatty() and not os.environ.get('NO_COLOR') \
         and os.environ.get('TERM') != 'dumb'

@@ -14,19 +14,20 @@
 
 """``pam run``: an experiment on live nodes, recorded."""
 
+import argparse
 import os
 import sys
 import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
-from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path
+from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
 
 HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     add_experiment_options(parser)
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
@@ -36,7 +37,7 @@ def add_arguments(parser):
     parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment

@@ -14,25 +14,26 @@
 
 """``pam simulate``: an experiment without ROS, faster than real time."""
 
+import argparse
 import os
 import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, load_setup, progress, tell_remarks)
-from pam_actuation.cli.options import out_path
+from pam_actuation.cli.options import out_path, Parser
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     add_experiment_options(parser)
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE)')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Simulate and say what was recorded."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment

@@ -14,12 +14,18 @@
 
 """``pam tune``: improve a controller offline, on a model, from what was recorded."""
 
+import argparse
 import os
+from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
     default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
-from pam_actuation.cli.options import count, out_path, source
+from pam_actuation.cli.options import count, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.experiments.experiment import Experiment
 
 HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
         'writes controller YAML, initial rules and report.')
@@ -28,7 +34,7 @@ EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 CHECK = 'tuning_check'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, nargs='*',
                         help='bags that say rig, controller and experiment')
@@ -67,7 +73,7 @@ def add_arguments(parser):
     add_overwrite_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.control.config import load_controller
@@ -114,7 +120,7 @@ def run(args):
     return EXIT_DONE if result.improved and not wrong else EXIT_FINDING
 
 
-def _targets(args):
+def _targets(args: argparse.Namespace) -> dict[str, str]:
     """Return what will be written to which file; raise InputError where that cannot be."""
     from pam_sim.files import check_file
     check_file(args.out, args.overwrite, parents=False)
@@ -124,22 +130,24 @@ def _targets(args):
     return targets
 
 
-def _first(runs, key):
+def _first(runs: 'list[RecordedRun]', key: str) -> str | None:
     """Return the first metadata entry of that name among the runs, None without any."""
     return next((run.metadata[key] for run in runs if run.metadata.get(key)), None)
 
 
-def _rig_source(args, runs):
+def _rig_source(args: argparse.Namespace, runs: 'list[RecordedRun]') -> str:
     """Return name, file or text of the model to tune on."""
     from pam_sim.errors import InputError
-    source = args.rig or _first(runs, 'rig')
+    source: str | None = args.rig or _first(runs, 'rig')
     if not source:
         raise InputError(
             'no model to tune on: give a bag that was recorded here, or --model', '--model')
     return source
 
 
-def _experiments(args, runs):
+def _experiments(
+        args: argparse.Namespace,
+        runs: 'list[RecordedRun]') -> 'tuple[list[Experiment], list[Experiment]]':
     """Return the experiments of the search and those of the held-out check."""
     from pam_actuation.experiments import load_experiment
     if args.experiment:

@@ -14,17 +14,23 @@
 
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
+import argparse
+from typing import TYPE_CHECKING
+
 from pam_actuation.cli.common import (
     add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
-from pam_actuation.cli.options import count, number, out_path, source
+from pam_actuation.cli.options import count, number, out_path, Parser, source
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
+
+if TYPE_CHECKING:
+    from pam_actuation.rigging.layouts import NodeSpec
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
 EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('what', choices=('rig', 'knee', 'exo'),
                         help='one muscle, a joint with two, two joints')
@@ -53,7 +59,7 @@ def add_arguments(parser):
     add_overwrite_option(parser, 'a policy that is there already')
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """
     Bring up, watch, take down; exit code 1 if a node ended or did not end in order.
 
@@ -97,7 +103,7 @@ def run(args):
     return EXIT_FINDING if failure or problems else EXIT_DONE
 
 
-def _check_controller(args):
+def _check_controller(args: argparse.Namespace) -> None:
     """Raise InputError for a controller that its node would refuse, before any node starts."""
     from pam_actuation.control.config import load_controller
     from pam_actuation.rigging.layouts import NO_CONTROLLER
@@ -112,7 +118,7 @@ def _check_controller(args):
     load_controller(args.controller, model, accept_other_rig=args.accept_other_rig)
 
 
-def _tell_remarks(args):
+def _tell_remarks(args: argparse.Namespace) -> None:
     """Say what a person should read before the experiment is played."""
     if not args.experiment:
         return
@@ -124,7 +130,7 @@ def _tell_remarks(args):
     tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
 
 
-def _write_policy(args, nodes):
+def _write_policy(args: argparse.Namespace, nodes: 'list[NodeSpec]') -> int:
     from pam_actuation.nodes.policy import policy
     from pam_sim.files import write_text
     path = str(write_text(args.policy, policy(nodes)))
@@ -132,7 +138,7 @@ def _write_policy(args, nodes):
     return EXIT_DONE
 
 
-def _nodes(args):
+def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     """Return the nodes that are asked for."""
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts

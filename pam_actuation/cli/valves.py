@@ -14,15 +14,17 @@
 
 """``pam valves compare``: the regulator and the on/off pair, measured on the same rig."""
 
+import argparse
+
 from pam_actuation.cli.common import (
     add_overwrite_option, add_seed_option, check_outputs, emit, EXIT_DONE, progress)
-from pam_actuation.cli.options import number, out_path, source
+from pam_actuation.cli.options import number, out_path, Parser, source
 
 HELP = 'Compare the valve types on one rig: accuracy, response, air, ripple, power, power loss.'
 EXAMPLE = 'pam valves compare --rig dmsp_5_300_realistic --html valves.html'
 
 
-def add_arguments(parser):
+def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('what', choices=('compare',), help='what to do with the valves')
     parser.add_argument(
@@ -40,7 +42,7 @@ def add_arguments(parser):
     add_overwrite_option(parser)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int | None:
     """Measure, print both tables, write the page asked for."""
     from pam_actuation.valves.compare import compare, STAGES
     from pam_actuation.valves.energy import power_arguments

@@ -18,6 +18,7 @@ import fcntl
 import os
 import socket
 import tempfile
+from typing import TextIO
 
 from pam_sim.errors import InputError
 
@@ -41,8 +42,8 @@ class DomainLock:
 
     """
 
-    def __init__(self, domain_id=None):
-        self._file = None
+    def __init__(self, domain_id: int | None = None) -> None:
+        self._file: TextIO | None = None
         if domain_id is not None:
             if not 0 <= domain_id <= 232:
                 raise InputError(f'{domain_id} is not allowed, give 0 to 232', 'domain id')
@@ -56,7 +57,7 @@ class DomainLock:
                 return
         raise InputError(f'all ROS domains from {LOWEST} to {HIGHEST} are in use', 'domain id')
 
-    def _take(self, candidate):
+    def _take(self, candidate: int) -> bool:
         path = os.path.join(tempfile.gettempdir(), f'pam_actuation_domain_{candidate}.lock')
         try:
             handle = open(path, 'a')
@@ -73,14 +74,14 @@ class DomainLock:
         self._file = handle
         return True
 
-    def release(self):
+    def release(self) -> None:
         """Give the domain back."""
         if self._file is not None:
             self._file.close()
             self._file = None
 
 
-def _silent(domain_id):
+def _silent(domain_id: int) -> bool:
     """Tell whether the port that the first participant of a domain listens on is free."""
     port = PORT_BASE + PORTS_PER_DOMAIN * domain_id + FIRST_PARTICIPANT
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -19,7 +19,9 @@ What the launch files of the same names describe, for those who start nodes with
 ``ros2 launch``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import namespace_of
@@ -39,12 +41,13 @@ class NodeSpec:
 
     name: str
     namespace: str
-    parameters: dict = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     parameter_file: str = ''
 
 
-def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='sim',
-        controller='', experiment='', record='', accept_other_rig=False):
+def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',
+        hardware: str = 'sim', controller: str = '', experiment: str = '', record: str = '',
+        accept_other_rig: bool = False) -> list[NodeSpec]:
     """
     Return the nodes of one muscle.
 
@@ -102,7 +105,8 @@ def rig(namespace='/muscle', rig='dmsp_5_300_realistic', valve='ppr', hardware='
     return nodes
 
 
-def played(experiment, rig, valve, controller='', presets=None):
+def played(experiment: str, rig: str, valve: str, controller: str = '',
+           presets: Mapping[str, str] | None = None) -> tuple[str, bool]:
     """
     Return what an experiment needs: name of the controller, '' for none; raw valve signals.
 
@@ -138,8 +142,9 @@ def played(experiment, rig, valve, controller='', presets=None):
     return name, wanted.sends_valve_command(valve)
 
 
-def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', controller='',
-         experiment='', seed=0, accept_other_rig=False):
+def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', valve: str = 'ppr',
+         controller: str = '', experiment: str = '', seed: int = 0,
+         accept_other_rig: bool = False) -> list[NodeSpec]:
     """
     Return the nodes of one simulated joint; its name is the last part of the namespace.
 
@@ -160,13 +165,14 @@ def knee(namespace='/knee', joint='joint_dmsp_5_300_realistic', valve='ppr', con
     return nodes + _reference(namespace, experiment, common)
 
 
-def exo(namespace='', **options):
+def exo(namespace: str = '', **options: Any) -> list[NodeSpec]:
     """Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``."""
     return [node for k, name in enumerate(KNEES)
             for node in knee(f'{namespace_of(namespace)}/{name}', seed=2 * k, **options)]
 
 
-def _reference(namespace, experiment, parameters):
+def _reference(namespace: str, experiment: str,
+               parameters: Mapping[str, Any]) -> list[NodeSpec]:
     if not experiment:
         return []
     return [NodeSpec('reference_generator', namespace, {

@@ -14,6 +14,7 @@
 
 """Nodes as processes of the operating system, started and ended by their parent only."""
 
+from collections.abc import Iterable, Mapping
 import ctypes
 import os
 from pathlib import Path
@@ -21,6 +22,7 @@ import signal
 import subprocess
 import sys
 import time
+from typing import Any
 
 from pam_actuation.nodes.transport import prepare_middleware
 
@@ -30,7 +32,7 @@ PR_SET_PDEATHSIG = 1
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 
-def node_environment(domain_id, log_dir):
+def node_environment(domain_id: int, log_dir: str | os.PathLike[str]) -> dict[str, str]:
     """
     Return the environment of the nodes: one domain, this machine only by UDP, one thread each.
 
@@ -52,7 +54,7 @@ def node_environment(domain_id, log_dir):
     return environment
 
 
-def parameter_arguments(parameters):
+def parameter_arguments(parameters: Mapping[str, Any]) -> list[str]:
     """Return the ROS arguments ``-p name:=value`` of a dict of parameters."""
     arguments = []
     for name, value in parameters.items():
@@ -94,8 +96,9 @@ class NodeProcess:
 
     """
 
-    def __init__(self, name, namespace, parameters, environment, log_dir, remap=(),
-                 parameter_file=''):
+    def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
+                 environment: Mapping[str, str], log_dir: str | os.PathLike[str],
+                 remap: Mapping[str, str] | None = None, parameter_file: str = '') -> None:
         self.name = name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
@@ -106,7 +109,7 @@ class NodeProcess:
             command += ['--params-file', parameter_file]
         if environment.get('ROS_SECURITY_ENABLE') == 'true':
             command += ['--enclave', self.full_name]
-        for topic, other in dict(remap).items():
+        for topic, other in dict(remap or {}).items():
             command += ['-r', f'{topic}:={other}']
         with open(self.log_file, 'wb') as log:
             self._process = subprocess.Popen(
@@ -115,16 +118,16 @@ class NodeProcess:
         self.pid = self._process.pid
 
     @property
-    def exit_code(self):
+    def exit_code(self) -> int | None:
         """Return the exit code, negative for a signal, None while the process runs."""
         return self._process.poll()
 
     @property
-    def running(self):
+    def running(self) -> bool:
         """Tell whether the process runs."""
         return self.exit_code is None
 
-    def how_it_ended(self):
+    def how_it_ended(self) -> str:
         """Return a phrase on how the process ended, with the last line it printed."""
         code = self.exit_code
         if code is None:
@@ -134,7 +137,7 @@ class NodeProcess:
         last = self.last_line()
         return f'{self.name} ended with exit code {code}' + (f' ({last})' if last else '')
 
-    def last_line(self):
+    def last_line(self) -> str:
         """Return the last line the node printed, without the time."""
         try:
             lines = self.log_file.read_text(errors='replace').strip().splitlines()
@@ -142,7 +145,7 @@ class NodeProcess:
             return ''
         return lines[-1].rsplit(']: ', 1)[-1] if lines else ''
 
-    def cpu_s(self):
+    def cpu_s(self) -> float | None:
         """Return the processor time used so far [s]; None once the process is gone."""
         try:
             fields = Path(f'/proc/{self.pid}/stat').read_text().rsplit(')', 1)[1].split()
@@ -150,12 +153,12 @@ class NodeProcess:
             return None
         return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
 
-    def send_signal(self, number):
+    def send_signal(self, number: int) -> None:
         """Send a signal, if the process still runs."""
         if self.running:
             self._process.send_signal(number)
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float) -> bool:
         """Wait for the end; return whether it came in time."""
         try:
             self._process.wait(timeout_s)
@@ -164,7 +167,7 @@ class NodeProcess:
         return True
 
 
-def end_all(processes, timeout_s=5.0):
+def end_all(processes: Iterable[NodeProcess], timeout_s: float = 5.0) -> None:
     """
     End processes: SIGTERM to all, and SIGKILL to those that have not ended in time.
 
@@ -181,7 +184,7 @@ def end_all(processes, timeout_s=5.0):
         process.wait(timeout_s)
 
 
-def end_with_parent():
+def end_with_parent() -> None:
     """Ask Linux for a SIGTERM to this process when its parent dies (a ``preexec_fn``)."""
     if LIBC is not None:
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -14,9 +14,17 @@
 
 """Lifecycle transitions of node processes, with a sentence on whoever does not make it."""
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 import signal
 import threading
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from pam_actuation.rigging.processes import NodeProcess
+
+if TYPE_CHECKING:
+    from pam_actuation.rigging.client import RigClient
 
 TRANSITION_TIMEOUT_S = 15.0
 STOP_TIMEOUT_S = 5.0          # to deactivate: the driver, which vents, comes after others
@@ -27,7 +35,8 @@ class SessionFailed(Exception):
     """The nodes could not be brought up or did not stay up; the text says why."""
 
 
-def change(client, processes, transition, timeout_s=TRANSITION_TIMEOUT_S):
+def change(client: 'RigClient', processes: Iterable[NodeProcess], transition: str,
+           timeout_s: float = TRANSITION_TIMEOUT_S) -> None:
     """
     Ask nodes for a transition at the same time.
 
@@ -62,7 +71,7 @@ def change(client, processes, transition, timeout_s=TRANSITION_TIMEOUT_S):
 
 
 @contextmanager
-def termination_as_interrupt():
+def termination_as_interrupt() -> Iterator[None]:
     """Turn SIGTERM into KeyboardInterrupt while the nodes run, so that they end in order."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -74,5 +83,5 @@ def termination_as_interrupt():
         signal.signal(signal.SIGTERM, before)
 
 
-def _interrupt(number, frame):
+def _interrupt(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt

@@ -21,6 +21,7 @@ rules. The muscle did not follow *its* commands, so the comparison shows how dif
 not how well.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TYPE_CHECKING
 
@@ -138,7 +139,7 @@ class RecordingCheck:
                 ('model', self.model), ('counterfactual', self.counterfactual))}}
 
 
-def check_recordings(runs: 'list[RecordedRun | Run]', rig: 'Rig',
+def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig',
                      controller: 'CompiledController') -> list[RecordingCheck]:
     """Return a RecordingCheck of every run for a model and a tuned controller."""
     checks = []

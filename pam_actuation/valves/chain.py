@@ -19,15 +19,22 @@ Driver and plant are the classes of the live nodes, on one clock and one bus; se
 at the rate of the plant node.
 """
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import attach, attach_plant, signal_tick
 from pam_actuation.messages import Pressure, START_NS, ValveSignal
 from pam_actuation.plant_loop import muscle_readings, PlantLoop
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.response import Response
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
 STEP_S = 0.001
@@ -51,13 +58,13 @@ class Record(Response):
 
     """
 
-    def __init__(self, outputs, command_pa, signal):
+    def __init__(self, outputs: FloatArray, command_pa: FloatArray, signal: FloatArray) -> None:
         super().__init__(outputs)
         self.command_pa = command_pa
         self.signal = signal
 
     @property
-    def gauge_pa(self):
+    def gauge_pa(self) -> FloatArray:
         """Return the true gauge pressure [Pa] at the ends of the steps, shape (N,)."""
         return self.true_pressure_pa[1:] - P_ATM_PA
 
@@ -75,11 +82,11 @@ class Bench:
 
     """
 
-    def __init__(self, rig, seed=0):
+    def __init__(self, rig: Rig, seed: int = 0) -> None:
         self.rig, self.seed = rig, seed
         self._config = driver_config(rig, _AT_ONCE)
 
-    def chain(self, start_gauge_pa):
+    def chain(self, start_gauge_pa: float) -> 'Chain':
         """Return a new Chain that rests at a gauge pressure [Pa]."""
         return Chain(self.rig, self._config, start_gauge_pa, self.seed)
 
@@ -87,16 +94,17 @@ class Bench:
 class _RecordedPlant(PlantLoop):
     """A plant on a clock that keeps the signal and the outputs of every step."""
 
-    def __init__(self, rig, seed, **initial):
+    def __init__(self, rig: Rig, seed: int, **initial: Any) -> None:
         super().__init__(rig, seed, _LONGEST_S, **initial)
-        self._rows, self._signals = [self.plant.outputs[np.newaxis]], []
+        self._rows: list[FloatArray] = [self.plant.outputs[np.newaxis]]
+        self._signals: list[tuple[float, ...]] = []
 
-    def step(self, count):
+    def step(self, count: int) -> None:
         """Advance the plant by some steps with the signal held."""
         self._rows.append(self.plant.roll(self.signal, steps=count))
         self._signals += [self.signal] * count
 
-    def taken(self):
+    def taken(self) -> tuple[FloatArray, FloatArray]:
         """Return (outputs, signals) since the last call; outputs begin with the row before."""
         outputs, signals = np.concatenate(self._rows), np.array(self._signals, dtype=float)
         self._rows, self._signals = [self.plant.outputs[np.newaxis]], []
@@ -106,7 +114,7 @@ class _RecordedPlant(PlantLoop):
 class Chain:
     """One valve, its driver and the rig, from rest at a pressure on; made by a Bench."""
 
-    def __init__(self, rig, config, start_gauge_pa, seed):
+    def __init__(self, rig: Rig, config: DriverConfig, start_gauge_pa: float, seed: int) -> None:
         self.rig = rig
         self.driver = DriverLoop(rig.valve, config)
         start_pa = P_ATM_PA + float(start_gauge_pa)
@@ -120,7 +128,7 @@ class Chain:
         self._drive = signal_tick(self._bus, self.driver)
         self._tick_before(start_pa)
 
-    def _tick_before(self, command_pa):
+    def _tick_before(self, command_pa: float) -> None:
         """Call the driver one period before the start: it knows the time of a tick then."""
         before_ns = self._time_ns(-self._every)
         if self._every % SENSOR_EVERY == 0:
@@ -131,10 +139,10 @@ class Chain:
         self._bus.deliver(before_ns)
         self.driver.tick(before_ns)
 
-    def _time_ns(self, step):
+    def _time_ns(self, step: int) -> int:
         return START_NS + step * _STEP_NS
 
-    def follow(self, command_gauge_pa):
+    def follow(self, command_gauge_pa: ArrayLike) -> Record:
         """
         Follow a pressure command, one value per millisecond.
 
@@ -148,7 +156,7 @@ class Chain:
         first, steps = self._steps, range(self._steps, self._steps + len(command))
         ticks = [step for step in steps if step == first or step % self._every == 0]
 
-        def drive(now_ns):
+        def drive(now_ns: int) -> None:
             step = (now_ns - self._time_ns(first)) // _STEP_NS
             wanted_pa = P_ATM_PA + command[step]
             self._bus.send('pressure_command', Pressure(now_ns, float(wanted_pa)), now_ns)
@@ -165,14 +173,14 @@ class Chain:
             raise InputError('the driver vented during the comparison; see its limits', 'rig')
         return Record(outputs, command, signals)
 
-    def impose(self, signal, duration_s):
+    def impose(self, signal: Iterable[float], duration_s: float) -> Record:
         """Hold a valve signal, past the driver, as when it has lost its power."""
         self._plant.set_signal(ValveSignal(
             self._time_ns(self._steps), self.rig.signal_names, tuple(signal)))
         outputs, signals = self._advance(round(duration_s / STEP_S))
         return Record(outputs, np.full(len(signals), np.nan), signals)
 
-    def _advance(self, steps):
+    def _advance(self, steps: int) -> tuple[FloatArray, FloatArray]:
         """Run the plant to so many steps after the last call; return what it kept."""
         self._bus.deliver(self._time_ns(self._steps + steps))
         self._steps += steps

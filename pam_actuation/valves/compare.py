@@ -36,7 +36,7 @@ STAGES = 7 * len(CHAINS)
 
 def compare(rig: 'Rig', seed: int = 0, power: dict[str, float] | None = None,
             hold_s: float = HOLD_S,
-            progress: Callable[..., Any] | None = None) -> dict[str, Any] | None:
+            progress: Callable[..., Any] | None = None) -> dict[str, Any]:
     """
     Measure every chain on one rig.
 

@@ -21,21 +21,28 @@ simulated. A run does not depend on the others: results equal those of ``Rig.sim
 in order, with any number of workers.
 """
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 import os
 import threading
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 from pam_sim.response import COLUMNS, Response
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import OUTPUT
-from pam_sim.rollout.sampling import Placed
+from pam_sim.rollout.sampling import Measured, Placed
 from pam_sim.rollout.simulate import check_outputs, prepare
 from pam_sim.short_repr import short_repr
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 
 @short_repr
@@ -56,15 +63,15 @@ class Record:
 
     """
 
-    valve_signal: object
-    external_force_n: object = None
-    contraction_m: object = None
+    valve_signal: ArrayLike
+    external_force_n: ArrayLike | None = None
+    contraction_m: ArrayLike | None = None
     initial_pressure_pa: float = P_ATM_PA
     dt_s: float = 0.001
-    initial_contraction_m: float = None
-    initial_signal: object = None
+    initial_contraction_m: float | None = None
+    initial_signal: ArrayLike | None = None
 
-    def prepare(self, rig):
+    def prepare(self, rig: 'Rig') -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return (state, par, inputs) of the rollout with a rig."""
         return prepare(rig, self.valve_signal, self.external_force_n, self.contraction_m,
                        self.dt_s, {'initial_pressure_pa': self.initial_pressure_pa,
@@ -72,7 +79,13 @@ class Record:
                                    'initial_signal': self.initial_signal})
 
 
-def simulate_batch(rigs, records, workers=None, keep=None, every=1):
+# For all runs the same signals, or a sequence of signals for each.
+AllMeasured = Sequence[Measured] | Sequence[Sequence[Measured]]
+
+
+def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
+                   records: Record | list[Record] | tuple[Record, ...], workers: int | None = None,
+                   keep: Sequence[str] | None = None, every: int = 1) -> list[Response]:
     """
     Simulate many runs.
 
@@ -111,7 +124,7 @@ def simulate_batch(rigs, records, workers=None, keep=None, every=1):
         raise InputError(f'is {every}; at least 1 is needed', 'every')
     places = {name: place for place, name in enumerate(names)}
 
-    def kept(index, outputs):
+    def kept(index: int, outputs: FloatArray) -> Response:
         rows = outputs[::every]
         if keep is None:
             return Response(rows.copy())
@@ -123,7 +136,9 @@ def simulate_batch(rigs, records, workers=None, keep=None, every=1):
     return _run_all(_pairs(rigs, records), kept, workers)
 
 
-def sample_batch(rigs, records, measured, workers=None):
+def sample_batch(rigs: 'Rig | list[Rig]', records: Record | list[Record],
+                 measured: AllMeasured,
+                 workers: int | None = None) -> list[tuple[FloatArray, ...]]:
     """
     Simulate many runs and return only the simulated values at the measured instants.
 
@@ -148,13 +163,15 @@ def sample_batch(rigs, records, measured, workers=None):
     pairs = _pairs(rigs, records)
     places = _placed(measured, pairs)
 
-    def sampled(index, outputs):
+    def sampled(index: int, outputs: FloatArray) -> tuple[FloatArray, ...]:
         return tuple(place.sample(outputs) for place in places[index])
 
     return _run_all(pairs, sampled, workers)
 
 
-def residual_sums(rigs, records, measured, workers=None):
+def residual_sums(rigs: 'list[Rig]', records: list[Record],
+                  measured: AllMeasured,
+                  workers: int | None = None) -> FloatArray:
     """
     Simulate many runs and return only the weighted sums of squared residuals.
 
@@ -169,18 +186,22 @@ def residual_sums(rigs, records, measured, workers=None):
     pairs = _pairs(rigs, records)
     places = _placed(measured, pairs)
 
-    def summed(index, outputs):
+    def summed(index: int, outputs: FloatArray) -> list[float]:
         return [place.residual_sum(outputs) for place in places[index]]
 
     return np.array(_run_all(pairs, summed, workers))
 
 
-def default_workers():
+def default_workers() -> int:
     """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
+    if hasattr(os, 'sched_getaffinity'):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
-def _pairs(rigs, records):
+def _pairs(
+        rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
+        records: Record | list[Record] | tuple[Record, ...]) -> 'list[tuple[Rig, Record]]':
     """Return the (rig, record) of every run."""
     rigs = list(rigs) if isinstance(rigs, (list, tuple)) else [rigs]
     records = list(records) if isinstance(records, (list, tuple)) else [records]
@@ -191,18 +212,19 @@ def _pairs(rigs, records):
     return list(zip(rigs * (count // len(rigs)), records * (count // len(records))))
 
 
-def _placed(measured, pairs):
+def _placed(measured: AllMeasured, pairs: 'list[tuple[Rig, Record]]') -> list[list[Placed]]:
     """Return per run the measured signals with their places between the steps."""
-    measured = list(measured)
     if not measured:
         raise InputError('is empty; at least one signal is needed', 'measured')
-    if not isinstance(measured[0], (list, tuple)):
-        measured = [tuple(measured)] * len(pairs)
-    if len(measured) != len(pairs):
-        raise InputError(f'has {len(measured)} entries for {len(pairs)} runs', 'measured')
-    known, placed = {}, []
-    for index, ((_, record), signals) in enumerate(zip(pairs, measured)):
-        key = (id(signals), len(record.valve_signal), record.dt_s)
+    same = [one for one in measured if isinstance(one, Measured)]
+    each = [one for one in measured if not isinstance(one, Measured)]
+    of_runs: Sequence[Sequence[Measured]] = [same] * len(pairs) if same else each
+    if len(of_runs) != len(pairs):
+        raise InputError(f'has {len(of_runs)} entries for {len(pairs)} runs', 'measured')
+    known: dict[tuple[int, int, float], list[Placed]] = {}
+    placed = []
+    for index, ((_, record), signals) in enumerate(zip(pairs, of_runs)):
+        key = (id(signals), len(np.asarray(record.valve_signal)), record.dt_s)
         if key not in known:
             try:
                 known[key] = [Placed(one, *key[1:]) for one in signals]
@@ -212,16 +234,19 @@ def _placed(measured, pairs):
     return placed
 
 
-def _run_all(pairs, finish, workers):
+def _run_all(pairs: 'list[tuple[Rig, Record]]', finish: Callable[[int, FloatArray], Any],
+             workers: int | None) -> list[Any]:
     """Return ``finish(index, outputs)`` of every run, in order."""
     workers = default_workers() if workers is None else workers
     if workers < 1:
         raise InputError(f'is {workers}; at least 1 is needed', 'workers')
     workers = min(workers, len(pairs))
-    results, errors, stop = [None] * len(pairs), {}, threading.Event()
+    results: list[Any] = [None] * len(pairs)
+    errors: dict[int, InputError] = {}
+    stop = threading.Event()
     queue = iter(range(len(pairs)))     # taking the next is atomic
 
-    def work():
+    def work() -> None:
         buffer = np.empty((0, size_of(OUTPUT)))
         for index in queue:
             # A run before the first mistake is still made: it may hold an earlier one.
@@ -254,7 +279,7 @@ def _run_all(pairs, finish, workers):
     return results
 
 
-def _of_run(index, error):
+def _of_run(index: int, error: InputError) -> InputError:
     """Return the error with the number of its run."""
     return InputError(error.problem, f'run {index}: {error.where}' if error.where
                       else f'run {index}')

@@ -16,8 +16,11 @@
 
 from dataclasses import replace
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import effects
@@ -31,10 +34,15 @@ from pam_sim.units import (
 from pam_sim.valve import hsv
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 _LAW_CODES = law_codes()
 
 
-def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal):
+def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
+             initial_contraction_m: float | None,
+             initial_signal: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
     """Return (state, par); arguments and errors as of ``Rig.pack``."""
     numbers = _numbers(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_signal)
     law = rig.muscle.law.law
@@ -53,7 +61,7 @@ def pack_rig(rig, dt_s, initial_pressure_pa, initial_contraction_m, initial_sign
     return state, par
 
 
-def _pack_effects(rig, numbers, state, par):
+def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray) -> None:
     for setting in rig.effects:
         effect = effects()[setting.name]
         place, state_place = PLACES[setting.name]
@@ -62,7 +70,8 @@ def _pack_effects(rig, numbers, state, par):
                 par[flag] = 1.0
 
 
-def _numbers(rig, dt_s, pressure, contraction, signal):
+def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None,
+             signal: ArrayLike | None) -> Numbers:
     value = rig.parameters
     for name, number, lower, upper, unit in (
             ('dt_s', dt_s, 1e-6, 0.02, 's'),
@@ -96,7 +105,7 @@ def _numbers(rig, dt_s, pressure, contraction, signal):
         rig.muscle)
 
 
-def _substep(rig, dt_s):
+def _substep(rig: 'Rig', dt_s: float) -> float:
     """Return the physics step: 0.1 ms when switching, shorter where something is faster."""
     value = rig.parameters
     fastest = 0.0                # 1/s, of lag, damping and swing
@@ -116,7 +125,7 @@ def _substep(rig, dt_s):
     return dt_s / count
 
 
-def _pack_base(rig, numbers, state, par):
+def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray) -> None:
     value = rig.parameters
     muscle = rig.muscle
     length_m, thread_squared, inverse_4_pi_n2 = muscle.shape

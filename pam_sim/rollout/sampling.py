@@ -16,8 +16,10 @@
 
 from dataclasses import dataclass
 
-from numba import njit
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.compiled import allocating_entry_point
 from pam_sim.errors import InputError
 from pam_sim.response import COLUMNS
 from pam_sim.short_repr import short_repr
@@ -43,9 +45,9 @@ class Measured:
     """
 
     signal: str
-    time_s: object
-    value: object
-    weight: object = 1.0
+    time_s: ArrayLike
+    value: ArrayLike
+    weight: ArrayLike = 1.0
 
 
 class Placed:
@@ -68,7 +70,7 @@ class Placed:
 
     """
 
-    def __init__(self, measured, steps, dt_s):
+    def __init__(self, measured: Measured, steps: int, dt_s: float) -> None:
         name = measured.signal
         if name not in COLUMNS:
             raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'measured')
@@ -94,28 +96,30 @@ class Placed:
         self._row = np.clip(np.floor(place), 0, steps - 1).astype(np.int64)
         self._share = np.clip(place - self._row, 0.0, 1.0)
 
-    def sample(self, outputs):
+    def sample(self, outputs: FloatArray) -> FloatArray:
         """Return the simulated values at the instants, shape (M,)."""
         found = np.empty_like(self._value)
         sample_into(outputs, self._column, self._row, self._share, found)
         return found
 
-    def residual_sum(self, outputs):
+    def residual_sum(self, outputs: FloatArray) -> float:
         """Return the sum of (weight (simulated - measured))^2."""
         return residual_sum(outputs, self._column, self._row, self._share, self._value,
                             self._weight)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
-def sample_into(outputs, column, row, share, found):
+@allocating_entry_point
+def sample_into(outputs: FloatArray, column: int, row: IntArray, share: FloatArray,
+                found: FloatArray) -> None:
     """Fill ``found`` with one column of the rollout, linear between its rows."""
     for j in range(row.size):
         low = outputs[row[j], column]
         found[j] = low + share[j] * (outputs[row[j] + 1, column] - low)
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
-def residual_sum(outputs, column, row, share, value, weight):
+@allocating_entry_point
+def residual_sum(outputs: FloatArray, column: int, row: IntArray, share: FloatArray,
+                 value: FloatArray, weight: FloatArray) -> float:
     """Return the weighted sum of squares of one column less the measured values."""
     total = 0.0
     for j in range(row.size):

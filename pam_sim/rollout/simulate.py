@@ -15,9 +15,12 @@
 """Check the inputs of a simulation, run the rollout and check what came out."""
 
 import math
+from typing import Any, TYPE_CHECKING
 import warnings
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.law import ExtrapolationWarning
@@ -27,12 +30,17 @@ from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
 from pam_sim.units import P_ATM_PA
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
 MAX_FORCE_N = 1e5
 # Of the length at rest: a sensor may read a little below zero.
 STRAIN_RANGE = (-0.05, 0.5)
 
 
-def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
+def simulate_rig(rig: 'Rig', valve_signal: ArrayLike,
+                 external_force_n: ArrayLike | None, contraction_m: ArrayLike | None, dt_s: float,
+                 initial: dict[str, Any]) -> Response:
     """Return the Response; arguments and errors as of ``Rig.simulate``."""
     state, par, inputs = prepare(
         rig, valve_signal, external_force_n, contraction_m, dt_s, initial)
@@ -42,7 +50,9 @@ def simulate_rig(rig, valve_signal, external_force_n, contraction_m, dt_s, initi
     return Response(outputs)
 
 
-def prepare(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
+def prepare(rig: 'Rig', valve_signal: ArrayLike,
+            external_force_n: ArrayLike | None, contraction_m: ArrayLike | None, dt_s: float,
+            initial: dict[str, Any]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (state, par, inputs) of a rollout; arguments and errors as of ``Rig.simulate``."""
     inputs, start = input_array(rig, valve_signal, external_force_n, contraction_m)
     if start is not None and initial.get('initial_contraction_m') is None:
@@ -53,7 +63,7 @@ def prepare(rig, valve_signal, external_force_n, contraction_m, dt_s, initial):
     return state, par, inputs
 
 
-def check_outputs(rig, outputs):
+def check_outputs(rig: 'Rig', outputs: FloatArray) -> None:
     """
     Refuse a rollout that left the numbers; flag one that left the table of its force law.
 
@@ -85,7 +95,9 @@ def check_outputs(rig, outputs):
                 ExtrapolationWarning, stacklevel=4)
 
 
-def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
+def input_array(rig: 'Rig', valve_signal: ArrayLike,
+                external_force_n: ArrayLike | None = None,
+                contraction_m: ArrayLike | None = None) -> tuple[FloatArray, float | None]:
     """
     Return (inputs, N rows of ``layout.INPUT``; contraction at the start or None).
 
@@ -131,7 +143,7 @@ def input_array(rig, valve_signal, external_force_n=None, contraction_m=None):
     return inputs, start
 
 
-def _check_range(values, lower, upper, unit, name):
+def _check_range(values: FloatArray, lower: float, upper: float, unit: str, name: str) -> None:
     """Refuse a number that is not finite or out of range, by name and place."""
     values = np.atleast_1d(values)
     slack = 1e-9 * (upper - lower)
@@ -143,7 +155,7 @@ def _check_range(values, lower, upper, unit, name):
                      name)
 
 
-def _sized(values, lengths, name):
+def _sized(values: ArrayLike, lengths: tuple[int, ...], name: str) -> FloatArray:
     array = np.asarray(values, dtype=float)
     if array.ndim == 0 or (array.ndim == 1 and len(array) in lengths):
         return array
