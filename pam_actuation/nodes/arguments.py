@@ -19,6 +19,7 @@ Answered before anything is imported that takes time or needs ROS, and without j
 The help is the node's page of ``docs/reference/nodes``, which is made from the code.
 """
 
+from collections.abc import Sequence
 import os
 import re
 import shutil
@@ -37,7 +38,7 @@ EXIT_DONE, EXIT_BAD_INPUT = 0, 2
 _LEFT_OUT = ('Made from the code',)
 
 
-def answer(name, arguments):
+def answer(name: str, arguments: Sequence[str]) -> int | None:
     """
     Answer a request for help, refuse what is not known.
 
@@ -65,7 +66,7 @@ def answer(name, arguments):
     return None
 
 
-def in_order(arguments):
+def in_order(arguments: Sequence[str]) -> list[str]:
     """
     Return the arguments with the namespace as ROS takes it.
 
@@ -93,7 +94,7 @@ def in_order(arguments):
     return ordered
 
 
-def help_text(name, width=None):
+def help_text(name: str, width: int | None = None) -> str:
     """
     Return the page of a node as text for a terminal.
 
@@ -112,7 +113,7 @@ def help_text(name, width=None):
     return '\n\n'.join([usage, *texts]) + '\n'
 
 
-def _as_text(block, width):
+def _as_text(block: str, width: int) -> str:
     """Return one block of a page, separated by empty lines there, as text."""
     if block.startswith('## '):
         return f'{block.removeprefix("## ")}:'
@@ -126,19 +127,19 @@ def _as_text(block, width):
     return textwrap.fill(_plain(block), width)
 
 
-def _plain(text):
+def _plain(text: str) -> str:
     """Return text without the marks of Markdown."""
     text = re.sub(r'\[([^\]]+)\]\([^)]*\)', r'\1', text)
     return re.sub(r'\\(.)', r'\1', text).replace('`', '')
 
 
-def _columns(rows):
+def _columns(rows: Sequence[Sequence[str]]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows)]
     return '\n'.join('  ' + '  '.join(
         cell.ljust(size) for cell, size in zip(row, widths)).rstrip() for row in rows)
 
 
-def _parameters(head, rows, width):
+def _parameters(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> str:
     """Return the lines of parameters: name, default, unit, allowed; below them the meaning."""
     lines = []
     for name, *cells in rows:
@@ -154,7 +155,7 @@ def _parameters(head, rows, width):
     return '\n'.join(lines)
 
 
-def _show(text):
+def _show(text: str) -> None:
     try:
         print(text, end='', flush=True)
     except BrokenPipeError:     # as by `valve_driver --help | head`

@@ -41,12 +41,12 @@ class Console:
 
     """
 
-    def __init__(self, name):
+    def __init__(self, name: str) -> None:
         self._name = name.strip('/').replace('/', '.')
-        self._lines = queue.Queue(MOST_WAITING)
-        self._thread = None
+        self._lines: queue.Queue[str | None] = queue.Queue(MOST_WAITING)
+        self._thread: threading.Thread | None = None
 
-    def say(self, word, stamp_ns, text):
+    def say(self, word: str, stamp_ns: int, text: str) -> None:
         """Have a line written, such as ``[WARN] [12.000000034] [muscle.valve_driver]: ...``."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._write, daemon=True, name='console')
@@ -58,7 +58,7 @@ class Console:
         except queue.Full:
             pass
 
-    def close(self):
+    def close(self) -> None:
         """Wait a little for what is still to be written."""
         if self._thread is not None and self._thread.is_alive():
             try:
@@ -67,7 +67,7 @@ class Console:
                 return
             self._thread.join(LAST_WORDS_S)
 
-    def _write(self):
+    def _write(self) -> None:
         # It may have been started by a loop of real-time priority.
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while (line := self._lines.get()) is not None:

@@ -23,6 +23,7 @@ complete.
 """
 
 import re
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.messages import Status
 from pam_actuation.nodes.console import Console
@@ -30,6 +31,10 @@ from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.topics.codec import encode
 
+if TYPE_CHECKING:
+    from pam_actuation.nodes.managed import ManagedNode
+
+Values = tuple[tuple[str, Any], ...]       # of a status: keys, and what becomes a text
 TOPIC, HARDWARE_ID = '/diagnostics', 'pam_actuation'
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 WORDS = {OK: 'INFO', WARN: 'WARN', ERROR: 'ERROR', STALE: 'WARN'}     # of the logger of ROS
@@ -48,20 +53,20 @@ class DiagnosticsReporter:
 
     """
 
-    def __init__(self, node):
+    def __init__(self, node: 'ManagedNode') -> None:
         self._node = node
         self.publisher = CountedPublisher(node, class_of(TOPIC), TOPIC)
         self.level = OK
         self.message = 'starting'
-        self.values = ()
+        self.values: Values = ()
         self.remark = ''            # what is wrong besides, such as another node of the same name
         self.silent = True
         self.console = Console(node.get_fully_qualified_name())
         self._said = OK, ''
-        self._sent = None
+        self._sent: tuple[int, str] | None = None
         self._sent_ns = 0
 
-    def update(self, level, message, values=()):
+    def update(self, level: int, message: str, values: Values = ()) -> None:
         """Set the state; send it at once when level or message changed."""
         self.level, self.message, self.values = level, message, values
         if (level, message) != self._sent:
@@ -70,7 +75,7 @@ class DiagnosticsReporter:
             if worse or now_ns - self._sent_ns >= SHORTEST_INTERVAL_NS:
                 self.send()
 
-    def send(self):
+    def send(self) -> None:
         """Send the state now, unless the node is to keep silent."""
         if self.silent:
             return
@@ -84,7 +89,7 @@ class DiagnosticsReporter:
             (*self.values, *self._node.diagnostic_values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)
 
-    def _say(self, now_ns, level, message):
+    def _say(self, now_ns: int, level: int, message: str) -> None:
         """Tell the terminal what is wrong, or no longer wrong; not each number that changes."""
         said, self._said = self._said, (level, DIGITS.sub('', message))
         node = self._node
@@ -93,7 +98,7 @@ class DiagnosticsReporter:
         if self._said != said and (level != OK or said[0] != OK):
             self.console.say(WORDS[level], now_ns, message)
 
-    def _counts(self):
+    def _counts(self) -> Values:
         """Return the counts of all publishers; the status being sent counts itself."""
         counts = [(f'published.{one.topic}', one.count) for one in self._node.publishers_counted]
         return (*counts, (f'published.{self.publisher.topic}', self.publisher.count + 1))

@@ -20,16 +20,21 @@ A control loop needs the newest inputs once per tick, not a callback per message
 arrived when the loop asks, each with the time it was received.
 """
 
+from collections.abc import Callable, Iterable
 from functools import partial
 import time
+from typing import Any
 
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.writers import WriterTake
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 WaitSet = rclpy_implementation.WaitSet
+Taken = tuple[Any, dict[str, Any]]           # a message, and what is known of its way
 TELL_AFTER_S, TELL_EVERY_S = 2.0, 5.0       # of a wait
 
 
@@ -47,7 +52,8 @@ class CountedPublisher:
 
     """
 
-    def __init__(self, node, message_type, topic, profile=None):
+    def __init__(self, node: Node, message_type: Any, topic: str,
+                 profile: QoSProfile | None = None) -> None:
         self._publisher = node.create_publisher(
             message_type, topic, profile or qos.PUBLISHER,
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
@@ -55,17 +61,17 @@ class CountedPublisher:
         self.topic = self._publisher.topic_name
         self.count = 0
 
-    def publish(self, message):
+    def publish(self, message: Any) -> None:
         """Send a ROS message (or serialized bytes) and count it."""
         self._publisher.publish(message)
         self.count += 1
 
     @property
-    def rclpy_publisher(self):
+    def rclpy_publisher(self) -> Any:
         """Return the publisher of rclpy."""
         return self._publisher
 
-    def matched_with(self, subscriber):
+    def matched_with(self, subscriber: str) -> bool:
         """
         Tell whether messages sent from now on reach the named node and all others known.
 
@@ -79,11 +85,11 @@ class CountedPublisher:
         names = [full_name(end.node_namespace, end.node_name) for end in endpoints]
         return subscriber in names and self._publisher.get_subscription_count() >= len(names)
 
-    def wait_for_all_acked(self, timeout_s):
+    def wait_for_all_acked(self, timeout_s: float) -> bool:
         """Wait until every subscriber has confirmed what was sent; return whether all did."""
         return self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
-    def destroy(self):
+    def destroy(self) -> None:
         """Remove the publisher from its node."""
         self._node.destroy_publisher(self._publisher)
 
@@ -91,13 +97,13 @@ class CountedPublisher:
 class _NeverExecuted(CallbackGroup):
     """A group whose members the executor neither waits for nor runs."""
 
-    def can_execute(self, entity):
+    def can_execute(self, entity: Any) -> bool:
         return False
 
-    def beginning_execution(self, entity):
+    def beginning_execution(self, entity: Any) -> bool:
         return False
 
-    def ending_execution(self, entity):
+    def ending_execution(self, entity: Any) -> None:
         pass
 
 
@@ -121,26 +127,28 @@ class PolledSubscription:
 
     """
 
-    def __init__(self, node, message_type, topic, profile=None, raw=False, read=None,
-                 writers=False):
+    def __init__(self, node: Node, message_type: Any, topic: str,
+                 profile: QoSProfile | None = None, raw: bool = False,
+                 read: Callable[[bytes], Any] | None = None, writers: bool = False) -> None:
         self._node = node
         self._subscription = node.create_subscription(
             message_type, topic, _unused, profile or qos.CONSUMER,
             callback_group=_NeverExecuted(), raw=raw,
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
-        self._take = partial(self._subscription.handle.take_message, message_type, raw)
+        self._take: Callable[[], Any] = partial(
+            self._subscription.handle.take_message, message_type, raw)
         if writers:
             self._take = WriterTake(self._subscription.handle, message_type)
         self._read = read
-        self._waiting = []
-        self._wait_set = None
+        self._waiting: list[Taken] = []
+        self._wait_set: Any = None
         self.topic = self._subscription.topic_name
         self.received = 0
         self.lost = 0               # by the sequence numbers of a single publisher
-        self._sequence = None
-        self.newest = None          # the message taken or collected last
+        self._sequence: int | None = None
+        self.newest: Any = None     # the message taken or collected last
 
-    def take(self, limit=2000):
+    def take(self, limit: int = 2000) -> list[Taken]:
         """
         Return a list of (message, info) in order of arrival, at most ``limit``.
 
@@ -151,13 +159,13 @@ class PolledSubscription:
         taken, self._waiting = self._waiting, []
         return taken
 
-    def take_before(self, time_ns):
+    def take_before(self, time_ns: int) -> list[Taken]:
         """Return the plain messages stamped before a time, as ``take``; keep the others."""
         taken = self.take()
         self._waiting = [item for item in taken if item[0].stamp_ns >= time_ns]
         return [item for item in taken if item[0].stamp_ns < time_ns]
 
-    def collect(self, limit=2000):
+    def collect(self, limit: int = 2000) -> None:
         """Fetch what has arrived, up to ``limit`` waiting messages, and keep it for ``take``."""
         waiting = self._waiting
         handle = self._subscription.handle
@@ -175,12 +183,12 @@ class PolledSubscription:
                 self.newest = item[0]
                 self.received += 1
 
-    def _count_lost(self, sequence):
+    def _count_lost(self, sequence: int) -> None:
         last, self._sequence = self._sequence, sequence
         if last is not None and sequence > last + 1 and self.publishers == 1:
             self.lost += sequence - last - 1
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float) -> None:
         """Wait until a message arrives, at most ``timeout_s``; the processor is free meanwhile."""
         handle = self._subscription.handle
         with handle:
@@ -191,25 +199,27 @@ class PolledSubscription:
             self._wait_set.wait(round(timeout_s * 1e9))
 
     @property
-    def publishers(self):
+    def publishers(self) -> int:
         """Return the number of publishers this subscription is matched with."""
         return self._subscription.get_publisher_count()
 
-    def destroy(self):
+    def destroy(self) -> None:
         """Remove the subscription from its node."""
         self._node.destroy_subscription(self._subscription)
 
 
-def _unused(message):
+def _unused(message: object) -> None:
     """Stand in for the callback a subscription must have."""
 
 
-def full_name(namespace, name):
+def full_name(namespace: str, name: str) -> str:
     """Return the full name of a node or topic in a namespace."""
     return f'{namespace.rstrip("/")}/{name}'
 
 
-def wait_until_matched(publishers, subscriber, timeout_s, stopping, tell=lambda text: None):
+def wait_until_matched(publishers: Iterable[CountedPublisher], subscriber: str, timeout_s: float,
+                       stopping: Callable[[], object],
+                       tell: Callable[[str], object] = lambda text: None) -> list[str]:
     """
     Wait until every publisher reaches the named subscriber, so that no message is lost.
 

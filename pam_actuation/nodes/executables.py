@@ -27,7 +27,7 @@ from pam_actuation.nodes import arguments
 from pam_actuation.ros_missing import ros_missing
 
 
-def start(name):
+def start(name: str) -> int:
     """
     Run the node of this name as this process, with the arguments of the process.
 
@@ -44,56 +44,56 @@ def start(name):
     try:
         import rclpy  # noqa: F401
     except ImportError as error:
-        print(f'{name}: {ros_missing(error.name or error)}', file=sys.stderr)
+        print(f'{name}: {ros_missing(error.name or str(error))}', file=sys.stderr)
         return arguments.EXIT_BAD_INPUT
     return importlib.import_module(f'pam_actuation.nodes.{name}').main()
 
 
-def valve_driver():
+def valve_driver() -> int:
     """Run the node of this name; return its exit code."""
     return start('valve_driver')
 
 
-def valve_watchdog():
+def valve_watchdog() -> int:
     """Run the node of this name; return its exit code."""
     return start('valve_watchdog')
 
 
-def plant_simulator():
+def plant_simulator() -> int:
     """Run the node of this name; return its exit code."""
     return start('plant_simulator')
 
 
-def sofc_controller():
+def sofc_controller() -> int:
     """Run the node of this name; return its exit code."""
     return start('sofc_controller')
 
 
-def pid_controller():
+def pid_controller() -> int:
     """Run the node of this name; return its exit code."""
     return start('pid_controller')
 
 
-def joint_simulator():
+def joint_simulator() -> int:
     """Run the node of this name; return its exit code."""
     return start('joint_simulator')
 
 
-def joint_controller():
+def joint_controller() -> int:
     """Run the node of this name; return its exit code."""
     return start('joint_controller')
 
 
-def reference_generator():
+def reference_generator() -> int:
     """Run the node of this name; return its exit code."""
     return start('reference_generator')
 
 
-def hardware_sensors():
+def hardware_sensors() -> int:
     """Run the node of this name; return its exit code."""
     return start('hardware_sensors')
 
 
-def experiment_recorder():
+def experiment_recorder() -> int:
     """Run the node of this name; return its exit code."""
     return start('experiment_recorder')

@@ -14,6 +14,7 @@
 
 """The recorder on ROS: every message of the rig, as it came, into a bag."""
 
+from collections.abc import Sequence
 import contextlib
 import json
 import os
@@ -26,18 +27,19 @@ from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.ending import EndWatch
 from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import experiment_metadata
-from pam_actuation.bags.recorder import RecorderCore
+from pam_actuation.bags.recorder import RecorderCore, RecordingSummary
 from pam_actuation.bags.writer import BagWriter, check_limits
-from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.endpoints import PolledSubscription, Taken
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
-from pam_actuation.nodes.plant_simulator import MAX_SEED
+from pam_actuation.nodes.physics_node import MAX_SEED
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.runner import run
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.definitions import schema_text, type_hash
-from pam_actuation.topics.quality import USUAL
+from pam_actuation.topics.quality import Quality, USUAL
 from pam_actuation.topics.table import RECORDED, ROOT
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -100,10 +102,16 @@ class ExperimentRecorder(ManagedNode):
             'say one.', UNKNOWN_SEED, MAX_SEED),
     )
 
-    core = None
+    core: RecorderCore | None = None
     _recorded = False           # in this process
 
-    def check(self):
+    @property
+    def _core(self) -> RecorderCore:
+        """Return what records while the node is active."""
+        assert self.core is not None
+        return self.core
+
+    def check(self) -> None:
         """Refuse topics that are not known."""
         for name in ('topics', 'await_topics'):
             for topic in self.value(name):
@@ -115,10 +123,11 @@ class ExperimentRecorder(ManagedNode):
             self.value('max_bagfile_size_bytes'), self.value('max_bagfile_duration_s'))
         self.extra = dict(parse_extra_topic(text) for text in self.value('extra_topics') if text)
 
-    def setup(self):
+    def setup(self) -> None:
         """Read the metadata, subscribe."""
         self.metadata = self._metadata()
-        self.sources, self.types = {}, {}
+        self.sources: dict[str, PolledSubscription] = {}
+        self.types: dict[str, str] = {}
         for topic in filter(None, self.value('topics')):
             row = RECORDED[topic]
             name = row.full_name('') if row.place == ROOT else topic
@@ -126,14 +135,14 @@ class ExperimentRecorder(ManagedNode):
         for name, type_name in self.extra.items():
             self._record(name, name, type_name, USUAL.recorder)
 
-    def _record(self, topic, name, type_name, quality):
+    def _record(self, topic: str, name: str, type_name: str, quality: Quality) -> None:
         """Subscribe to a topic; definitions are looked up now, not at the first message."""
         schema_text(type_name)
         type_hash(type_name)
         self.types[topic] = type_name
         self.sources[topic] = self.subscribe(message_class(type_name), name, quality)
 
-    def _metadata(self):
+    def _metadata(self) -> dict[str, str]:
         path = self.value('metadata_file')
         if path:
             try:
@@ -159,7 +168,7 @@ class ExperimentRecorder(ManagedNode):
             origin='live', remarks='\n'.join(
                 experiment.remarks(rig.valve, rig, controller)) if experiment and rig else '')
 
-    def start(self):
+    def start(self) -> None:
         """Open the bag; wait until the publishers asked for are connected."""
         writer = BagWriter(
             self.value('output'), {'pam_experiment': self.metadata},
@@ -168,7 +177,7 @@ class ExperimentRecorder(ManagedNode):
             max_file_s=self.value('max_bagfile_duration_s'))
         self.core = RecorderCore(writer)
         self.watch = EndWatch(self.get_namespace().rstrip('/'))
-        self.known = set()
+        self.known: set[str] = set()
         if self._recorded or not self.value('autostart'):
             for source in self.sources.values():
                 source.take()           # what came before belongs to no recording
@@ -180,7 +189,7 @@ class ExperimentRecorder(ManagedNode):
         self.get_logger().info(f'ready, recording to {self.value("output")}')
         self.add_loop(TAKE_PERIOD_S)
 
-    def _wait_for_publishers(self):
+    def _wait_for_publishers(self) -> list[str]:
         deadline = time.monotonic() + READY_TIMEOUT_S
         while True:
             missing = [topic for topic in self.value('await_topics')
@@ -189,18 +198,18 @@ class ExperimentRecorder(ManagedNode):
                 return missing
             time.sleep(0.01)
 
-    def _connected(self, source):
+    def _connected(self, source: PolledSubscription) -> bool:
         return source.publishers >= max(self.count_publishers(source.topic), 1)
 
-    def tick(self):
+    def tick(self) -> None:
         """Hand over what arrived."""
         self._take_all()
-        if self.core.write_error:
+        if self._core.write_error:
             self._give_up()
-        elif self.timing.ticks % CHECK_EVERY == 1:
+        elif self.timing is not None and self.timing.ticks % CHECK_EVERY == 1:
             self._check_losses()
 
-    def _give_up(self):
+    def _give_up(self) -> None:
         """
         End after a write error: keep what is written, tell everybody, exit with 1.
 
@@ -211,8 +220,8 @@ class ExperimentRecorder(ManagedNode):
         self.fail(f'{summary.write_error} ({summary.written} messages kept, '
                   f'{summary.dropped} not written)')
 
-    def _check_losses(self):
-        counts = self.core.counts.values()
+    def _check_losses(self) -> None:
+        counts = self._core.counts.values()
         lost = sum(one.lost or 0 for one in counts)
         dropped = sum(one.dropped for one in counts)
         if lost or dropped:
@@ -221,7 +230,7 @@ class ExperimentRecorder(ManagedNode):
         else:
             self.diagnostics.update(OK, 'recording')
 
-    def _take_all(self):
+    def _take_all(self) -> int:
         """Take what arrived on all topics; return how many messages it was."""
         taken = 0
         for topic, source in self.sources.items():
@@ -230,21 +239,21 @@ class ExperimentRecorder(ManagedNode):
                 continue
             name = source.topic
             if name not in self.known:
-                self.core.add_topic(name, self.types[topic])
+                self._core.add_topic(name, self.types[topic])
                 self.known.add(name)
-            self.core.receive_all(name, messages)
+            self._core.receive_all(name, messages)
             if topic == 'diagnostics':
                 self._listen(messages)
             taken += len(messages)
         return taken
 
-    def _listen(self, messages):
+    def _listen(self, messages: Sequence[Taken]) -> None:
         """Follow how the run goes by what the other nodes say."""
         for data, _ in messages:
             with contextlib.suppress(InputError):
                 self.watch.hear(decode('diagnostics', data))
 
-    def _ending(self):
+    def _ending(self) -> Ending:
         """Return how the run ended, by what was heard and by who started this node."""
         told = None
         if self.value('notes_folder'):
@@ -253,9 +262,9 @@ class ExperimentRecorder(ManagedNode):
                 told = Ending(**json.load(stream))
         return self.watch.ending(ending_of(self.metadata).planned_s, told)
 
-    def _close(self):
+    def _close(self) -> RecordingSummary:
         """Finish the bag; return the summary."""
-        summary = self.core.close(self._ending())
+        summary = self._core.close(self._ending())
         self.core = None
         if self.value('notes_folder'):
             try:
@@ -265,7 +274,7 @@ class ExperimentRecorder(ManagedNode):
                 self.get_logger().warning(str(error))
         return summary
 
-    def stop(self):
+    def stop(self) -> None:
         """Take the last messages, finish the bag, say whether it is complete."""
         if self.core is None:
             return
@@ -281,7 +290,7 @@ class ExperimentRecorder(ManagedNode):
             f'{summary.lost} messages lost and {summary.dropped} dropped, '
             f'{summary.written} recorded{_before(summary)}: {summary.path}'))
 
-    def _take_last(self):
+    def _take_last(self) -> None:
         begin = last = time.monotonic()
         while True:
             now = time.monotonic()
@@ -292,12 +301,12 @@ class ExperimentRecorder(ManagedNode):
                 return
             time.sleep(0.01)
 
-    def _others_publish(self):
+    def _others_publish(self) -> bool:
         own = {'/diagnostics': 1}
         return any(source.publishers > own.get(source.topic, 0)
                    for source in self.sources.values())
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add what was recorded."""
         values = super().diagnostic_values()
         if self.core is None:
@@ -310,13 +319,13 @@ class ExperimentRecorder(ManagedNode):
         return (*values, *rows)
 
 
-def _before(summary):
+def _before(summary: RecordingSummary) -> str:
     """Return in words how many messages came too early for the recorder, '' for none."""
     early = sum(counts.missed_at_start or 0 for counts in summary.counts.values())
     return f', {early} sent before the recorder was connected' if early else ''
 
 
-def parse_extra_topic(text):
+def parse_extra_topic(text: str) -> tuple[str, str]:
     """Return name and type of ``NAME=TYPE``; InputError with a reason."""
     where = 'parameter extra_topics'
     name, _, type_name = text.partition('=')
@@ -332,7 +341,7 @@ def parse_extra_topic(text):
     return name, type_name
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(ExperimentRecorder, args)
 

@@ -14,13 +14,15 @@
 
 """The sensors of the real rig on ROS: pressure, contraction and force, stamped when read."""
 
+from collections.abc import Sequence
 import sys
+from typing import Any
 
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
 from pam_actuation.hardware.sysfs import DeviceError
-from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
@@ -47,15 +49,15 @@ class HardwareSensors(ManagedNode):
         *node_parameters(parameters_of(SENSOR_INPUTS)),
     )
 
-    sensors = None
+    sensors: Any = None         # of the back end, once configured
     failures = 0
 
-    def check(self):
+    def check(self) -> None:
         """Refuse to stamp what is measured with a time that may stand still."""
         if self.uses_simulated_time and self.value('backend') != 'dummy':
             raise InputError('real sensors are not read in simulated time', 'use_sim_time')
 
-    def setup(self):
+    def setup(self) -> None:
         """Open the sensors, create the publishers of those connected."""
         self.sensors = open_sensors(self.value('backend'), {
             parameter.name: self.value(parameter.name)
@@ -63,19 +65,19 @@ class HardwareSensors(ManagedNode):
         for topic in self.sensors.topics:
             self.add_publisher(topic)
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Let go of the sensors."""
         self.sensors = None
 
-    def start(self):
+    def start(self) -> None:
         """Read at a steady rate."""
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add how often a sensor did not answer."""
         return (*super().diagnostic_values(), ('read_failures', self.failures))
 
-    def tick(self):
+    def tick(self) -> None:
         """Read and send each sensor."""
         problem = ''
         for topic in self.sensors.topics:
@@ -93,7 +95,7 @@ class HardwareSensors(ManagedNode):
             self.diagnostics.update(OK, f'measuring {", ".join(self.sensors.topics)}')
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(HardwareSensors, args)
 

@@ -19,21 +19,27 @@ The pages of the nodes and the access policy are made from this, so that they sa
 code does. Nothing is activated and nothing sent.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import importlib
 import inspect
+from typing import Any, Self, TYPE_CHECKING
 
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 import rclpy
 from rclpy.parameter import Parameter
 
+if TYPE_CHECKING:
+    from pam_actuation.control.settings import Setting
+
 NAMESPACE = '/ns'       # any: what lies below it is relative
 KINDS = ('publishes', 'subscribes', 'serves')
 OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout')
 # Node to the sets of parameters that, beside the defaults, bring other topics or services.
-VARIANTS = {
+VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'plant_simulator': ({'valve_type': 'hsv'}, {'use_sim_time': True}),
     'hardware_sensors': (),
     'valve_driver': ({'accept_valve_command': True},),
@@ -45,7 +51,7 @@ VARIANTS = {
     'experiment_recorder': (),
     'joint_simulator': ({'valve_type': 'hsv'},),
     'joint_controller': ()}
-NEEDED = {'hardware_sensors': {'backend': 'dummy'}}
+NEEDED: dict[str, dict[str, Any]] = {'hardware_sensors': {'backend': 'dummy'}}
 
 
 @dataclass(frozen=True)
@@ -60,14 +66,14 @@ class NodeInterface:
 
     name: str
     description: str
-    parameters: tuple
-    publishes: dict
-    subscribes: dict
-    serves: dict
-    settings: tuple = ()
+    parameters: tuple[NodeParameter, ...]
+    publishes: dict[str, str]
+    subscribes: dict[str, str]
+    serves: dict[str, str]
+    settings: 'tuple[Setting, ...]' = ()
 
 
-def node_class(name):
+def node_class(name: str) -> type[ManagedNode]:
     """Return the class of a node by the name of its executable."""
     module = importlib.import_module(f'pam_actuation.nodes.{name}')
     return next(one for one in vars(module).values()
@@ -77,18 +83,19 @@ def node_class(name):
 class Inspector:
     """A context manager: nodes are made and configured in a ROS domain of its own."""
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         """Open the domain."""
         self._lock = DomainLock()
         self._context = local_context(self._lock.domain_id)
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """Leave the domain."""
         rclpy.try_shutdown(context=self._context)
         self._lock.release()
 
-    def interface(self, name, parameters=None, namespace=NAMESPACE):
+    def interface(self, name: str, parameters: Mapping[str, Any] | None = None,
+                  namespace: str = NAMESPACE) -> NodeInterface:
         """
         Return the NodeInterface of a node with some parameters.
 
@@ -108,7 +115,7 @@ class Inspector:
             if node.input_error is not None:
                 raise node.input_error
             return NodeInterface(
-                name, inspect.getdoc(kind), kind.PARAMETERS,
+                name, inspect.getdoc(kind) or '', kind.PARAMETERS,
                 _by_name(namespace, ((one.topic_name, one.msg_type) for one in node.publishers)),
                 _by_name(namespace, (
                     (one.topic_name, one.msg_type) for one in node.subscriptions)),
@@ -118,15 +125,16 @@ class Inspector:
         finally:
             node.destroy_node()
 
-    def whole_interface(self, name):
+    def whole_interface(self, name: str) -> tuple[NodeInterface, dict[str, str]]:
         """
         Return (NodeInterface, notes): everything a node can offer.
 
         ``notes`` maps the names that come with certain parameters only to these, as
         ``experiment:=voltage_steps``.
         """
-        base, notes = self.interface(name), {}
-        whole = {kind: dict(getattr(base, kind)) for kind in KINDS}
+        base = self.interface(name)
+        notes: dict[str, str] = {}
+        whole: dict[str, Any] = {kind: dict(getattr(base, kind)) for kind in KINDS}
         for parameters in VARIANTS[name]:
             variant = self.interface(name, parameters)
             words = ' '.join(f'{key}:={str(value).lower()}' for key, value in parameters.items())
@@ -137,7 +145,7 @@ class Inspector:
         return replace(base, **whole), notes
 
 
-def _by_name(namespace, items):
+def _by_name(namespace: str, items: Iterable[tuple[str, Any]]) -> dict[str, str]:
     """Return name, as relative as can be, to type name; what every node has is left out."""
     found = {}
     for name, kind in items:

@@ -14,13 +14,16 @@
 
 """The controller of a joint on ROS: angle and wishes in, two pressure commands out."""
 
+from collections.abc import Sequence
 import sys
+from typing import Any
 
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.controller_node import ACCEPT_OTHER_RIG
 from pam_actuation.nodes.controller_node import FOLLOWING
 from pam_actuation.nodes.controller_node import report_reason
+from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -63,9 +66,9 @@ class JointNode(LearningSwitch, ManagedNode):
             'learning', True, 'Whether the rules change while running.', live=True),
     )
 
-    loop = None
+    loop: Any = None            # a JointControllerLoop, once configured
 
-    def setup(self):
+    def setup(self) -> None:
         """Load the controller, create the topics."""
         from pam_actuation.control.config import load_controller
         from pam_actuation.control.joint_loop import JointControllerLoop
@@ -101,19 +104,19 @@ class JointNode(LearningSwitch, ManagedNode):
         self._refusals = RefusalLog(self.get_logger())
         self._freeze_service = self.create_freeze_service()
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Take service and description back."""
         self.destroy_service(self._freeze_service)
         self.destroy_publisher(self._description)
         self.loop = None
 
-    def start(self):
+    def start(self) -> None:
         """Begin without memory of a former run; what was learned stays."""
         self.discard_arrived()
         self.loop.forget()
         self.add_loop(1.0 / self.loop.rate_hz)
 
-    def tick(self):
+    def tick(self) -> None:
         """Take the newest inputs, compute, send both commands and internals."""
         for topic, subscription, handler in self._inputs:
             taken = subscription.take()
@@ -136,13 +139,13 @@ class JointNode(LearningSwitch, ManagedNode):
             self.diagnostics, self.loop.reason,
             GIVING if self.loop.follows_torque else FOLLOWING)
 
-    def safe_stop(self, why):
+    def safe_stop(self, why: str) -> None:
         """Command atmospheric pressure: both drivers vent."""
         if self.publishers_counted:
             for topic in self._commands:
                 self.send(topic, Pressure(self.now_ns(), P_ATM_PA))
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add whether the rules change, and wishes that were refused."""
         values = super().diagnostic_values()
         if self.loop is None:
@@ -155,7 +158,7 @@ class JointNode(LearningSwitch, ManagedNode):
                 ('efforts.refusal', self.loop.efforts.refusal))
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(JointNode, args)
 

@@ -14,9 +14,11 @@
 
 """The joint on ROS: valve signals of two muscles in, angle and their measurements out."""
 
+from collections.abc import Sequence
 from functools import partial
 import sys
 
+from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
@@ -41,7 +43,7 @@ class JointSimulator(PhysicsNode):
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
     )
 
-    def setup(self):
+    def setup(self) -> None:
         """Load the joint, create the sensors' publishers."""
         from pam_actuation.joint_plant_loop import JointPlantLoop
         from pam_sim.joint import load_joint
@@ -50,9 +52,9 @@ class JointSimulator(PhysicsNode):
         joint.plant().step(resting, resting)                 # compiled before time counts
         self.plant = JointPlantLoop(joint, seed=self.value('seed'))
         self.add_publisher('joint_state')
-        self.signals = {}
+        self.signals: dict[str, PolledSubscription] = {}
         for side in SIDES:
-            topics = ('pressure', 'contraction', 'force')
+            topics: tuple[str, ...] = ('pressure', 'contraction', 'force')
             if joint.flexor.valve == 'hsv':
                 topics += ('supply_pressure',)
             for topic in topics:
@@ -60,7 +62,7 @@ class JointSimulator(PhysicsNode):
             self.signals[side] = self.add_subscription(
                 f'{side}/valve_signal', writers=True)
 
-    def tick(self):
+    def tick(self) -> None:
         """Apply what arrived, run physics to the present, measure."""
         arrived = [
             (message, partial(self.plant.set_signal, side, writer=info['writer']))
@@ -69,7 +71,7 @@ class JointSimulator(PhysicsNode):
             self.send(topic, plain)
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(JointSimulator, args)
 

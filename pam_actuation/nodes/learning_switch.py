@@ -14,11 +14,19 @@
 
 """What freezes the rules of a controller: a parameter and a service, for nodes with rules."""
 
+from collections.abc import Iterable
+from typing import Any, TYPE_CHECKING
+
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
+if TYPE_CHECKING:
+    from pam_actuation.nodes.managed import ManagedNode as _Node
+else:
+    _Node = object
 
-class LearningSwitch:
+
+class LearningSwitch(_Node):
     """
     Mixed into a ManagedNode with the live parameter ``learning``.
 
@@ -28,7 +36,7 @@ class LearningSwitch:
     learning = False
     _follows_parameter = False
 
-    def create_freeze_service(self):
+    def create_freeze_service(self) -> Any:
         """Follow the parameter from now on and offer the service; return it."""
         self.learning = self.value('learning')
         if not self._follows_parameter:
@@ -36,13 +44,13 @@ class LearningSwitch:
             self._follows_parameter = True
         return self.create_service(SetBool, '~/freeze_learning', self._freeze)
 
-    def _on_parameters(self, parameters):
+    def _on_parameters(self, parameters: Iterable[Parameter]) -> None:
         for parameter in parameters:
             if parameter.name == 'learning':
                 with self.loops.lock:
                     self.learning = parameter.value
 
-    def _freeze(self, request, response):
+    def _freeze(self, request: Any, response: Any) -> Any:
         self.set_parameters([Parameter('learning', value=not request.data)])
         response.success = True
         response.message = 'learning is on' if self.learning else 'learning is frozen'

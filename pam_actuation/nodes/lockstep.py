@@ -22,10 +22,15 @@ the same inputs in the same tick in every run, however long messages take. A nod
 is left out after a while, so that time goes on and its loss has the consequences it has in life.
 """
 
+from collections.abc import Callable, Iterable, Sequence
 import time
+from typing import Protocol, TYPE_CHECKING
 
-from pam_actuation.nodes.endpoints import full_name
+from pam_actuation.nodes.endpoints import CountedPublisher, full_name, PolledSubscription
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.nodes.managed import ManagedNode
 
 PLANT, DRIVER, REFERENCE = 'plant_simulator', 'valve_driver', 'reference_generator'
 CONTROLLERS = ('sofc_controller', 'pid_controller')
@@ -43,7 +48,7 @@ NEEDED_BY = {
     'valve_signal': (PLANT,), 'external_force': (PLANT,)}
 
 
-def participants_of(names):
+def participants_of(names: Iterable[str]) -> tuple[str, ...]:
     """
     Return the participants a parameter lists, () for none.
 
@@ -61,7 +66,8 @@ def participants_of(names):
     return names
 
 
-def connections(node, participants):
+def connections(node: 'ManagedNode',
+                participants: Sequence[str]) -> list[tuple[CountedPublisher, str]]:
     """
     Return (publisher, full name of a node that must receive it) for what a node sends.
 
@@ -78,23 +84,37 @@ def connections(node, participants):
             for name in NEEDED_BY.get(topic, ()) if name in participants]
 
 
+class TickInput(Protocol):
+    """What a tick needs: a message on one of some subscriptions."""
+
+    @property
+    def subscriptions(self) -> tuple[PolledSubscription, ...]:
+        """Return where it may come."""
+
+    def arrived(self, tick_ns: int) -> bool:
+        """Return whether the message of a tick is there."""
+
+    def follows(self, before_ns: int) -> bool:
+        """Return whether the newest message is of a certain tick or later."""
+
+
 class EachTick:
     """A topic that has one message per clock message, whatever its stamps."""
 
-    def __init__(self, subscription):
+    def __init__(self, subscription: PolledSubscription) -> None:
         self.subscriptions = (subscription,)
         self._before = subscription.received
         self._ticks = 0
-        self._tick_ns = None
+        self._tick_ns: int | None = None
 
-    def arrived(self, tick_ns):
+    def arrived(self, tick_ns: int) -> bool:
         """Return whether the message of a tick is there."""
         if tick_ns != self._tick_ns:
             self._tick_ns = tick_ns
             self._ticks += 1
         return self.subscriptions[0].received - self._before >= self._ticks
 
-    def follows(self, before_ns):
+    def follows(self, before_ns: int) -> bool:
         """Return False: a count that was lost once stays lost."""
         return False
 
@@ -102,14 +122,14 @@ class EachTick:
 class Stamped:
     """A message with the stamp of the tick, on any one of some topics."""
 
-    def __init__(self, *subscriptions):
+    def __init__(self, *subscriptions: PolledSubscription) -> None:
         self.subscriptions = subscriptions
 
-    def arrived(self, tick_ns):
+    def arrived(self, tick_ns: int) -> bool:
         """Return whether the message of a tick is there."""
         return self.follows(tick_ns)
 
-    def follows(self, before_ns):
+    def follows(self, before_ns: int) -> bool:
         """Return whether the newest message is of a certain tick or later."""
         return any(one.newest is not None and one.newest.stamp_ns >= before_ns
                    for one in self.subscriptions)
@@ -131,17 +151,19 @@ class OneTickOld(Stamped):
 
     """
 
-    def __init__(self, subscription, period_ns=0):
+    def __init__(self, subscription: PolledSubscription, period_ns: int = 0) -> None:
         super().__init__(subscription)
         self._period_ns = period_ns
-        self._first_ns = self._last_ns = self._tick_ns = None
+        self._first_ns: int | None = None
+        self._last_ns: int | None = None
+        self._tick_ns: int | None = None
 
-    def arrived(self, tick_ns):
+    def arrived(self, tick_ns: int) -> bool:
         """Return whether the last message due before the tick is there."""
         if tick_ns != self._tick_ns:
             self._last_ns, self._tick_ns = self._tick_ns, tick_ns
             self._first_ns = self._first_ns or tick_ns
-        if self._last_ns is None:
+        if self._last_ns is None or self._first_ns is None:
             return True
         due_ns = self._last_ns
         if self._period_ns:
@@ -152,7 +174,7 @@ class OneTickOld(Stamped):
 class StampedIfSent(Stamped):
     """A topic that not every experiment has: asked for where somebody publishes it."""
 
-    def arrived(self, tick_ns):
+    def arrived(self, tick_ns: int) -> bool:
         """Return whether the message of a tick is there, or nobody sends any."""
         return not self.subscriptions[0].publishers or super().arrived(tick_ns)
 
@@ -174,28 +196,29 @@ class TickInputs:
 
     """
 
-    def __init__(self, make, active, report, patience_s=LEFT_OUT_AFTER_S):
+    def __init__(self, make: Callable[[], Sequence[TickInput]], active: bool,
+                 report: Callable[[str], object], patience_s: float = LEFT_OUT_AFTER_S) -> None:
         self._make = make
         self._active = active
         self._report = report
         self._patience_s = patience_s
-        self._inputs = []
-        self._left_out = {}          # input to the tick it was missing in
-        self._since_s = None
-        self._before_ns = None
+        self._inputs: Sequence[TickInput] = []
+        self._left_out: dict[TickInput, int] = {}       # to the tick it was missing in
+        self._since_s: float | None = None
+        self._before_ns: int | None = None
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         """Tell whether this is a lockstep."""
         return self._active
 
-    def begin(self):
+    def begin(self) -> None:
         """Begin to count."""
         self._inputs = self._make() if self._active else []
         self._left_out = {}
         self._since_s = None
         self._before_ns = None
 
-    def arrived(self, tick_ns):
+    def arrived(self, tick_ns: int) -> bool:
         """Wait for what a tick needs, at most 0.1 s; return whether all of it is there."""
         deadline_s = None
         for one in self._inputs:
@@ -209,7 +232,7 @@ class TickInputs:
         self._before_ns = tick_ns
         return True
 
-    def _there(self, one, tick_ns):
+    def _there(self, one: TickInput, tick_ns: int) -> bool:
         for subscription in one.subscriptions:
             subscription.collect()
         if one in self._left_out:
@@ -220,13 +243,13 @@ class TickInputs:
         return one.arrived(tick_ns)
 
     @staticmethod
-    def _wait(one, longest_s):
+    def _wait(one: TickInput, longest_s: float) -> None:
         # Of several topics any may come: looked at in turn.
         several = len(one.subscriptions) > 1
         for subscription in one.subscriptions:
             subscription.wait(TURN_S if several else longest_s)
 
-    def _give_up(self, one, tick_ns, now_s):
+    def _give_up(self, one: TickInput, tick_ns: int, now_s: float) -> bool:
         """Return False, for the next call to wait on; note a sender that is silent for long."""
         self._since_s = self._since_s or now_s
         if now_s - self._since_s > self._patience_s:
@@ -236,5 +259,5 @@ class TickInputs:
         return False
 
 
-def _names(one):
+def _names(one: TickInput) -> str:
     return ' or '.join(subscription.topic for subscription in one.subscriptions)

@@ -21,30 +21,43 @@ sleeps. The executor serves services and parameters in a second thread, which sl
 request arrives. A lock keeps the two apart.
 """
 
+from collections.abc import Callable
 import threading
 import time
+from typing import Protocol
 
 LONGEST_SLEEP_NS = 100_000_000     # how soon an idle node notices that it is to end
+
+
+class LoopTime(Protocol):
+    """A time that loops run on."""
+
+    def now_ns(self) -> int:
+        """Return the time [ns]."""
+
+    def wait_until(self, wake_ns: int) -> None:
+        """Wait for a time [ns], at most 0.1 s."""
 
 
 class Loop:
     """
     One callback every ``period_ns``; ticks that were missed are not made up for.
 
-    ``clock`` is what the period is counted on, ``SteadyTime`` or something like it.
+    ``clock`` is what the period is counted on, by default ``SteadyTime``.
     """
 
-    def __init__(self, period_ns, callback, now_ns, clock=None):
+    def __init__(self, period_ns: int, callback: Callable[[], object], now_ns: int,
+                 clock: LoopTime | None = None) -> None:
         self.period_ns = period_ns
         self.callback = callback
         self.next_ns = now_ns + period_ns
-        self.clock = clock
+        self.clock: LoopTime = clock or SteadyTime()
 
-    def every(self, period_s):
+    def every(self, period_s: float) -> None:
         """Change the period, from the next tick on."""
         self.period_ns = round(period_s * 1e9)
 
-    def advance(self, now_ns):
+    def advance(self, now_ns: int) -> None:
         """Set the time of the next tick, in step with the former ones."""
         late_ns = now_ns - self.next_ns
         self.next_ns += self.period_ns * (1 + max(late_ns, 0) // self.period_ns)
@@ -53,11 +66,11 @@ class Loop:
 class SteadyTime:
     """The time loops run on: here the steady clock of the computer."""
 
-    def now_ns(self):
+    def now_ns(self) -> int:
         """Return the time [ns]."""
         return time.monotonic_ns()
 
-    def wait_until(self, wake_ns):
+    def wait_until(self, wake_ns: int) -> None:
         """Wait for a time [ns], at most 0.1 s."""
         sleep_ns = min(wake_ns - time.monotonic_ns(), LONGEST_SLEEP_NS)
         if sleep_ns > 0:
@@ -71,16 +84,17 @@ class LoopSet:
     ``time`` is what they run on, ``SteadyTime`` or something like it.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.lock = threading.RLock()
-        self.time = SteadyTime()
-        self._loops = []
+        self.time: LoopTime = SteadyTime()
+        self._loops: list[Loop] = []
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         """Tell whether there is any loop."""
         return bool(self._loops)
 
-    def add(self, period_s, callback, clock=None):
+    def add(self, period_s: float, callback: Callable[[], object],
+            clock: LoopTime | None = None) -> Loop:
         """
         Call ``callback`` every ``period_s`` from now on; ``clock`` if not on ``time``.
 
@@ -92,12 +106,12 @@ class LoopSet:
             self._loops.append(loop)
         return loop
 
-    def clear(self):
+    def clear(self) -> None:
         """End all loops."""
         with self.lock:
             self._loops = []
 
-    def run_once(self):
+    def run_once(self) -> None:
         """Sleep until the next tick is due, at most 0.1 s, and run what is due."""
         loops = self._loops
         if not loops:

@@ -24,35 +24,33 @@ objects with safe outputs; *activate* starts the loop from the present state;
 output safe and ends the node's work.
 """
 
+from collections.abc import Callable, Iterable
 import gc
 import time
 import traceback
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.diagnostics import DiagnosticsReporter
-from pam_actuation.nodes.diagnostics import ERROR
-from pam_actuation.nodes.diagnostics import OK
-from pam_actuation.nodes.endpoints import CountedPublisher
-from pam_actuation.nodes.endpoints import PolledSubscription
-from pam_actuation.nodes.endpoints import wait_until_matched
-from pam_actuation.nodes.lockstep import TickInputs
-from pam_actuation.nodes.loops import LoopSet
-from pam_actuation.nodes.loops import SteadyTime
-from pam_actuation.nodes.parameters import declare
-from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Values
+from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
+from pam_actuation.nodes.lockstep import TickInput, TickInputs
+from pam_actuation.nodes.loops import LoopSet, SteadyTime
+from pam_actuation.nodes.parameters import declare, NodeParameter
 from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.ros_messages import class_of
-from pam_actuation.nodes.simulated_time import FollowedTime
-from pam_actuation.nodes.simulated_time import leave_clock_to_node
+from pam_actuation.nodes.simulated_time import FollowedTime, leave_clock_to_node, PlantTime
 from pam_actuation.nodes.timing import LoopTiming
-from pam_actuation.topics.codec import Reader
-from pam_actuation.topics.codec import Writer
+from pam_actuation.topics.codec import Reader, Writer
+from pam_actuation.topics.quality import Quality
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
-from rclpy.lifecycle import LifecycleNode
+from rclpy.lifecycle import LifecycleNode, LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
+
+if TYPE_CHECKING:
+    from pam_actuation.control.settings import Setting
 
 DEACTIVATED = 'deactivated'
 EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
@@ -97,17 +95,19 @@ class ManagedNode(LifecycleNode):
     REALTIME_RANK = 0           # added to a real-time priority: among equals nobody gives way
     SPEAKS_AT_ONCE = True       # in /diagnostics, also before it is active
     FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
-    PARAMETERS = ()
+    PARAMETERS: tuple[NodeParameter, ...] = ()
 
-    def __init__(self, **kwargs):
-        self.publishers_counted = []
-        self.exit_code = None       # not None: the process is to end now, with this code
+    def __init__(self, **kwargs: Any) -> None:
+        self.publishers_counted: list[CountedPublisher] = []
+        # Not None: the process is to end now, with this code.
+        self.exit_code: int | None = None
         self.result_code = 0        # with which it ends otherwise
         self.stopping = False
-        self.input_error = None     # the user's mistake that stopped the last transition
-        self.timing = None
-        self._writers = {}
-        self.subscriptions_polled = []
+        # The user's mistake that stopped the last transition.
+        self.input_error: InputError | None = None
+        self.timing: LoopTiming | None = None
+        self._writers: dict[str, tuple[CountedPublisher, Writer]] = {}
+        self.subscriptions_polled: list[PolledSubscription] = []
         self.loops = LoopSet()
         super().__init__(self.NAME, **kwargs)
         self._refuse_impossible_transitions()
@@ -116,7 +116,7 @@ class ManagedNode(LifecycleNode):
             self.value('await_subscriber'), self.get_namespace().rstrip('/'),
             'parameter await_subscriber')
         self.participants = self._participants()
-        self.simulated_time = None
+        self.simulated_time: FollowedTime | PlantTime | None = None
         if self.FOLLOWS_CLOCK and self.uses_simulated_time:
             leave_clock_to_node(self)
         self.diagnostics = DiagnosticsReporter(self)
@@ -126,94 +126,95 @@ class ManagedNode(LifecycleNode):
     # What derived nodes override.
 
     @staticmethod
-    def controller_settings():
+    def controller_settings() -> 'tuple[Setting, ...]':
         """Return the settings that its controller files know, for its page."""
         return ()
 
-    def check(self):
+    def check(self) -> None:
         """Raise InputError if the parameters given at start do not make sense."""
 
-    def setup(self):
+    def setup(self) -> None:
         """Build the plain objects, publishers and subscriptions (configure)."""
 
-    def start(self):
+    def start(self) -> None:
         """Prepare for the first tick (activate)."""
 
-    def tick(self):
+    def tick(self) -> None:
         """Run once per period of the loop."""
 
-    def due(self, since_last_s):
+    def due(self, since_last_s: float) -> bool:
         """Tell whether to tick now; asked only by a loop with ``poll_s``."""
         return True
 
-    def safe_stop(self, why):
+    def safe_stop(self, why: str) -> None:
         """Make the output safe; called on every way out, perhaps more than once."""
 
-    def stop(self):
+    def stop(self) -> None:
         """Finish work after safe output and last diagnostics (deactivate)."""
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Drop what ``setup`` built, apart from publishers and subscriptions (cleanup)."""
 
-    def make_simulated_time(self):
+    def make_simulated_time(self) -> FollowedTime | PlantTime:
         """Return the time the loops run on with use_sim_time."""
         return FollowedTime(self, self.tick_inputs())
 
-    def inputs_of_a_tick(self):
+    def inputs_of_a_tick(self) -> list[TickInput]:
         """Return what a tick waits for in lockstep, see ``lockstep``."""
         return []
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Return (key, value) pairs that every status of this node shows."""
         lost = ((f'lost.{one.topic}', one.lost) for one in self.subscriptions_polled)
         return (*(self.timing.values() if self.timing else ()), *lost)
 
     # What derived nodes use.
 
-    def value(self, name):
+    def value(self, name: str) -> Any:
         """Return the value of a parameter."""
         return self.get_parameter(name).value
 
-    def now_ns(self):
+    def now_ns(self) -> int:
         """Return the time for stamps [ns]: ROS time, simulated if use_sim_time is set."""
         if self.simulated_time is not None:
             return self.simulated_time.now_ns()
         return self.get_clock().now().nanoseconds
 
     @property
-    def uses_simulated_time(self):
+    def uses_simulated_time(self) -> bool:
         """Tell whether this node was started with use_sim_time."""
         return bool(self.get_parameter('use_sim_time').value)
 
-    def tick_inputs(self, patience_s=lockstep.LEFT_OUT_AFTER_S):
+    def tick_inputs(self, patience_s: float = lockstep.LEFT_OUT_AFTER_S) -> TickInputs:
         """Return the ``TickInputs`` of this node."""
         return TickInputs(
             self.inputs_of_a_tick, bool(self.participants), self.get_logger().warning, patience_s)
 
-    def topics_sent(self):
+    def topics_sent(self) -> list[tuple[str, CountedPublisher]]:
         """Return (short topic name, publisher) of all topics of the rig this node sends."""
         return [(topic, publisher) for topic, (publisher, _) in self._writers.items()]
 
-    def _participants(self):
+    def _participants(self) -> tuple[str, ...]:
         """Return the nodes in lockstep; InputError if that is not possible."""
         names = lockstep.participants_of(self.value('lockstep'))
         if names and not self.uses_simulated_time:
             raise InputError('lockstep is in simulated time, set use_sim_time', 'use_sim_time')
         return names if self.NAME in names else ()
 
-    def add_publisher(self, topic):
+    def add_publisher(self, topic: str) -> None:
         """Create the publisher of a topic of the rig; ``send`` publishes on it."""
         publisher = CountedPublisher(
             self, class_of(topic), topic, qos.profile(topic_of(topic).service.publisher))
         self.publishers_counted.append(publisher)
         self._writers[topic] = (publisher, Writer(topic, self.value('muscle')))
 
-    def send(self, topic, plain):
+    def send(self, topic: str, plain: Any) -> None:
         """Publish a plain message."""
         publisher, writer = self._writers[topic]
         publisher.publish(writer.fill(plain))
 
-    def add_subscription(self, topic, plain=True, writers=False):
+    def add_subscription(self, topic: str, plain: bool = True,
+                         writers: bool = False) -> PolledSubscription:
         """
         Create and return a polled subscription of a topic of the rig.
 
@@ -224,7 +225,9 @@ class ManagedNode(LifecycleNode):
             class_of(topic), topic, topic_of(topic).service.consumer,
             Reader(topic) if plain else None, writers)
 
-    def subscribe(self, message_type, name, quality, read=None, writers=False):
+    def subscribe(self, message_type: Any, name: str, quality: Quality,
+                  read: Callable[[bytes], Any] | None = None,
+                  writers: bool = False) -> PolledSubscription:
         """
         Create and return a polled subscription of any topic, which takes bytes.
 
@@ -236,12 +239,12 @@ class ManagedNode(LifecycleNode):
         self.subscriptions_polled.append(subscription)
         return subscription
 
-    def discard_arrived(self):
+    def discard_arrived(self) -> None:
         """Take what waits in the subscriptions and forget it."""
         for subscription in self.subscriptions_polled:
             subscription.take()
 
-    def add_loop(self, period_s, poll_s=None):
+    def add_loop(self, period_s: float, poll_s: float | None = None) -> None:
         """
         Run ``tick`` every ``period_s`` on the steady clock while active.
 
@@ -256,17 +259,20 @@ class ManagedNode(LifecycleNode):
         else:
             self.loops.add(poll_s, self._polled_tick)
 
-    def _polled_tick(self):
+    def _polled_tick(self) -> None:
+        assert self.timing is not None
         since_last_s = self.timing.since_last_s(time.monotonic_ns())
         if self._guarded(lambda: self.due(since_last_s)):
             self._timed_tick()
 
-    def _timed_tick(self):
-        self.timing.begin(time.monotonic_ns())
+    def _timed_tick(self) -> None:
+        timing = self.timing
+        assert timing is not None
+        timing.begin(time.monotonic_ns())
         self._guarded(self.tick)
-        self.timing.end(time.monotonic_ns())
+        timing.end(time.monotonic_ns())
 
-    def _guarded(self, action):
+    def _guarded(self, action: Callable[[], Any]) -> Any:
         """Return what a part of the loop returns; if it fails, the node fails safely."""
         try:
             return action()
@@ -274,7 +280,7 @@ class ManagedNode(LifecycleNode):
             self.fail(f'the loop of this node failed: {error}', traceback.format_exc())
             return None
 
-    def fail(self, why, details=''):
+    def fail(self, why: str, details: str = '') -> None:
         """Make the output safe, say why and end the process with exit code 1."""
         self.get_logger().error(f'{why}\n{details}' if details else why)
         self._make_safe(why)
@@ -282,21 +288,21 @@ class ManagedNode(LifecycleNode):
         self.exit_code = 1
         self.diagnostics.update(ERROR, why)
 
-    def _make_safe(self, why):
+    def _make_safe(self, why: str) -> None:
         """Call ``safe_stop``; a fault in it must not stop the way out."""
         try:
             self.safe_stop(why)
         except Exception:
             self.get_logger().error(f'the safe stop failed:\n{traceback.format_exc()}')
 
-    def _end_loops(self):
+    def _end_loops(self) -> None:
         self.loops.clear()
         if self.simulated_time is not None:
             self.simulated_time.end()
         if self.timing:
             self.timing.pause()
 
-    def finish(self, why):
+    def finish(self, why: str) -> None:
         """Leave safely from whatever state: the end of every process comes through here."""
         with self.loops.lock:
             was_active = bool(self.loops)
@@ -308,24 +314,24 @@ class ManagedNode(LifecycleNode):
             else:
                 self._farewell()
 
-    def last_status(self, why):
+    def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status of all."""
         return ERROR if self.exit_code else OK, why, self.diagnostics.values
 
-    def _end_work(self, why):
+    def _end_work(self, why: str) -> None:
         diagnostics = self.diagnostics
         diagnostics.level, diagnostics.message, diagnostics.values = self.last_status(why)
         diagnostics.send()
         self._farewell()
         self.stop()
 
-    def _farewell(self):
+    def _farewell(self) -> None:
         """Wait a little until everybody has what was sent last."""
         deadline = time.monotonic() + FAREWELL_S
         for publisher in (*self.publishers_counted, self.diagnostics.publisher):
             publisher.wait_for_all_acked(max(deadline - time.monotonic(), 0.0))
 
-    def destroy_node(self):
+    def destroy_node(self) -> None:
         """
         Destroy everything of this node in the middleware.
 
@@ -333,40 +339,40 @@ class ManagedNode(LifecycleNode):
         alive until the process ends. There Fast DDS takes its tables down under the threads
         that still receive, which now and then ended a process by a segmentation fault.
         """
-        super().destroy_node()
+        super().destroy_node()      # type: ignore[no-untyped-call]
         del self._state_machine
 
     # Transitions: each is wrapped, since rclpy swallows exceptions without a word.
 
-    def on_configure(self, state):
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read parameters, build everything with safe outputs."""
         return self._transition('configure', self._configure)
 
-    def on_activate(self, state):
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Wait for the receivers that must not miss anything, start the loop."""
         return self._transition('activate', self._activate)
 
-    def on_deactivate(self, state):
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop the loop, make the output safe."""
         return self._transition('deactivate', self._deactivate)
 
-    def on_cleanup(self, state):
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Drop everything."""
         return self._transition('cleanup', self._cleanup)
 
-    def on_shutdown(self, state):
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the output safe and end the process."""
         self.exit_code = self.exit_code or 0
         return self._transition('shutdown', self._deactivate)
 
-    def on_error(self, state):
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the output safe after a failed transition; the node is unconfigured then."""
         self._end_loops()
         self._make_safe('a transition failed')
         self._farewell()
         return self._transition('recover', self._cleanup)
 
-    def _transition(self, word, action):
+    def _transition(self, word: str, action: Callable[[], object]) -> TransitionCallbackReturn:
         try:
             with self.loops.lock:
                 action()
@@ -387,14 +393,14 @@ class ManagedNode(LifecycleNode):
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             return TransitionCallbackReturn.ERROR
 
-    def _configure(self):
+    def _configure(self) -> None:
         self.input_error = None
         self.setup()
         if self.FOLLOWS_CLOCK and self.uses_simulated_time:
             self.simulated_time = self.loops.time = self.make_simulated_time()
         self.diagnostics.update(OK, 'configured, not active')
 
-    def _activate(self):
+    def _activate(self) -> None:
         self._await_subscriber()
         gc.collect()
         gc.freeze()                  # what exists now stays: no long collections in the loop
@@ -413,7 +419,7 @@ class ManagedNode(LifecycleNode):
         self.diagnostics.update(OK, 'active')
         self.get_logger().info('active')
 
-    def _report(self):
+    def _report(self) -> None:
         own = self.get_name(), self.get_namespace()
         count = self.get_node_names_and_namespaces().count(own)
         # What was killed before this node began is not on its graph.
@@ -421,17 +427,18 @@ class ManagedNode(LifecycleNode):
             f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one')
         self.diagnostics.send()
 
-    def _await_subscriber(self):
+    def _await_subscriber(self) -> None:
         if self.awaited:
             publishers = (*self.publishers_counted, self.diagnostics.publisher)
             self._await_matched(publishers, self.awaited, 'await_subscriber')
 
-    def _await_participants(self):
+    def _await_participants(self) -> None:
         """Wait until those in lockstep with this node receive what they need of it."""
         for publisher, name in lockstep.connections(self, self.participants):
             self._await_matched([publisher], name, 'lockstep')
 
-    def _await_matched(self, publishers, subscriber, parameter):
+    def _await_matched(self, publishers: Iterable[CountedPublisher], subscriber: str,
+                       parameter: str) -> None:
         missed = wait_until_matched(
             publishers, subscriber, self.value('await_timeout_s'), lambda: self.stopping,
             self.get_logger().info)
@@ -441,21 +448,21 @@ class ManagedNode(LifecycleNode):
             raise InputError(
                 f'{subscriber} does not receive {", ".join(missed)}', f'parameter {parameter}')
 
-    def _deactivate(self):
+    def _deactivate(self) -> None:
         was_active = bool(self.loops)
         self._end_loops()
         self._make_safe(DEACTIVATED)
         if was_active:
             self._end_work(DEACTIVATED)
 
-    def _cleanup(self):
+    def _cleanup(self) -> None:
         if self.simulated_time is not None:
             self.simulated_time.close()
             self.simulated_time, self.loops.time = None, SteadyTime()
         self.teardown()
         self._drop_endpoints()
 
-    def _undo_setup(self):
+    def _undo_setup(self) -> None:
         """Take back what a configure that failed has built, as far as it came."""
         try:
             self.teardown()
@@ -463,14 +470,14 @@ class ManagedNode(LifecycleNode):
             self.get_logger().debug(f'not built yet: {error}')
         self._drop_endpoints()
 
-    def _drop_endpoints(self):
+    def _drop_endpoints(self) -> None:
         for publisher in self.publishers_counted:
             publisher.destroy()
         for subscription in self.subscriptions_polled:
             subscription.destroy()
         self.publishers_counted, self.subscriptions_polled, self._writers = [], [], {}
 
-    def _refuse_impossible_transitions(self):
+    def _refuse_impossible_transitions(self) -> None:
         """
         Answer a transition that the present state does not know with success = false.
 
@@ -480,7 +487,7 @@ class ManagedNode(LifecycleNode):
         service = self._service_change_state
         original = service.callback
 
-        def change_state(request, response):
+        def change_state(request: Any, response: Any) -> Any:
             try:
                 return original(request, response)
             except Exception as error:

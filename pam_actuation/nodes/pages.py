@@ -14,11 +14,18 @@
 
 """One Markdown page per node: what it is, parameters, topics, services, an example."""
 
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
 from pam_actuation.models.markdown import escaped, row
-from pam_actuation.nodes.interfaces import Inspector, NEEDED, VARIANTS
+from pam_actuation.nodes.interfaces import Inspector, NEEDED, NodeInterface, VARIANTS
 from pam_actuation.nodes.managed import COMMON_PARAMETERS
+from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import parameter_arguments
+
+if TYPE_CHECKING:
+    from pam_actuation.control.settings import Setting
 
 _EXPLAINED = 'states, timing and what is common to all nodes: [Nodes](../nodes.md)'
 _MADE = 'Made from the code by `pam nodes --markdown docs/reference/nodes`; do not edit.'
@@ -28,13 +35,13 @@ _EXAMPLES = (
     *layouts.rig(hardware='dummy', experiment='sine_quarter_hz', record='runs/first'))
 
 
-def pages():
+def pages() -> dict[str, str]:
     """Return file name to text of the page of every node."""
     with Inspector() as inspector:
         return {f'{name}.md': page(*inspector.whole_interface(name)) for name in VARIANTS}
 
 
-def page(interface, notes):
+def page(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     """Return the page of one node from ``Inspector.whole_interface``."""
     first, _, rest = interface.description.partition('\n')
     parts = [
@@ -51,7 +58,7 @@ def page(interface, notes):
     return '\n\n'.join(part.rstrip() for part in parts) + '\n'
 
 
-def _example(interface):
+def _example(interface: NodeInterface) -> str:
     node = next((one for one in _EXAMPLES if one.name == interface.name), None)
     namespace = node.namespace if node else '/muscle'
     given = {key: value for key, value in (node.parameters if node else {}).items()
@@ -70,7 +77,7 @@ def _example(interface):
     return '\n'.join(lines)
 
 
-def _endpoints(interface, notes):
+def _endpoints(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     lines = [row(('', 'name', 'type', 'only with')), '|---|---|---|---|']
     for word, items in (('sends', interface.publishes), ('takes', interface.subscribes),
                         ('serves', interface.serves)):
@@ -80,7 +87,7 @@ def _endpoints(interface, notes):
     return '\n'.join(lines)
 
 
-def _parameters(parameters):
+def _parameters(parameters: Sequence[NodeParameter]) -> str:
     if not parameters:
         return 'None of its own.'
     lines = [row(('parameter', 'default', 'unit', 'allowed', 'live', 'meaning')),
@@ -92,7 +99,7 @@ def _parameters(parameters):
     return '\n'.join(lines)
 
 
-def _settings(settings):
+def _settings(settings: 'Iterable[Setting]') -> str:
     lines = [row(('setting', 'default', 'unit', 'allowed', 'meaning')), '|---|---|---|---|---|']
     lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit.strip('-')),
                    f'{one.lower:g} to {one.upper:g}', escaped(one.description)))

@@ -14,10 +14,16 @@
 
 """What the nodes of simulated physics share: they follow the clock and measure what is new."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pam_actuation.messages import Message
+from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.timing import Latency
 from pam_actuation.plant_loop import Backlog
 
+Arrived = tuple[Any, Callable[[Any], object]]      # a plain message, and what takes it
 MAX_SEED = 2**31 - 1
 
 
@@ -30,18 +36,18 @@ class PhysicsNode(ManagedNode):
     Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
     """
 
-    plant = None
-    _latency = None
+    plant: Any = None           # a PlantClock, once configured
+    _latency: Latency | None = None
 
-    def start(self):
+    def start(self) -> None:
         """Begin with the clock at the present."""
         self.plant.advance_to(self.now_ns())
-        self._sampled_steps = None
+        self._sampled_steps: int | None = None
         self._latency = Latency()
-        self._backlog = Backlog()
+        self._backlog: Backlog[Arrived] = Backlog()
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
-    def measured(self, now_ns, arrived):
+    def measured(self, now_ns: int, arrived: Sequence[Arrived]) -> dict[str, Message]:
         """
         Apply what arrived, run physics to a time, measure.
 
@@ -60,13 +66,14 @@ class PhysicsNode(ManagedNode):
 
         """
         if self.simulated_time is None:
-            arrived = self._backlog.take(now_ns, arrived)
-            if arrived is None:
+            taken = self._backlog.take(now_ns, arrived)
+            if taken is None:
                 return {}
+            arrived = taken
         for plain, apply in sorted(arrived, key=lambda item: item[0].stamp_ns):
             self.plant.advance_to(min(plain.stamp_ns, now_ns))
             apply(plain)
-            if self.simulated_time is None:
+            if self.simulated_time is None and self._latency is not None:
                 self._latency.add(now_ns - plain.stamp_ns)
         self.plant.advance_to(now_ns)
         if self.plant.steps == self._sampled_steps:
@@ -74,7 +81,7 @@ class PhysicsNode(ManagedNode):
         self._sampled_steps = self.plant.steps
         return self.plant.sample(now_ns)
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add how the physics keeps up with the clock."""
         values = super().diagnostic_values()
         if self.plant is None:

@@ -14,10 +14,15 @@
 
 """The PID baseline on ROS: same topics as the self-organizing controller, no learning."""
 
+from collections.abc import Sequence
 import sys
+from typing import TYPE_CHECKING
 
 from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.runner import run
+
+if TYPE_CHECKING:
+    from pam_actuation.control.settings import Setting
 
 
 class PidNode(ControllerNode):
@@ -28,13 +33,13 @@ class PidNode(ControllerNode):
     DEFAULT_CONTROLLERS = {'ppr': 'pid', 'hsv': 'pid_hsv'}
 
     @staticmethod
-    def controller_settings():
+    def controller_settings() -> 'tuple[Setting, ...]':
         """Return the settings that its controller files know, for its page."""
         from pam_actuation.control.pid import SETTINGS
         return SETTINGS
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(PidNode, args)
 

@@ -14,13 +14,17 @@
 
 """The rig on ROS: valve signal in, measured pressure, contraction and force out."""
 
+from collections.abc import Sequence
 from functools import partial
 import sys
+from typing import Any
 
 from pam_actuation.nodes import lockstep
+from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.endpoints import full_name
+from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.parameters import NodeParameter
-from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
+from pam_actuation.nodes.physics_node import Arrived, MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
 from pam_actuation.nodes.simulated_time import PlantTime
@@ -51,14 +55,15 @@ class PlantSimulator(PhysicsNode):
             'only: as fast as the nodes answer.', 0.0, 1000.0),
     )
 
-    _clock_services = ()
+    simulated_time: PlantTime | None
+    _clock_services: Sequence[Any] = ()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a clock that nothing would hold back."""
         if self.value('clock_rate') == 0.0 and not self.participants:
             raise InputError('0 is allowed in lockstep only', 'parameter clock_rate')
 
-    def setup(self):
+    def setup(self) -> None:
         """Load the rig, create the sensors' publishers."""
         from pam_actuation.plant_loop import PlantLoop
         from pam_sim import load_rig
@@ -76,13 +81,13 @@ class PlantSimulator(PhysicsNode):
                 self.create_service(SetBool, '~/pause', self._on_pause),
                 self.create_service(Trigger, '~/step', self._on_step)]
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Take the services back."""
         for service in self._clock_services:
             self.destroy_service(service)
         self._clock_services = ()
 
-    def make_simulated_time(self):
+    def make_simulated_time(self) -> PlantTime:
         """Make the time that the others follow; InputError if somebody else does."""
         if self.count_publishers(CLOCK_TOPIC):
             raise InputError('another node publishes it; the plant is the only clock', CLOCK_TOPIC)
@@ -92,19 +97,21 @@ class PlantSimulator(PhysicsNode):
             self, self.tick_inputs(lockstep.PLANT_PATIENCE_S),
             1.0 / self.value('publish_rate_hz'), self.value('clock_rate'), followers)
 
-    def inputs_of_a_tick(self):
+    def inputs_of_a_tick(self) -> list[TickInput]:
         """Return the signal of the driver and, where there is one, the disturbance."""
         if lockstep.DRIVER not in self.participants:
             return []
         return [lockstep.Stamped(self.signals), lockstep.StampedIfSent(self.disturbances)]
 
-    def _on_pause(self, request, response):
+    def _on_pause(self, request: Any, response: Any) -> Any:
+        assert self.simulated_time is not None
         self.simulated_time.paused = request.data
         response.success = True
         response.message = 'paused' if request.data else 'going on'
         return response
 
-    def _on_step(self, request, response):
+    def _on_step(self, request: Any, response: Any) -> Any:
+        assert self.simulated_time is not None
         response.success = self.simulated_time.paused
         response.message = 'not paused'
         if response.success:
@@ -112,7 +119,7 @@ class PlantSimulator(PhysicsNode):
             response.message = f'one step of {1e3 / self.value("publish_rate_hz"):g} ms'
         return response
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add the clock it makes."""
         values = super().diagnostic_values()
         if self.plant is None or self.simulated_time is None:
@@ -121,16 +128,16 @@ class PlantSimulator(PhysicsNode):
                 ('clock.paused', self.simulated_time.paused),
                 ('clock.waits_for', ' '.join(self.simulated_time.waits_for)))
 
-    def tick(self):
+    def tick(self) -> None:
         """Apply what arrived, run physics to the present, measure."""
-        arrived = [(message, self.plant.set_external_force)
-                   for message, _ in self.disturbances.take()]
+        arrived: list[Arrived] = [
+            (message, self.plant.set_external_force) for message, _ in self.disturbances.take()]
         arrived += [(message, partial(self.plant.set_signal, writer=info['writer']))
                     for message, info in self.signals.take()]
         messages = self.measured(self.now_ns(), arrived)
         if not messages:
             return
-        if self.participants:
+        if self.simulated_time is not None and self.participants:
             self.simulated_time.publish()       # first: the others wake up and await the rest
         for topic, plain in messages.items():
             self.send(topic, plain)
@@ -138,7 +145,7 @@ class PlantSimulator(PhysicsNode):
             self.simulated_time.publish()       # last: a tick finds what was measured for it
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(PlantSimulator, args)
 

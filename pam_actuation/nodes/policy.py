@@ -20,10 +20,12 @@ parameters, and nothing else. One enclave per node, named after it; one more for
 who reads the diagnostics and calls the services the nodes offer, the emergency stop first of all.
 """
 
+from collections.abc import Iterable
 import xml.etree.ElementTree as ElementTree
 
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
+from pam_actuation.rigging.layouts import NodeSpec
 
 PARAMETER_SERVICES = (
     'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
@@ -35,7 +37,7 @@ OPERATOR = 'operator'
 SENT_BY_EVERY_NODE = (*OF_EVERY_NODE, '~/transition_event')
 
 
-def policy(nodes):
+def policy(nodes: Iterable[NodeSpec]) -> str:
     """
     Return the text of the policy of a list of NodeSpec.
 
@@ -49,7 +51,8 @@ def policy(nodes):
     root.append(ElementTree.Comment(
         ' Made from the code, as docs/guides/security.md says; do not edit. '))
     enclaves = ElementTree.SubElement(root, 'enclaves')
-    offered = []
+    offered: list[str] = []
+    nodes = list(nodes)
     with Inspector() as inspector:
         for node in nodes:
             # What only matters once it runs is left out: it may not exist here.
@@ -77,7 +80,7 @@ def policy(nodes):
             + ElementTree.tostring(root, encoding='unicode') + '\n')
 
 
-def _profile(enclaves, namespace, name):
+def _profile(enclaves: ElementTree.Element, namespace: str, name: str) -> ElementTree.Element:
     """Add an enclave with one node; return the node's profile."""
     enclave = ElementTree.SubElement(
         enclaves, 'enclave', path=f'{namespace.rstrip("/")}/{name}')
@@ -85,7 +88,7 @@ def _profile(enclaves, namespace, name):
     return ElementTree.SubElement(profiles, 'profile', ns=namespace, node=name)
 
 
-def _allow(profile, kind, right, names):
+def _allow(profile: ElementTree.Element, kind: str, right: str, names: Iterable[str]) -> None:
     """Allow a right to topics or services, ``kind`` is the word for one of them."""
     allowed = ElementTree.SubElement(profile, f'{kind}s', {right: 'ALLOW'})
     for name in names:

@@ -17,7 +17,7 @@
 import os
 
 
-def ask_for_realtime(priority):
+def ask_for_realtime(priority: int) -> str:
     """
     Let all threads of this process be scheduled first, round robin (Linux).
 

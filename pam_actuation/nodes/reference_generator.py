@@ -14,11 +14,13 @@
 
 """The reference on ROS: what the muscle is asked to do, now and ahead."""
 
+from collections.abc import Sequence
 import sys
+from typing import Any
 
 from pam_actuation.bags.ending import FINISHED
 from pam_actuation.bags.ending import PLAYING
-from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.diagnostics import OK, Values
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
@@ -50,15 +52,15 @@ class ReferenceGenerator(ManagedNode):
         NodeParameter('exit_when_finished', False, 'End the process when the experiment is over.'),
     )
 
-    loop = None
-    begin_ns = None
+    loop: Any = None            # a ReferenceLoop, once configured
+    begin_ns: int | None = None
 
-    def check(self):
+    def check(self) -> None:
         """Refuse to wait in lockstep, where everybody waits for the reference."""
         if self.participants and self.value('start_delay_s') > 0.0:
             raise InputError('0 is needed in lockstep', 'parameter start_delay_s')
 
-    def setup(self):
+    def setup(self) -> None:
         """Load the experiment, create the topics of its domain."""
         from pam_actuation.experiments import load_experiment
         from pam_actuation.experiments.reference import ReferenceLoop
@@ -69,20 +71,20 @@ class ReferenceGenerator(ManagedNode):
             self.add_publisher(topic)
         self.main_topic = self.publishers_counted[0].topic
 
-    def start(self):
+    def start(self) -> None:
         """Play from the beginning."""
         self.loop.start_ns = None
         self.begin_ns = None
         self.add_loop(1.0 / self.loop.rate_hz)
 
-    def _received(self):
+    def _received(self) -> bool:
         """Tell whether anybody is there to receive the experiment."""
         if not self.value('await_receiver'):
             return True
         expected = 1 if self.value('await_subscriber') else 0
         return self.count_subscribers(self.main_topic) > expected
 
-    def tick(self):
+    def tick(self) -> None:
         """Send what is due."""
         now_ns = self.now_ns()
         if self.begin_ns is None and self._received():
@@ -99,24 +101,24 @@ class ReferenceGenerator(ManagedNode):
         if self.value('exit_when_finished'):
             self.exit_code = 0
 
-    def safe_stop(self, why):
+    def safe_stop(self, why: str) -> None:
         """Take the disturbance off and, where it speaks to the valve, ask it to vent."""
         if self.loop is not None and self.begin_ns is not None:
             self.begin_ns = None
             for topic, plain in self.loop.safe_messages(self.now_ns()).items():
                 self.send(topic, plain)
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Drop the experiment."""
         self.loop = None
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add how far the experiment is."""
         elapsed_s = self.loop.elapsed_s(self.now_ns()) if self.loop else 0.0
         return (*super().diagnostic_values(), ('elapsed_s', f'{elapsed_s:.3f}'))
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(ReferenceGenerator, args)
 

@@ -14,6 +14,8 @@
 
 """Tell the log why a message was not taken, once and not with every message."""
 
+from typing import Any
+
 
 class RefusalLog:
     """
@@ -26,11 +28,11 @@ class RefusalLog:
 
     """
 
-    def __init__(self, logger):
+    def __init__(self, logger: Any) -> None:
         self._logger = logger
-        self._before = ()
+        self._before: tuple[str, ...] = ()
 
-    def note(self, *refusals):
+    def note(self, *refusals: str) -> None:
         """Take the present reasons, '' for none."""
         before, self._before = self._before, refusals
         for refusal in refusals:

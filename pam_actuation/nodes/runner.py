@@ -20,6 +20,7 @@ Here signals only ask the loop to end; the safe signal and the last diagnostics 
 out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad input.
 """
 
+from collections.abc import Sequence
 import os
 import re
 import signal
@@ -27,10 +28,12 @@ import socket
 import sys
 import threading
 import traceback
+from typing import Any
 
 from pam_actuation import interrupts
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
+from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.transport import prepare_middleware
 from pam_sim.errors import InputError
 import rclpy
@@ -38,7 +41,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-SIGNALS = {number: number.name for number in interrupts.ENDING}
+SIGNALS: dict[int, str] = {number: number.name for number in interrupts.ENDING}
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
@@ -54,7 +57,7 @@ class _Stopper(threading.Thread):
     thread makes the output safe itself and ends the process.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(daemon=True, name='signals')
         self._read_end, write_end = socket.socketpair()
         write_end.setblocking(False)
@@ -62,11 +65,11 @@ class _Stopper(threading.Thread):
         for number in SIGNALS:
             signal.signal(number, _noted)
         signal.set_wakeup_fd(write_end.fileno(), warn_on_full_buffer=False)
-        self.node = None
+        self.node: Any = None
         self.reason = ''
         self.safe = threading.Event()
 
-    def run(self):
+    def run(self) -> None:
         """Handle the first signal."""
         number = self._read_end.recv(1)[0]
         while number not in SIGNALS:
@@ -81,11 +84,11 @@ class _Stopper(threading.Thread):
                 os._exit(1)
 
 
-def _noted(number, frame):
+def _noted(number: int, frame: object) -> None:
     """Stand in for the default action of a signal; the thread above does the work."""
 
 
-def run(node_class, args=None):
+def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int:
     """
     Run one node as a process.
 
@@ -113,12 +116,12 @@ def run(node_class, args=None):
         interrupts.ignore(SIGNALS)
 
 
-def _run(node_class, args, stopper):
+def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_Stopper') -> int:
     try:
         if args is None:
             args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
         prepare_middleware()
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=list(args), signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
     except InputError as error:
         return _refuse(node_class, error)
@@ -162,7 +165,7 @@ def _run(node_class, args, stopper):
     return node.exit_code or node.result_code
 
 
-def _serve(node, executor, ended):
+def _serve(node: ManagedNode, executor: SingleThreadedExecutor, ended: threading.Event) -> None:
     """
     Answer services and parameter requests until ``ended`` is set.
 
@@ -180,9 +183,10 @@ def _serve(node, executor, ended):
             ended.wait(SERVICE_WAIT_S)
 
 
-def _bring_up(node):
+def _bring_up(node: ManagedNode) -> None:
     """Configure and activate; a mistake of the user ends the process with exit code 2."""
-    for trigger in (node.trigger_configure, node.trigger_activate):
+    steps: tuple[Any, ...] = node.trigger_configure, node.trigger_activate
+    for trigger in steps:
         trigger()
         if node.stopping:
             return
@@ -194,7 +198,7 @@ def _bring_up(node):
             return
 
 
-def _refuse(node_class, sentence):
+def _refuse(node_class: type[ManagedNode], sentence: object) -> int:
     """Print one sentence on what was wrong with the command line; return exit code 2."""
     print(f'{node_class.NAME}: {sentence}', file=sys.stderr)
     rclpy.try_shutdown()

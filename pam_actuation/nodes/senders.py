@@ -14,12 +14,18 @@
 
 """Who sends what a node hears: writers by their GIDs, nodes by the graph."""
 
+from collections.abc import Sequence
 import time
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.drivers.senders import DriverSenders, is_safe, Senders, told, two_send
-from pam_actuation.nodes.endpoints import full_name
+from pam_actuation.nodes.endpoints import full_name, PolledSubscription, Taken
 from pam_actuation.nodes.writers import gid_of
 from pam_actuation.topics.codec import Reader
+from rclpy.node import Node
+
+if TYPE_CHECKING:
+    from pam_actuation.nodes.managed import ManagedNode
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'         # as the graph has it before it hears of the node
 ASK_EVERY_NS = 20_000_000
@@ -39,12 +45,12 @@ class WriterNames:
 
     """
 
-    def __init__(self, node):
+    def __init__(self, node: Node) -> None:
         self._node = node
-        self._names = {}
-        self._asked_ns = {}
+        self._names: dict[bytes, str] = {}
+        self._asked_ns: dict[str, int] = {}
 
-    def __call__(self, topic, writer):
+    def __call__(self, topic: str, writer: Any) -> str:
         """
         Return the full name of the node of a writer, '' while the graph does not tell.
 
@@ -58,7 +64,7 @@ class WriterNames:
                 self._names.update(self.on_graph(topic))
         return self._names.get(writer, '')
 
-    def on_graph(self, topic):
+    def on_graph(self, topic: str) -> dict[bytes, str]:
         """Return GID to full node name of the publishers of a topic, '' where it has none yet."""
         return {bytes(end.endpoint_gid): '' if end.node_name == UNKNOWN else full_name(
             end.node_namespace, end.node_name)
@@ -76,7 +82,7 @@ class DriverEar:
 
     """
 
-    def __init__(self, node):
+    def __init__(self, node: 'ManagedNode') -> None:
         names = WriterNames(node)
         self._node = node
         self.vented = False         # whether another node sent the safe signal at the last look
@@ -90,17 +96,17 @@ class DriverEar:
             lambda topic, writer: names(node.resolve_topic_name(topic), writer),
             node.get_fully_qualified_name())
 
-    def begin(self):
+    def begin(self) -> None:
         """Forget what was said on ``valve_signal`` before the driver was active."""
         self._signals.take()
 
-    def took(self, topic, taken):
+    def took(self, topic: str, taken: Sequence[Taken]) -> None:
         """Note who sent messages that were taken on a followed topic."""
         now_ns = self._node.now_ns() if taken else 0
         for _, info in taken:
             self._senders.topics[topic].heard(info['writer'], now_ns)
 
-    def listen(self):
+    def listen(self) -> bool:
         """Take what was said on ``valve_signal``; return whether another one opens the valve."""
         opens, taken = False, self._signals.take()
         self.vented = False
@@ -116,11 +122,11 @@ class DriverEar:
             self.vented |= safe and writer is not None
         return opens
 
-    def fault(self, now_ns):
+    def fault(self, now_ns: int) -> tuple[str, str] | None:
         """Return (key in ``FAULTS``, sentence) of a second sender, None where there is none."""
         return self._senders.fault(now_ns)
 
-    def publishers(self, topic, full_topic):
+    def publishers(self, topic: str, full_topic: str) -> tuple[int, str]:
         """
         Return how many publishers of a topic send or may yet, and their names as words.
 
@@ -145,12 +151,12 @@ class SensorEar:
 
     """
 
-    def __init__(self, node, subscription):
+    def __init__(self, node: 'ManagedNode', subscription: PolledSubscription) -> None:
         self._node, self._topic = node, subscription.topic
         self._senders = Senders()
         self._name_of = WriterNames(node)
 
-    def took(self, taken, now_ns):
+    def took(self, taken: Sequence[Taken], now_ns: int) -> str:
         """Note who sent messages that were taken; return the sentence on two, '' for one."""
         for _, info in taken:
             self._senders.heard(info['writer'], now_ns)

@@ -21,15 +21,18 @@ addition until what they need of the tick has arrived (``lockstep``).
 """
 
 import time
+from typing import Any
 
 from pam_actuation.messages import START_NS
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.lockstep import TickInputs
 from pam_actuation.nodes.ros_messages import set_stamp
 from rclpy.clock import ClockType
 from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
@@ -39,7 +42,7 @@ LONGEST_WAIT_S = 0.1                        # how soon a waiting node notices th
 FALLEN_BEHIND_S = 0.1                       # later than this, the rate counts from now on anew
 
 
-def leave_clock_to_node(node):
+def leave_clock_to_node(node: Node) -> None:
     """
     End rclpy's own subscription of the clock.
 
@@ -48,10 +51,10 @@ def leave_clock_to_node(node):
     node._time_source.detach_node()
 
 
-def set_node_clock(node, now_ns):
+def set_node_clock(node: Node, now_ns: int) -> None:
     """Let the clock of a node, which stamps its log, show a simulated time [ns]."""
-    node.get_clock().set_ros_time_override(
-        Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME))
+    clock: Any = node.get_clock()           # that of a node can be set
+    clock.set_ros_time_override(Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME))
 
 
 class FollowedTime:
@@ -67,21 +70,21 @@ class FollowedTime:
 
     """
 
-    def __init__(self, node, inputs):
+    def __init__(self, node: Node, inputs: TickInputs) -> None:
         self._node = node
         self._inputs = inputs
-        self._subscription = None
+        self._subscription: PolledSubscription | None = None
         self._now_ns = 0
-        self._pending_ns = None
+        self._pending_ns: int | None = None
 
-    def begin(self):
+    def begin(self) -> None:
         """Subscribe to the clock: the plant then knows that this node is ready."""
         self.end()
         self._pending_ns = None
         self._inputs.begin()
         self._subscription = PolledSubscription(self._node, Clock, CLOCK_TOPIC, qos.CONSUMER)
 
-    def end(self):
+    def end(self) -> None:
         """Leave the clock."""
         if self._subscription is not None:
             self._subscription.destroy()
@@ -89,11 +92,11 @@ class FollowedTime:
 
     close = end
 
-    def now_ns(self):
+    def now_ns(self) -> int:
         """Return the simulated time [ns], 0 before the first clock message."""
         return self._now_ns
 
-    def wait_until(self, wake_ns):
+    def wait_until(self, wake_ns: int) -> None:
         """Wait for the next clock message, and in lockstep for the inputs of its tick."""
         subscription = self._subscription
         if subscription is None:
@@ -107,7 +110,7 @@ class FollowedTime:
         except InvalidHandle:
             return              # left the clock while waiting
 
-    def _next(self, subscription):
+    def _next(self, subscription: PolledSubscription) -> int | None:
         """Return the next time to go to [ns]; None if no message came for a while."""
         # In lockstep every message is a tick; else only the newest one counts.
         limit = 1 if self._inputs else 2000
@@ -143,62 +146,63 @@ class PlantTime:
 
     """
 
-    def __init__(self, node, inputs, period_s, rate, followers=()):
+    def __init__(self, node: Node, inputs: TickInputs, period_s: float, rate: float,
+                 followers: tuple[str, ...] = ()) -> None:
         self._node = node
         self._inputs = inputs
         self._period_ns = round(period_s * 1e9)
         self._rate = rate
         self._followers = followers
-        self._missing = ()
+        self._missing: tuple[str, ...] = ()
         self._publisher = CountedPublisher(node, Clock, CLOCK_TOPIC)
         self._message = Clock()
         self._now_ns = START_NS
         self._steps_left = 0
         self.paused = False
         self._begin_ns = START_NS
-        self._anchor = None
-        self._rate_anchor = None
+        self._anchor: tuple[int, int] | None = None
+        self._rate_anchor: tuple[int, int] | None = None
 
-    def begin(self):
+    def begin(self) -> None:
         """Go on from the present, once all are there who take part."""
         self._anchor = self._rate_anchor = None
         self._missing = self._followers
         self._begin_ns = self._now_ns
         self._inputs.begin()
 
-    def end(self):
+    def end(self) -> None:
         """Do nothing: the time stands still without loops."""
 
-    def close(self):
+    def close(self) -> None:
         """Take the clock back."""
         self._publisher.destroy()
 
     @property
-    def waits_for(self):
+    def waits_for(self) -> tuple[str, ...]:
         """Return the full names of the nodes that do not receive the clock yet."""
         return self._missing
 
-    def now_ns(self):
+    def now_ns(self) -> int:
         """Return the simulated time [ns]."""
         return self._now_ns
 
-    def publish(self):
+    def publish(self) -> None:
         """Tell everybody the time."""
         set_stamp(self._message.clock, self._now_ns)
         self._publisher.publish(self._message)
 
-    def _follows(self, name):
+    def _follows(self, name: str) -> bool:
         """Tell whether a node subscribed by its own ``FollowedTime`` and not by rclpy's."""
         ends = self._node.get_subscriptions_info_by_topic(CLOCK_TOPIC)
         return self._publisher.matched_with(name) and any(
             end.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             and full_name(end.node_namespace, end.node_name) == name for end in ends)
 
-    def step(self):
+    def step(self) -> None:
         """Go on by one period although paused."""
         self._steps_left += 1
 
-    def wait_until(self, wake_ns):
+    def wait_until(self, wake_ns: int) -> None:
         """Go on by one period when that is due."""
         if self.paused and not self._steps_left:
             self._anchor = self._rate_anchor = None
@@ -219,7 +223,7 @@ class PlantTime:
         self._now_ns += self._period_ns
         set_node_clock(self._node, self._now_ns)
 
-    def _due(self):
+    def _due(self) -> bool:
         """Wait until the rate allows the next period, at most 0.1 s; return whether it does."""
         steady_ns = time.monotonic_ns()
         if self._rate_anchor is None:
@@ -238,7 +242,7 @@ class PlantTime:
         return left_s <= LONGEST_WAIT_S
 
     @property
-    def achieved_rate(self):
+    def achieved_rate(self) -> float:
         """Return simulated seconds per second since the start or the last pause."""
         if self._rate_anchor is None:
             return 0.0

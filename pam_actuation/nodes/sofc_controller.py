@@ -14,15 +14,21 @@
 
 """The self-organizing fuzzy controller on ROS, with services for its rules."""
 
+from collections.abc import Callable, Sequence
 import os
 import sys
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.nodes.controller_node import ControllerNode
+from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
 from std_srvs.srv import Trigger
+
+if TYPE_CHECKING:
+    from pam_actuation.control.settings import Setting
 
 
 class SofcNode(LearningSwitch, ControllerNode):
@@ -41,12 +47,12 @@ class SofcNode(LearningSwitch, ControllerNode):
     )
 
     @staticmethod
-    def controller_settings():
+    def controller_settings() -> 'tuple[Setting, ...]':
         """Return the settings that its controller files know, for its page."""
         from pam_actuation.control.sofc.settings import SETTINGS
         return SETTINGS
 
-    def setup(self):
+    def setup(self) -> None:
         """Load the controller and its rules, offer the services for the rules."""
         super().setup()
         if self.value('rules_file') and os.path.exists(self._path()):
@@ -58,12 +64,12 @@ class SofcNode(LearningSwitch, ControllerNode):
             self.create_service(Trigger, '~/reset_rules', self._answered(self._reset)),
         ]
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Take the services back."""
         for service in self._rule_services:
             self.destroy_service(service)
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add whether the rules change, and how often learning took changes back."""
         values = (*super().diagnostic_values(), ('learning', self.learning))
         if self.state is None:
@@ -71,14 +77,14 @@ class SofcNode(LearningSwitch, ControllerNode):
         internals = dict(zip(self.state.names, self.state.values))
         return (*values, ('rules_rolled_back', f'{internals["times_rolled_back"]:.0f}'))
 
-    def _answered(self, action):
+    def _answered(self, action: Callable[[], str]) -> Callable[[Any, Any], Any]:
         """
         Return a Trigger callback that reports what the action says or what is wrong.
 
         An action holds the lock of the loops for the exchange of rules only: a disk that takes
         its time delays no tick.
         """
-        def callback(request, response):
+        def callback(request: Any, response: Any) -> Any:
             try:
                 response.message = action()
                 response.success = True
@@ -87,31 +93,31 @@ class SofcNode(LearningSwitch, ControllerNode):
             return response
         return callback
 
-    def _path(self):
+    def _path(self) -> str:
         path = self.value('rules_file')
         if not path:
             raise InputError('is empty, give a file', 'parameter rules_file')
         return os.path.expanduser(path)
 
-    def _save(self):
+    def _save(self) -> str:
         with self.loops.lock:
             rules = self.controller.rules.copy()
         rules.save(self._path())
         return f'rules saved to {self._path()}'
 
-    def _load(self):
+    def _load(self) -> str:
         rules = type(self.controller.rules).load(self._path(), self.controller.rules)
         with self.loops.lock:
             self.controller.replace_rules(rules, self._path())
         return f'rules loaded from {self._path()}'
 
-    def _reset(self):
+    def _reset(self) -> str:
         with self.loops.lock:
             self.controller.reset_rules()
         return 'rules are the initial ones again'
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(SofcNode, args)
 

@@ -24,26 +24,26 @@ _SHORTEST_NS, _BINS = 1000, math.ceil(math.log(1e7) / _BIN) + 1
 class Latency:
     """Distribution of a latency over a whole run, to 2 %, in a few thousand numbers."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count = 0
         self.max_ns = 0
         self._counts = [0] * _BINS
-        self._used_ns = None        # stamp of the input used last
+        self._used_ns: int | None = None        # stamp of the input used last
 
-    def add(self, latency_ns):
+    def add(self, latency_ns: int) -> None:
         """Note one; below 0 (clocks of two machines) counts as 0."""
         self.count += 1
         self.max_ns = max(self.max_ns, latency_ns)
         ratio = max(latency_ns, _SHORTEST_NS) / _SHORTEST_NS
         self._counts[min(int(math.log(ratio) / _BIN), _BINS - 1)] += 1
 
-    def used(self, stamp_ns, now_ns):
+    def used(self, stamp_ns: int | None, now_ns: int) -> None:
         """Note the age of an input when it is used first; None for a stamp: there is none."""
         if stamp_ns is not None and stamp_ns != self._used_ns:
             self._used_ns = stamp_ns
             self.add(now_ns - stamp_ns)
 
-    def quantile_ns(self, share):
+    def quantile_ns(self, share: float) -> float:
         """Return the latency [ns] that a share of all does not exceed, NaN before the first."""
         wanted, seen = share * self.count, 0
         for index, count in enumerate(self._counts):
@@ -52,7 +52,7 @@ class Latency:
                 return min(_SHORTEST_NS * math.exp((index + 1) * _BIN), self.max_ns)
         return math.nan
 
-    def values(self, name):
+    def values(self, name: str) -> tuple[tuple[str, str], ...]:
         """Return (key, text) pairs for a diagnostic status; times in ms."""
         if not self.count:
             return ()
@@ -75,18 +75,18 @@ class LoopTiming:
 
     """
 
-    def __init__(self, period_s):
+    def __init__(self, period_s: float) -> None:
         self.period_ns = round(period_s * 1e9)
         self.ticks = 0
         self.overruns = 0
-        self._last_ns = None
+        self._last_ns: int | None = None
         self._intervals = 0
         self._span_ns = 0
         self.max_jitter_ns = 0
         self._busy_ns = 0
         self.max_busy_ns = 0
 
-    def begin(self, now_ns):
+    def begin(self, now_ns: int) -> None:
         """Note the start of a tick; ``now_ns`` comes from a steady clock."""
         if self._last_ns is not None:
             interval = now_ns - self._last_ns
@@ -99,15 +99,15 @@ class LoopTiming:
         self.ticks += 1
 
     @property
-    def missed(self):
+    def missed(self) -> int:
         """Return how many ticks did not run: the periods that passed against the ticks."""
         return max(round(self._span_ns / self.period_ns) - self._intervals, 0)
 
-    def since_last_s(self, now_ns):
+    def since_last_s(self, now_ns: int) -> float:
         """Return the time since the last tick began [s], infinite before the first."""
         return math.inf if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
 
-    def end(self, now_ns):
+    def end(self, now_ns: int) -> None:
         """Note the end of the tick begun last."""
         if self._last_ns is None:
             return                  # paused by the tick itself
@@ -116,11 +116,11 @@ class LoopTiming:
         if busy > self.max_busy_ns:
             self.max_busy_ns = busy
 
-    def pause(self):
+    def pause(self) -> None:
         """Forget the last tick, so that a pause does not count as an overrun."""
         self._last_ns = None
 
-    def values(self):
+    def values(self) -> tuple[tuple[str, str], ...]:
         """Return (key, text) pairs for a diagnostic status; times in ms."""
         if not self._intervals:
             return (('loop.ticks', str(self.ticks)),)

@@ -27,6 +27,7 @@ The answers free all messages of those 3 s at once, up to the depth of the publi
 nobody else can send (1000 messages). The profiles let it ask every 0.2 s.
 """
 
+from collections.abc import Mapping, MutableMapping
 import os
 
 from pam_actuation.resources import config_dir
@@ -41,7 +42,7 @@ FAST_DDS = 'rmw_fastrtps'           # as the names of its implementations begin
 LOOPBACK, NETWORK = 'fastdds_loopback.xml', 'fastdds_network.xml'
 
 
-def prepare_middleware(environment=os.environ):
+def prepare_middleware(environment: MutableMapping[str, str] = os.environ) -> None:
     """
     Set how participants that are created later in this process talk.
 
@@ -78,13 +79,13 @@ def prepare_middleware(environment=os.environ):
         environment.pop(LOCALHOST_ONLY, None)       # it would overrule the range
 
 
-def _is_prepared(environment):
+def _is_prepared(environment: Mapping[str, str]) -> bool:
     """Return whether the range was left to the profile for this machine."""
     return (environment.get(PROFILES, '').endswith(LOOPBACK)
             and environment.get(RANGE) == BY_PROFILE)
 
 
-def unprepared(environment):
+def unprepared(environment: Mapping[str, str]) -> dict[str, str]:
     """Return a copy of an environment in which ROS and Fast DDS take their own defaults."""
     left = {name: value for name, value in environment.items()
             if name not in (PROFILES, TRANSPORTS)}

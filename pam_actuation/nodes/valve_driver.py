@@ -14,7 +14,9 @@
 
 """The valve driver on ROS: pressure command in, valve signal out, safe on every way out."""
 
+from collections.abc import Sequence
 import sys
+from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.hardware.back_ends import open_valve
@@ -24,7 +26,9 @@ from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.diagnostics import ERROR
+from pam_actuation.nodes.diagnostics import ERROR, Values
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import DEACTIVATED
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import node_parameters
@@ -74,13 +78,13 @@ class ValveDriver(ManagedNode):
         *node_parameters((*DRIVER_PARAMETERS, *parameters_of(VALVE_OUTPUTS))),
     )
 
-    loop = None
-    output = None
+    loop: Any = None            # a DriverLoop, once configured
+    output: Any = None          # what the valve hangs on
     _not_vented = ''        # why not, at the end
-    _stopped = None         # what a latched stop is carried over from
-    _safety_services = ()
+    _stopped: Any = None    # what a latched stop is carried over from
+    _safety_services: Sequence[Any] = ()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse to drive a device on a time that may stand still, or to vent between signals."""
         if self.uses_simulated_time and self.value('backend') not in ('sim', 'dummy'):
             raise InputError('a real valve is not driven in simulated time', 'use_sim_time')
@@ -89,16 +93,16 @@ class ValveDriver(ManagedNode):
                 f'{self.value("device_watchdog_s"):g} s is shorter than a few signals take, '
                 f'allowed are 0 and {SHORTEST_SILENCE_S:g} to 1', 'parameter device_watchdog_s')
 
-    def inputs_of_a_tick(self):
+    def inputs_of_a_tick(self) -> list[TickInput]:
         """Return the measurements and the command."""
-        awaited = [lockstep.EachTick(self.pressures)]
+        awaited: list[TickInput] = [lockstep.EachTick(self.pressures)]
         if self.loop.is_hsv:
             awaited.append(lockstep.EachTick(self.supplies))
         if {lockstep.REFERENCE, *lockstep.CONTROLLERS} & {*self.participants}:
             awaited.append(lockstep.Stamped(*filter(None, (self.commands, self.raw_commands))))
         return awaited
 
-    def setup(self):
+    def setup(self) -> None:
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
         config = self._config()
@@ -115,7 +119,7 @@ class ValveDriver(ManagedNode):
         self.add_publisher('valve_signal')
         self.add_publisher('followed_pressure')
         self.commands = self.add_subscription('pressure_command', writers=True)
-        self.raw_commands = None
+        self.raw_commands: PolledSubscription | None = None
         if self.value('accept_valve_command'):
             self.raw_commands = self.add_subscription('valve_command', writers=True)
         self.pressures = self.add_subscription('pressure', writers=True)
@@ -126,7 +130,7 @@ class ValveDriver(ManagedNode):
             self.create_service(Trigger, '~/reset', self._on_reset),
         ]
 
-    def _config(self):
+    def _config(self) -> DriverConfig:
         """Return the driver's numbers: those given, else the rig's, else the defaults."""
         if not self.value('rig'):
             return DriverConfig.from_parameters(
@@ -143,7 +147,7 @@ class ValveDriver(ManagedNode):
             ', '.join(f'{name} {value:g}' for name, value in told.items()) or 'the defaults'))
         return config
 
-    def teardown(self):
+    def teardown(self) -> None:
         """Take the services back."""
         for service in self._safety_services:
             self.destroy_service(service)
@@ -153,7 +157,7 @@ class ValveDriver(ManagedNode):
             self._stopped = self.loop.safety
         self.loop = self.output = None
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add the valve's device and its refusals, and how old what came in was when used."""
         values = (*super().diagnostic_values(), ('backend', self.value('backend')))
         if self.output is None:
@@ -164,7 +168,7 @@ class ValveDriver(ManagedNode):
         vents = self.output.watchdog_vents
         return values if vents is None else (*values, ('device_watchdog_vents', vents))
 
-    def start(self):
+    def start(self) -> None:
         """Tick by the clock, and for the PPR also by the command."""
         if self.loop.is_hsv:
             self.add_loop(self.loop.period_s)
@@ -174,19 +178,19 @@ class ValveDriver(ManagedNode):
         self.ear.begin()
         self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
 
-    def due(self, since_last_s):
+    def due(self, since_last_s: float) -> bool:
         """Tell whether a command or the clock asks for a tick (PPR, polled)."""
         self._take_commands()
         return self._commanded or since_last_s >= EARLY_SHARE * self.loop.period_s
 
-    def _take_commands(self):
+    def _take_commands(self) -> None:
         arrived = self.commands.take()
         self.ear.took('pressure_command', arrived)
         taken = [(message, info['publication_sequence_number']) for message, info in arrived]
         if self.raw_commands is not None:
             arrived = self.raw_commands.take()
             self.ear.took('valve_command', arrived)
-            raw = [(message, None) for message, _ in arrived]
+            raw: list[tuple[Any, Any]] = [(message, None) for message, _ in arrived]
             # One sender takes turns on the two topics: they are one sequence by stamp.
             taken = sorted(taken + raw, key=lambda item: item[0].stamp_ns) if raw else taken
         for plain, sequence in taken:
@@ -196,7 +200,7 @@ class ValveDriver(ManagedNode):
                 self.loop.on_command(plain, sequence)
         self._commanded = bool(taken)
 
-    def tick(self):
+    def tick(self) -> None:
         """Take what arrived, decide, send."""
         self._take_commands()
         arrived = self.pressures.take()
@@ -224,7 +228,7 @@ class ValveDriver(ManagedNode):
         self._latencies['pressure'].used(safety.pressure.stamp_ns, now_ns)
         self.diagnostics.update(status.level, status.message, status.values)
 
-    def safe_stop(self, why):
+    def safe_stop(self, why: str) -> None:
         """Send the signal that vents, again if the device refuses it."""
         if self.loop is None:
             return
@@ -235,7 +239,7 @@ class ValveDriver(ManagedNode):
             self.get_logger().error(f'the valve did not take the signal that vents: {problem}')
             self.diagnostics.update(ERROR, f'not vented: {problem}')
 
-    def last_status(self, why):
+    def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status: that it ended, and vented."""
         ended = {'state': 'ended', 'fault': '', 'target_kpa_gauge': 'vent'}
         values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values)
@@ -245,18 +249,18 @@ class ValveDriver(ManagedNode):
         # What a lifecycle manager asked for itself is told in the word it knows.
         return level, message if why == DEACTIVATED else f'{message}, vented', values
 
-    def _answer(self):
+    def _answer(self) -> None:
         """Send the safe signal right after each opening of a second sender."""
         if self.loop.safety.sender_fault and self.ear.listen():
             self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
 
-    def _look_at_graph(self):
+    def _look_at_graph(self) -> None:
         self.loop.set_command_publishers(*max(
             self.ear.publishers(topic, subscription.topic) for topic, subscription in (
                 ('pressure_command', self.commands), ('valve_command', self.raw_commands))
             if subscription))
 
-    def _on_emergency_stop(self, request, response):
+    def _on_emergency_stop(self, request: Any, response: Any) -> Any:
         with self.loops.lock:
             response.success, response.message = self.loop.emergency_stop('service call')
             if self.loops:
@@ -265,13 +269,13 @@ class ValveDriver(ManagedNode):
                 self.safe_stop('emergency stop')
         return response
 
-    def _on_reset(self, request, response):
+    def _on_reset(self, request: Any, response: Any) -> Any:
         with self.loops.lock:
             response.success, response.message = self.loop.reset()
         return response
 
 
-def _warm_up(loop):
+def _warm_up(loop: Any) -> None:
     """Let a spare driver follow for some periods, so that all code is loaded and compiled."""
     for k in range(5):
         now_ns = round(k * loop.period_s * 1e9)
@@ -280,7 +284,7 @@ def _warm_up(loop):
         loop.tick(now_ns)
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(ValveDriver, args)
 

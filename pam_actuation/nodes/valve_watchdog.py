@@ -14,11 +14,13 @@
 
 """The watchdog on ROS: it vents when the valve driver falls silent."""
 
+from collections.abc import Sequence
 import sys
+from typing import Any
 
 from pam_actuation.drivers.watchdog import (
     CONTESTED, machine_load, SignalWatchdog, VENTS, WAITING)
-from pam_actuation.nodes.diagnostics import ERROR, OK, WARN
+from pam_actuation.nodes.diagnostics import ERROR, OK, Values, WARN
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.lockstep import DRIVER
 from pam_actuation.nodes.managed import ManagedNode
@@ -49,9 +51,9 @@ class ValveWatchdog(ManagedNode):
             'timeout_s', 0.05, 'Silence of valve_signal from which it vents [s].', 0.02, 1.0),
     )
 
-    watchdog = None
+    watchdog: Any = None        # a SignalWatchdog, once configured
 
-    def setup(self):
+    def setup(self) -> None:
         """Create the topic, which it hears and, if need be, speaks on."""
         self._told = self.value('valve_type')
         self.watchdog = SignalWatchdog(
@@ -61,12 +63,12 @@ class ValveWatchdog(ManagedNode):
         self.signals = self.add_subscription('valve_signal', writers=True)
         self._name_of = WriterNames(self)
 
-    def start(self):
+    def start(self) -> None:
         """Look at a steady rate."""
         self.add_loop(PERIOD_S)
         self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
 
-    def _listen(self):
+    def _listen(self) -> tuple[int, bool]:
         """Take what was said; return the time after and whether a second sender opens."""
         opens, taken = False, self.signals.take()
         # Only now: what arrived while this node waited for the processor is not from the future.
@@ -77,14 +79,14 @@ class ValveWatchdog(ManagedNode):
             opens |= self.watchdog.on_signal(message, now_ns, writer, name)
         return now_ns, opens
 
-    def _answer(self):
+    def _answer(self) -> None:
         """Send the safe signal right after each opening of a second sender."""
         if self.watchdog.state == CONTESTED:
             now_ns, opens = self._listen()
             if opens:
                 self.send('valve_signal', self.watchdog.safe_signal(now_ns))
 
-    def tick(self):
+    def tick(self) -> None:
         """Take what was said; if the driver is silent or not alone, vent."""
         now_ns, _ = self._listen()
         signal = self.watchdog.tick(now_ns)
@@ -100,13 +102,13 @@ class ValveWatchdog(ManagedNode):
                      'overruled')
         self.diagnostics.update(level, text)
 
-    def diagnostic_values(self):
+    def diagnostic_values(self) -> Values:
         """Add how often it has vented."""
         vents = (('vents', self.watchdog.vents),) if self.watchdog else ()
         return (*super().diagnostic_values(), *vents)
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run(ValveWatchdog, args)
 

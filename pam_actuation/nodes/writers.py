@@ -22,6 +22,7 @@ expected, messages come by rclpy, without a writer.
 
 import ctypes
 from functools import partial
+from typing import Any
 
 import rclpy
 
@@ -64,10 +65,10 @@ class _Subscription(ctypes.Structure):
     _fields_ = [('implementation', ctypes.c_void_p)]
 
 
-def _rcl():
+def _rcl() -> tuple[Any, Any] | None:
     """Return ``librcl``, declared, and the allocator; None where it is not found."""
     try:
-        rcl = ctypes.CDLL('librcl.so')
+        rcl: Any = ctypes.CDLL('librcl.so')
         rcutils = ctypes.CDLL('librcutils.so')
         take = rcl.rcl_take_serialized_message
         rcutils.rcutils_get_default_allocator.restype = _Allocator
@@ -95,12 +96,12 @@ class WriterTake:
 
     """
 
-    def __init__(self, handle, message_type):
+    def __init__(self, handle: Any, message_type: Any) -> None:
         self._by_rclpy = partial(handle.take_message, message_type, True)
         self._info = _Info()
         self._array = _Array()
         found = _rcl()
-        self._rcl = None
+        self._rcl: Any = None
         if found is not None:
             self._rcl, allocator = found
             self._array.allocator = allocator.pointers
@@ -111,7 +112,7 @@ class WriterTake:
             self._identifier = end and ctypes.c_void_p.from_address(end).value
         self._arguments = ctypes.byref(self._array), ctypes.byref(self._info), None
 
-    def __call__(self):
+    def __call__(self) -> Any:
         """
         Return (bytes, info) of the next message, None if there is none.
 
@@ -133,7 +134,7 @@ class WriterTake:
             'reception_sequence_number': None, 'writer': bytes(info.gid.data) if known else None}
 
 
-def gid_of(publisher):
+def gid_of(publisher: Any) -> bytes | None:
     """Return the GID of an rclpy publisher as bytes, None where it cannot be told."""
     found = _rcl()
     if found is None:
