@@ -15,10 +15,10 @@
 """
 Driver law of a proportional pressure regulator (PPR): pressure to volts.
 
-The regulator closes its own pressure loop (static gain ``K_m`` of 100 kPa/V in the
-nominal rig), so the law is its static inverse, clipped to the input range and
-optionally limited in slew. ``ppr_step`` is the compiled form; it shares its
-signature with ``hsv_step`` so that a closed-loop rollout can hold either.
+The regulator closes its own pressure loop, with a static gain ``K_m`` of 100 kPa/V in the nominal
+rig. The law is therefore its static inverse, clipped to the input range and optionally limited in
+slew. ``ppr_step`` is the compiled form; it shares its signature with ``hsv_step`` so that a
+closed-loop rollout can hold either.
 """
 
 from dataclasses import dataclass
@@ -90,11 +90,11 @@ class PprConfig:
     """
     What the law knows of the regulator.
 
-    ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is
-    ``lowest_v``..``highest_v``; ``slew_v_per_s`` limits the change (0 = no limit);
-    ``period_s`` is the time between two steps; ``time_constant_s`` is the regulator's
-    own lag and ``dead_time_s`` its pure delay, used only to judge whether a pressure reading
-    should have moved, and how far it is behind during the slow rise.
+    ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is ``lowest_v``..``highest_v``;
+    ``slew_v_per_s`` limits the change (0 = no limit); ``period_s`` is the time between two steps;
+    ``time_constant_s`` is the lag of the regulator and ``dead_time_s`` its pure delay. They serve
+    only to judge whether a pressure reading should have moved, and how far it is behind during the
+    slow rise.
     """
 
     gain_pa_per_v: float = number(100_000.0, 1e3, 1e7, 'static gain K_m of the regulator')

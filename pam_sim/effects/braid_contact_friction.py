@@ -23,12 +23,11 @@ is that the deformation of the strands gives their contact area and with it the
 friction, without a coefficient measured on the muscle. The derivation and the
 numbers here are our own; the paper's were not at hand.
 
-Threads of length Lf with n turns, N in each direction, cross 2 N^2 n times, and
-the crossings cannot slide, only turn: by 2 d(alpha) = 2 dx / (Lf sin alpha).
-Each thread direction carries half the pressure on the cylinder pi D L; all of it
-is taken to press the crossings, which is the most it can be. Strands of radius R
-crossing at 2 alpha touch in a patch of mean radius a (Hertz, with the modulus E of
-the contact); turning it costs the torque (3 pi / 16) mu (force) a. The virtual
+Threads of length Lf with n turns, N in each direction, cross 2 N^2 n times. The crossings cannot
+slide; they turn by 2 d(alpha) = 2 dx / (Lf sin alpha). Each thread direction carries half the
+pressure on the cylinder pi D L; all of it is taken to press the crossings, which is the most it
+can be. Strands of radius R crossing at 2 alpha touch in a patch of mean radius a (Hertz, with the
+modulus E of the contact). Turning the patch needs the torque (3 pi / 16) mu (force) a. The virtual
 work of all crossings is F_f dx, with D = Lf sin(alpha) / (n pi), L = Lf cos(alpha).
 
 The load of a crossing grows with sin(2 alpha), its effective radius falls with it:

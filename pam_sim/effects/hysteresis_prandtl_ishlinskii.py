@@ -18,16 +18,16 @@ Memory of the pressure: the force map is read behind a sum of plays (Prandtl-Ish
     F = F_map(p_g + sum_j w_j (y_j - p_g), eps)
     y_j = min(max(y_j, p_g - r_j), p_g + r_j),   r_j = rho_j (b + k p_g)
 
-Play operators on the pressure, the usual description of the pressure-length loop
-of a muscle; half widths that grow with pressure make them generalised plays (Al
-Janaideh, Rakheja, Su 2009, Smart Materials and Structures 18).
+Play operators on the pressure are the usual description of the pressure-length loop of a muscle.
+Half widths that grow with pressure make them generalised plays (Al Janaideh, Rakheja, Su 2009,
+Smart Materials and Structures 18).
 
-Maxwell slip is a sum of stop operators on the contraction: it is a force that
-the travel winds up, acts on a muscle moved at constant pressure and damps its
-vibration. Here the plays follow the pressure: at constant pressure the force is
-a function of contraction alone and nothing is dissipated, but the isometric force
-has a loop, which Maxwell slip has not. On a hanging load cycled by pressure both
-give the same kind of loop. Both return to the point where a minor loop began.
+Maxwell slip is a sum of stop operators on the contraction. Its force grows with the travel. It
+acts on a muscle moved at constant pressure and damps its vibration. Here the plays follow the
+pressure. At constant pressure the force is a function of contraction alone and nothing is
+dissipated. But the isometric force has a loop, which Maxwell slip does not have. On a hanging load
+cycled by pressure both give the same kind of loop. Both return to the point where a minor loop
+began.
 """
 
 from collections.abc import Mapping

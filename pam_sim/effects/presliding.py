@@ -18,12 +18,12 @@ Dry friction that bends before it slips, as the effects of this kind share it.
     F_f = F_s (z + tau w dz/dt) / z_s
     dz/dt = v - |v| z / (z_s (1 + e w)),   w = exp(-(v / v_s)^2)
 
-The bristles of LuGre (Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE Trans. Automatic
-Control 40(3)) with their stiffness given by the way z_s: at rest a contact gives way by
-micrometres before it slides, which an encoder sees where plain Coulomb friction holds still.
-Its damping falls with the speed (Olsson 1996, thesis, Lund), or a reversal would overshoot.
-Over the travel dx of a step the equation of z is linear and solved exactly, so that it stays
-stable however short the way.
+These are the bristles of LuGre (Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE Trans.
+Automatic Control 40(3)). The way z_s gives their stiffness. At rest a contact deflects by
+micrometres before it slides. An encoder sees that, while plain Coulomb friction holds still. The
+damping falls with the speed (Olsson 1996, thesis, Lund), or a reversal would overshoot. Over the
+travel dx of a step the equation of z is linear and solved exactly, so that it stays stable however
+short the way.
 """
 
 from collections.abc import Mapping
