@@ -137,7 +137,7 @@ def add_experiment_options(parser: Parser) -> None:
     add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
 
 
-def load_setup(args: argparse.Namespace) -> 'tuple[Experiment, Rig, Any]':
+def load_setup(args: argparse.Namespace) -> 'tuple[Experiment, Any, Any]':
     """
     Return (experiment, rig, controller) that the options name.
 

@@ -15,9 +15,12 @@
 """Thin a trace for a page without hiding its extremes."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pam_sim.annotations import FloatArray
 
 
-def decimate_min_max(x, y, max_points=2400):
+def decimate_min_max(xs: ArrayLike, ys: ArrayLike,
+                     max_points: int = 2400) -> tuple[FloatArray, FloatArray]:
     """
     Keep the smallest and the largest value of every bin, in their order.
 
@@ -26,7 +29,7 @@ def decimate_min_max(x, y, max_points=2400):
 
     Parameters
     ----------
-    x, y : array_like, shape (N,)
+    xs, ys : array_like, shape (N,)
         Abscissa (ascending) and value.
     max_points : int
         Largest number of points returned, at least 4.
@@ -37,28 +40,29 @@ def decimate_min_max(x, y, max_points=2400):
         At most ``max_points`` of the given points, ends included.
 
     """
-    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    x, y = np.asarray(xs, dtype=float), np.asarray(ys, dtype=float)
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if x.size <= max_points:
         return x, y
     bins = max(int(max_points) // 2 - 1, 1)
     edges = np.linspace(0, x.size, bins + 1).astype(int)
-    keep = [0, x.size - 1]
+    kept = [0, x.size - 1]
     for start, stop in zip(edges[:-1], edges[1:]):
         part = y[start:stop]
-        keep += [start + int(np.argmin(part)), start + int(np.argmax(part))]
-    keep = np.unique(keep)
+        kept += [start + int(np.argmin(part)), start + int(np.argmax(part))]
+    keep = np.unique(kept)
     return x[keep], y[keep]
 
 
-def decimate_steps(x, y, max_points=2400):
+def decimate_steps(xs: ArrayLike, ys: ArrayLike,
+                   max_points: int = 2400) -> tuple[FloatArray, FloatArray]:
     """
     Thin a held (zero order) signal: first drop repeats, then as ``decimate_min_max``.
 
     Both ends of every plateau are kept, so that a step stays a step.
     """
-    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    x, y = np.asarray(xs, dtype=float), np.asarray(ys, dtype=float)
     if x.size > 2:
         changed = np.flatnonzero(np.diff(y) != 0.0)
         keep = np.unique(np.concatenate(([0], changed, changed + 1, [x.size - 1])))

@@ -21,11 +21,15 @@ over a page and come from the Okabe-Ito palette, which colour-blind readers can
 tell apart.
 """
 
+from collections.abc import Iterable, Sequence
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+from pam_sim.annotations import FloatArray
 
 ROW_PX = 210                 # height of one row of a stack of plots
 LEGEND_PX = 30               # room above a row for its legend
@@ -35,9 +39,14 @@ DIVERGING = [[0.0, '#2166ac'], [0.25, '#92c5de'], [0.5, '#f7f7f7'], [0.75, '#fdb
              [1.0, '#b35806']]
 
 
-def rounded(values, digits=5):
+Trace = dict[str, Any]      # of plotly
+# Title of an axis, traces; True as third: spikes are cut off.
+Row = tuple[str, list[Trace]] | tuple[str, list[Trace], bool]
+
+
+def rounded(values: ArrayLike, digits: int = 5) -> list[int | float | None]:
     """Return a list of floats with so many significant digits; NaN and infinity become None."""
-    out = []
+    out: list[int | float | None] = []
     for value in np.asarray(values, dtype=float).ravel():
         value = float(value)
         if not math.isfinite(value):
@@ -48,7 +57,8 @@ def rounded(values, digits=5):
     return out
 
 
-def line(x, y, name, role, held=False, dash=None, width=1.6, max_points=2400):
+def line(x: ArrayLike, y: ArrayLike, name: str, role: str, held: bool = False,
+         dash: str | None = None, width: float = 1.6, max_points: int = 2400) -> dict[str, Any]:
     """
     Return one line trace, thinned without losing extremes.
 
@@ -68,17 +78,18 @@ def line(x, y, name, role, held=False, dash=None, width=1.6, max_points=2400):
         Most points kept.
 
     """
-    x, y = (decimate_steps if held else decimate_min_max)(x, y, max_points)
-    style = {'color': f'@{role}', 'width': width}
+    kept_x, kept_y = (decimate_steps if held else decimate_min_max)(x, y, max_points)
+    style: dict[str, Any] = {'color': f'@{role}', 'width': width}
     if held:
         style['shape'] = 'hv'
     if dash:
         style['dash'] = dash
     return {'type': 'scatter', 'mode': 'lines', 'name': name, 'line': style,
-            'x': [round(float(v), 4) for v in x], 'y': rounded(y)}
+            'x': [round(float(v), 4) for v in kept_x], 'y': rounded(kept_y)}
 
 
-def points(x, y, name, role, max_points=700):
+def points(x: Sequence[float] | FloatArray, y: Sequence[float] | FloatArray, name: str,
+           role: str, max_points: int = 700) -> Trace:
     """Return one trace of points, every so-manieth kept; arguments as of :func:`line`."""
     every = max(int(math.ceil(len(x) / max_points)), 1)
     return {'type': 'scatter', 'mode': 'markers', 'name': name,
@@ -86,7 +97,7 @@ def points(x, y, name, role, max_points=700):
             'x': rounded(x[::every]), 'y': rounded(y[::every])}
 
 
-def spikes_aside(traces):
+def spikes_aside(traces: list[dict[str, Any]]) -> tuple[float, float, str] | None:
     """
     Return (low, high, text) of an axis that short spikes do not stretch, None where none do.
 
@@ -107,7 +118,9 @@ def spikes_aside(traces):
         ' and '.join(f'{end:.3g}' for end in outside))
 
 
-def stack(rows, x_title, row_px=ROW_PX):
+def stack(
+        rows: Sequence[Row],
+        x_title: str, row_px: int = ROW_PX) -> dict[str, Any]:
     """
     Return a figure of plots one below the other whose x axes zoom together.
 
@@ -126,10 +139,11 @@ def stack(rows, x_title, row_px=ROW_PX):
     n = len(rows)
     inner = n * (row_px + LEGEND_PX)
     height = inner + BOTTOM_PX
-    layout = {'height': height, 'margin': {'l': 78, 'r': 14, 't': 4, 'b': BOTTOM_PX},
-              'hovermode': 'x'}
-    data = []
-    for k, (title, traces, *robust) in enumerate(rows):
+    layout: dict[str, Any] = {
+        'height': height, 'margin': {'l': 78, 'r': 14, 't': 4, 'b': BOTTOM_PX}, 'hovermode': 'x'}
+    data: list[Trace] = []
+    for k, row in enumerate(rows):
+        title, traces = row[0], row[1]
         suffix = '' if k == 0 else str(k + 1)
         top = 1.0 - (k * (row_px + LEGEND_PX) + LEGEND_PX) / inner
         bottom = max(top - row_px / inner, 0.0)
@@ -141,7 +155,7 @@ def stack(rows, x_title, row_px=ROW_PX):
             layout['xaxis' + suffix]['matches'] = 'x'
         layout['yaxis' + suffix] = {'domain': [bottom, top], 'title': {'text': title},
                                     'anchor': 'x' + suffix}
-        limits = spikes_aside(traces) if any(robust) else None
+        limits = spikes_aside(traces) if len(row) == 3 and row[2] else None
         if limits is not None:
             layout['yaxis' + suffix]['range'] = rounded(limits[:2])
             layout.setdefault('annotations', []).append({
@@ -156,7 +170,9 @@ def stack(rows, x_title, row_px=ROW_PX):
     return {'data': data, 'layout': layout}
 
 
-def bars(categories, groups, x_title, y_title, height=300):
+def bars(categories: Iterable[object],
+         groups: Sequence[tuple[str, ArrayLike, str]], x_title: str,
+         y_title: str, height: int = 300) -> dict[str, Any]:
     """
     Return a grouped bar chart.
 
@@ -183,7 +199,8 @@ def bars(categories, groups, x_title, y_title, height=300):
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
 
 
-def histogram(groups, x_title, y_title, bins=80, height=280):
+def histogram(groups: list[tuple[str, FloatArray, str]], x_title: str, y_title: str,
+              bins: int = 80, height: int = 280) -> dict[str, Any]:
     """
     Return histograms over one common set of bins, counted here to keep the page light.
 
@@ -220,7 +237,8 @@ def histogram(groups, x_title, y_title, bins=80, height=280):
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
 
 
-def heat_maps(maps, x_title, y_title, z_title, limit, height=340):
+def heat_maps(maps: list[tuple[str, FloatArray, FloatArray, FloatArray]], x_title: str,
+              y_title: str, z_title: str, limit: float, height: int = 340) -> dict[str, Any]:
     """
     Return heat maps in one row with one colour scale, symmetric about zero.
 
@@ -239,8 +257,9 @@ def heat_maps(maps, x_title, y_title, z_title, limit, height=340):
     n = len(maps)
     gap = 0.05 if n > 2 else 0.09
     width = (1.0 - gap * (n - 1)) / n
-    layout = {'height': height, 'margin': {'l': 62, 'r': 10, 't': 34, 'b': BOTTOM_PX},
-              'annotations': []}
+    layout: dict[str, Any] = {
+        'height': height, 'margin': {'l': 62, 'r': 10, 't': 34, 'b': BOTTOM_PX},
+        'annotations': []}
     data = []
     for k, (title, x, y, z) in enumerate(maps):
         suffix = '' if k == 0 else str(k + 1)

@@ -26,7 +26,8 @@ from pam_sim.files import check_file, holds
 LONGEST = 100
 
 
-def origin(bags, page, kind='report', model='', certify=None):
+def origin(bags: list[str], page: str, kind: str = 'report', model: str = '',
+           certify: str | None = None) -> str:
     """
     Return the words in the head of a page that tell of what it is.
 
@@ -46,7 +47,7 @@ def origin(bags, page, kind='report', model='', certify=None):
     """
     folder = os.path.dirname(os.path.abspath(page))
 
-    def seen(path):
+    def seen(path: str) -> str:
         return os.path.relpath(path, folder) if os.path.exists(path) else str(path)
 
     words = [f'{kind} of ' + ' and '.join(map(seen, bags))]
@@ -55,16 +56,16 @@ def origin(bags, page, kind='report', model='', certify=None):
     return ', '.join(words)
 
 
-def is_of(page, words):
+def is_of(page: str, words: str) -> bool:
     """Return whether a page is there and its head tells these words of ``origin``."""
     return holds(page, _as_written(words))
 
 
-def _as_written(words):
+def _as_written(words: str) -> str:
     return f'{text(words)}">'
 
 
-def default_page(bags, overwrite=False):
+def default_page(bags: list[str], overwrite: bool = False) -> str:
     """
     Return the path of the page about some bags.
 

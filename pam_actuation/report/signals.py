@@ -14,10 +14,16 @@
 
 """Read the signals of a run for metrics and plots: SI arrays on the experiment's clock."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from pam_sim.annotations import FloatArray
+
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
 
-def stamps_s(run, topic):
+def stamps_s(run: 'Run', topic: str) -> FloatArray | None:
     """Return the stamps of a topic [s since the experiment's start], or None if missing."""
     series_ = run.topics.get(topic)
     if series_ is None or not len(series_.stamp_ns):
@@ -25,7 +31,7 @@ def stamps_s(run, topic):
     return (np.asarray(series_.stamp_ns) - start_ns(run)) * 1e-9
 
 
-def start_ns(run):
+def start_ns(run: 'Run') -> int:
     """Return the first reference stamp, else the first stamp of the valve or any topic."""
     for topic in ('reference', 'joint_reference', 'pressure_command', 'valve_signal'):
         series_ = run.topics.get(topic)
@@ -35,7 +41,7 @@ def start_ns(run):
     return min(first) if first else 0
 
 
-def duration_s(run):
+def duration_s(run: 'Run') -> float:
     """Return the time from the first to the last stamp of all topics [s]."""
     spans = [(int(s.stamp_ns[0]), int(s.stamp_ns[-1]))
              for s in run.topics.values() if len(s.stamp_ns)]
@@ -44,7 +50,8 @@ def duration_s(run):
     return (max(last for _, last in spans) - min(first for first, _ in spans)) * 1e-9
 
 
-def series(run, topic, field=None):
+def series(run: 'Run', topic: str,
+           field: str | None = None) -> tuple[FloatArray, FloatArray] | None:
     """
     Return (time_s, value) of a topic's field, or None if it is not in the run.
 

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import ClassVar, TYPE_CHECKING
+from typing import ClassVar, Self, TYPE_CHECKING
 
 
 @dataclass
@@ -40,7 +40,7 @@ class Primitive:
 
     if TYPE_CHECKING:     # a field of some, calculated by others
         @property
-        def duration_s(self) -> float:
+        def duration_s(self: Self) -> float:
             """Return how long it lasts [s]."""
 
     def at(self, t_s: float) -> tuple[float, float]:

@@ -14,13 +14,19 @@
 
 """Tracking error cycle by cycle, runs side by side."""
 
+from typing import TYPE_CHECKING
+
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section
+
+if TYPE_CHECKING:
+    from pam_actuation.report.metrics import RunMetrics
 
 ROLES = ('after', 'frozen', 'second', 'green', 'command')
 
 
-def cycles(named, key='cycles', title='Tracking error per cycle', remark=''):
+def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
+           title: str = 'Tracking error per cycle', remark: str = '') -> Section | None:
     """
     Return the bar chart of the RMSE of every cycle, or None if no run has cycles.
 
@@ -32,11 +38,11 @@ def cycles(named, key='cycles', title='Tracking error per cycle', remark=''):
         Anchor, heading, and a sentence above the chart.
 
     """
-    named = [(name, m.cycle_rmse_m) for name, m in named if len(m.cycle_rmse_m)]
-    if not named:
+    errors = [(name, m.cycle_rmse_m) for name, m in named if len(m.cycle_rmse_m)]
+    if not errors:
         return None
-    count = max(len(values) for _, values in named)
+    count = max(len(values) for _, values in errors)
     groups = [(name, values * 1e3, ROLES[k % len(ROLES)])
-              for k, (name, values) in enumerate(named)]
+              for k, (name, values) in enumerate(errors)]
     figure = figures.bars(range(1, count + 1), groups, 'cycle', 'tracking RMSE [mm]')
     return Section(key, title, (paragraph(remark) if remark else '') + plot(figure))

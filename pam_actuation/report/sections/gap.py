@@ -14,12 +14,17 @@
 
 """The gap between a recording and a model: verdict, size, place, overlays."""
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_actuation.report.sections.gap_witness import coloured_part, witness_part
 from pam_actuation.report.sections.replay import SHOWN
+
+if TYPE_CHECKING:
+    from pam_sim.gap.result import GapResult, SignalGap
 
 VERDICT_TEXT = {
     'no_gap': 'No gap beyond noise', 'parameter': 'A number of the model is wrong',
@@ -28,8 +33,9 @@ VERDICT_TEXT = {
 EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %
 
 
-def gap_section(result, key='gap', title='Recording against model', remark='',
-                max_points=2000, command='pam run next_experiment.yaml'):
+def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording against model',
+                remark: str = '', max_points: int = 2000,
+                command: str = 'pam run next_experiment.yaml') -> Section:
     """
     Return the section of a gap result.
 
@@ -64,17 +70,17 @@ def gap_section(result, key='gap', title='Recording against model', remark='',
     return Section(key, title, body)
 
 
-def _size(name, s):
+def _size(name: str, s: 'SignalGap') -> list[str | None]:
     factor, _, unit, _ = SHOWN[name]
 
-    def shown(value):
+    def shown(value: float | None) -> str | None:
         return None if value is None else f'{value * factor:.3g} {unit}'
     return [name, shown(s.noise_floor), shown(s.rmse_before), shown(s.rmse_refit),
             shown(s.rmse_after),
             None if s.shrink_percent is None else f'{s.shrink_percent:.0f} %']
 
 
-def _effects(result):
+def _effects(result: 'GapResult') -> str:
     if not result.effects:
         return ''
     rows = []
@@ -93,7 +99,7 @@ def _effects(result):
         f'{100 * result.unexplained_fraction:.1f} % of the squared gap are left unexplained.')
 
 
-def _evidence(result):
+def _evidence(result: 'GapResult') -> str:
     if not result.evidence:
         return ''
     body = '<h3>Evidence against each rival</h3>'
@@ -111,7 +117,7 @@ def _evidence(result):
         'errors block by block; below 3 the data do not tell two names apart.', 'note')
 
 
-def _next(result, command):
+def _next(result: 'GapResult', command: str) -> str:
     if not result.next_experiment:
         return ''
     return '<h3>What to measure next</h3>' + paragraph(
@@ -119,7 +125,7 @@ def _next(result, command):
         'page).')
 
 
-def _where(result):
+def _where(result: 'GapResult') -> str:
     if not result.where:
         return ''
     whole = [w for w in result.where if w.condition == 'all']
@@ -140,7 +146,7 @@ def _where(result):
     return body
 
 
-def _calibration(result):
+def _calibration(result: 'GapResult') -> str:
     if not result.calibration:
         return ''
     wrong = {p.name for p in result.parameters}
@@ -154,9 +160,9 @@ def _calibration(result):
                         'was known before.', 'note') + '</details>')
 
 
-def _overlay(result, max_points):
+def _overlay(result: 'GapResult', max_points: int) -> dict[str, Any]:
     start = min(int(t.stamp_ns[0]) for t in result.traces.values())
-    rows = []
+    rows: list[figures.Row] = []
     for name, trace in result.traces.items():
         factor, offset, unit, label = SHOWN[name]
         time_s = (trace.stamp_ns - start) * 1e-9

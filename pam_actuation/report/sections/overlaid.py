@@ -14,16 +14,24 @@
 
 """Several runs in the same axes, each on the clock of its own experiment."""
 
+from collections.abc import Callable
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.report import figures, signals
 from pam_actuation.report.metrics import tracking_error
 from pam_actuation.report.page import paragraph, plot, Section
+from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
 ROLES = ('measured', 'second', 'green', 'command', 'after')
 _DASHES = (None, 'dash', 'dot')      # once the colours are used up
 
 
-def overlaid(named, key='overlaid', title='Runs laid over each other', max_points=1600):
+def overlaid(named: 'list[tuple[str, Run]]', key: str = 'overlaid',
+             title: str = 'Runs laid over each other', max_points: int = 1600) -> Section | None:
     """
     Return the section that draws all runs into the same plots, None for a single run.
 
@@ -55,30 +63,32 @@ def overlaid(named, key='overlaid', title='Runs laid over each other', max_point
         'Drag to zoom, all rows follow; click a name to hide that run.'))
 
 
-def _lines(named, read, points):
+def _lines(named: 'list[tuple[str, Run]]', read: Callable[..., Any],
+           points: int) -> list[dict[str, Any]]:
     traces = []
     for k, (title, run) in enumerate(named):
         pair = read(run)
         if pair is not None:
+            time_s, value = pair
             traces.append(figures.line(
-                *pair, title, ROLES[k % len(ROLES)], width=1.3, max_points=points,
+                time_s, value, title, ROLES[k % len(ROLES)], width=1.3, max_points=points,
                 dash=_DASHES[k // len(ROLES) % len(_DASHES)]))
     return traces
 
 
-def _topic(topic, factor, offset=0.0):
-    def read(run):
+def _topic(topic: str, factor: float, offset: float = 0.0) -> Callable[..., Any]:
+    def read(run: 'Run') -> tuple[FloatArray, FloatArray] | None:
         pair = signals.series(run, topic)
         return None if pair is None else (pair[0], (pair[1] - offset) * factor)
     return read
 
 
-def _error(run):
+def _error(run: 'Run') -> tuple[FloatArray, FloatArray] | None:
     tracked = tracking_error(run)
     return None if tracked is None else (tracked[0], tracked[1] * 1e3)
 
 
-def _reference(run, points):
+def _reference(run: 'Run', points: int) -> list[dict[str, Any]]:
     pair = signals.series(run, 'reference')
     return [] if pair is None else [figures.line(
         pair[0], pair[1] * 1e3, 'reference', 'reference', dash='dash', width=1.1,

@@ -14,13 +14,20 @@
 
 """Where the numbers of a page come from: bags, rig, controller, versions, seed."""
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.facts import NOT_RECORDED, recorded, recorded_rig_title
 from pam_actuation.report import signals
 from pam_actuation.report.page import Section, table, text
 
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
-def provenance(runs, key='provenance', title='Where this comes from'):
+
+def provenance(runs: 'list[tuple[str, Run]]', key: str = 'provenance',
+               title: str = 'Where this comes from') -> Section:
     """
     Return the section that says which recordings a page shows and how they were made.
 
@@ -32,16 +39,17 @@ def provenance(runs, key='provenance', title='Where this comes from'):
         Anchor and heading.
 
     """
-    fields = [('Recording', lambda run: run.path or 'in memory'),
-              ('Experiment', lambda run: recorded(run.metadata, 'experiment_name')),
-              ('Rig', lambda run: recorded_rig_title(run.metadata)),
-              ('Valve', lambda run: _valve(run)),
-              ('Namespace', lambda run: run.namespace),
-              ('Duration', lambda run: f'{signals.duration_s(run):.1f} s'),
-              ('Planned and reached', lambda run: ending_of(run.metadata).sentence),
-              ('Messages', lambda run: _counts(run)),
-              ('Random seed', lambda run: recorded(run.metadata, 'seed')),
-              ('pam_actuation version', lambda run: recorded(run.metadata, 'software_version'))]
+    fields: list[tuple[str, Callable[[Run], object]]] = [
+        ('Recording', lambda run: run.path or 'in memory'),
+        ('Experiment', lambda run: recorded(run.metadata, 'experiment_name')),
+        ('Rig', lambda run: recorded_rig_title(run.metadata)),
+        ('Valve', lambda run: _valve(run)),
+        ('Namespace', lambda run: run.namespace),
+        ('Duration', lambda run: f'{signals.duration_s(run):.1f} s'),
+        ('Planned and reached', lambda run: ending_of(run.metadata).sentence),
+        ('Messages', lambda run: _counts(run)),
+        ('Random seed', lambda run: recorded(run.metadata, 'seed')),
+        ('pam_actuation version', lambda run: recorded(run.metadata, 'software_version'))]
     if any((run.metadata or {}).get('controller_other_rig') for _, run in runs):
         fields.append(('Controller', lambda run: (run.metadata or {}).get(
             'controller_other_rig', 'made for this rig')))
@@ -56,7 +64,7 @@ def provenance(runs, key='provenance', title='Where this comes from'):
     return Section(key, title, body)
 
 
-def _valve(run):
+def _valve(run: 'Run') -> str:
     """Return the valve as recorded, or as its signal tells."""
     valve = recorded(run.metadata, 'valve')
     if valve != NOT_RECORDED:
@@ -65,5 +73,5 @@ def _valve(run):
     return f'{seen.upper()}, by its signal' if seen else NOT_RECORDED
 
 
-def _counts(run):
+def _counts(run: 'Run') -> str:
     return ', '.join(f'{name} {len(series.stamp_ns)}' for name, series in run.topics.items())

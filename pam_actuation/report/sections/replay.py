@@ -15,6 +15,7 @@
 """Simulated against recorded, and the bit-exact replay of the controller."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -40,8 +41,9 @@ class Overlay:
     simulated: np.ndarray
 
 
-def overlays(signals, key='overlays', title='Simulated against recorded', remark='',
-             max_points=2000):
+def overlays(signals: list[Overlay], key: str = 'overlays',
+             title: str = 'Simulated against recorded', remark: str = '',
+             max_points: int = 2000) -> Section:
     """
     Return the section that lays simulated signals over recorded ones, with residuals.
 
@@ -55,7 +57,8 @@ def overlays(signals, key='overlays', title='Simulated against recorded', remark
         Most points per trace.
 
     """
-    rows, facts = [], []
+    rows: list[figures.Row] = []
+    facts = []
     for one in signals:
         factor, offset, unit, label = SHOWN.get(one.signal, (1.0, 0.0, '', one.signal))
         recorded = (one.recorded + offset) * factor
@@ -77,7 +80,8 @@ def overlays(signals, key='overlays', title='Simulated against recorded', remark
         figures.stack(rows, 'time since the start of the experiment [s]', row_px=170)))
 
 
-def controller_replays(named, key='replay', title='Controller replayed offline'):
+def controller_replays(named: list[tuple[str, SimpleNamespace]], key: str = 'replay',
+                       title: str = 'Controller replayed offline') -> Section:
     """
     Return the table of controller replays.
 

@@ -14,16 +14,22 @@
 
 """The controller's rules before and after learning."""
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.control.sofc.words import ranked
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, text
-from pam_actuation.rules.grids import grids
+from pam_actuation.rules.grids import Grid, grids
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 _MOST_WORDS = 12
 
 
-def rules(before, after, key='rules', title='What the rules learned'):
+def rules(before: 'RuleBase', after: 'RuleBase', key: str = 'rules',
+          title: str = 'What the rules learned') -> Section:
     """
     Return the section of the rule base.
 
@@ -50,7 +56,7 @@ def rules(before, after, key='rules', title='What the rules learned'):
     return Section(key, title, body + _words(after))
 
 
-def _figure(grid):
+def _figure(grid: Grid) -> str:
     """Return the plot of one grid: lines over few columns, else heat maps of one scale."""
     if not (grid.values.any() or grid.before.any()):
         return ''
@@ -63,7 +69,7 @@ def _figure(grid):
     return plot(figures.heat_maps(maps, grid.columns.title, grid.rows.title, 'kPa', limit))
 
 
-def _lines(grid):
+def _lines(grid: Grid) -> dict[str, Any]:
     traces = []
     for c, role in zip(range(len(grid.columns.values)), ('after', 'second')):
         name = grid.columns.labels[c]
@@ -78,7 +84,7 @@ def _lines(grid):
     return figures.stack([('added pressure [kPa]', traces)], grid.rows.title, row_px=280)
 
 
-def _words(after):
+def _words(after: 'RuleBase') -> str:
     spoken = ranked(after)[:_MOST_WORDS]
     if not spoken:
         return ''

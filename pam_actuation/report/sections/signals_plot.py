@@ -14,15 +14,22 @@
 
 """Signals over time: contraction, error, pressure, force and valve, zooming together."""
 
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 
 from pam_actuation.report import figures, signals
 from pam_actuation.report.metrics import force_error, tracking_error
 from pam_actuation.report.page import plot, Section
+from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
 
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
-def time_plots(run, key='signals', title='Signals over time', max_points=2400):
+
+def time_plots(run: 'Run', key: str = 'signals', title: str = 'Signals over time',
+               max_points: int = 2400) -> Section:
     """
     Return the section with all signals of one run.
 
@@ -38,15 +45,15 @@ def time_plots(run, key='signals', title='Signals over time', max_points=2400):
         figure, 'Drag to zoom, all rows follow; double click to go back.'))
 
 
-def _mm(pair):
+def _mm(pair: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
     return pair[0], pair[1] * 1e3
 
 
-def _kpa(pair):
+def _kpa(pair: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
     return pair[0], (pair[1] - P_ATM_PA) * 1e-3
 
 
-def _contraction(run, points):
+def _contraction(run: 'Run', points: int) -> tuple[str, list[dict[str, Any]]] | None:
     traces = []
     reference, measured = signals.series(run, 'reference'), signals.series(run, 'contraction')
     if measured is not None:
@@ -58,18 +65,20 @@ def _contraction(run, points):
     return ('contraction [mm]', traces) if traces else None
 
 
-def _error(run, points):
+def _error(run: 'Run', points: int) -> tuple[str, list[dict[str, Any]]] | None:
     tracked, pulled = tracking_error(run), force_error(run)
     if pulled is not None:
+        time_s, error_n = pulled
         return 'force error [N]', [figures.line(
-            *pulled, 'reference − force', 'residual', width=1.1, max_points=points)]
+            time_s, error_n, 'reference − force', 'residual', width=1.1, max_points=points)]
     if tracked is None:
         return None
+    time_s, error_mm = _mm(tracked)
     return 'tracking error [mm]', [figures.line(
-        *_mm(tracked), 'reference − contraction', 'residual', width=1.1, max_points=points)]
+        time_s, error_mm, 'reference − contraction', 'residual', width=1.1, max_points=points)]
 
 
-def _pressure(run, points):
+def _pressure(run: 'Run', points: int) -> tuple[str, list[dict[str, Any]]] | None:
     traces = []
     for topic, name, role, dash in (('pressure', 'pressure', 'measured', None),
                                     ('pressure_command', 'command', 'command', 'dot')):
@@ -79,7 +88,7 @@ def _pressure(run, points):
     return ('pressure [kPa gauge]', traces) if traces else None
 
 
-def _force(run, points):
+def _force(run: 'Run', points: int) -> tuple[str, list[dict[str, Any]]] | None:
     traces = []
     for topic, name, role, dash in (('force', 'load cell', 'measured', None),
                                     ('external_force', 'external force', 'second', None),
@@ -91,7 +100,7 @@ def _force(run, points):
     return ('force [N]', traces) if traces else None
 
 
-def _valve(run, points):
+def _valve(run: 'Run', points: int) -> tuple[str, list[dict[str, Any]]] | None:
     """Return what went to the valve, and what was asked for where signals were commanded."""
     volts = _both(run, 'ppr_voltage', 'voltage', 'green', 1.0, points)
     if volts:
@@ -101,7 +110,8 @@ def _valve(run, points):
     return ('duty [–], vent downwards', duties) if duties else None
 
 
-def _both(run, field, name, role, sign, points):
+def _both(run: 'Run', field: str, name: str, role: str, sign: float,
+          points: int) -> list[dict[str, Any]]:
     """Return the traces of one signal as sent and, if there are commands, as commanded."""
     traces = []
     for topic, title, colour, dash in (('valve_signal', name, role, None),

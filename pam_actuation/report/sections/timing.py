@@ -14,15 +14,24 @@
 
 """How regular the loops ran."""
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pam_actuation.report import figures, signals
 from pam_actuation.report.page import paragraph, plot, Section, table
 
+if TYPE_CHECKING:
+    from pam_actuation.report.joint_page import JointMetrics
+    from pam_actuation.report.metrics import RunMetrics
+    from pam_sim.run import Run
+
 PLOTTED = (('pressure_command', 'controller', 'after'), ('valve_signal', 'driver', 'second'))
 
 
-def timing(named, key='timing', title='Loop timing'):
+def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
+           key: str = 'timing', title: str = 'Loop timing') -> Section:
     """
     Return the table of periods of every topic and the histogram of the loops.
 

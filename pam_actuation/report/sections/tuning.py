@@ -14,11 +14,17 @@
 
 """What offline tuning changed."""
 
+from typing import Any, TYPE_CHECKING
+
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, table
 
+if TYPE_CHECKING:
+    from pam_actuation.tuning.tune import TuneResult
 
-def tuning_section(result, key='tuning', title='Offline tuning'):
+
+def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
+                   title: str = 'Offline tuning') -> Section:
     """
     Return the section of a tuning result.
 
@@ -53,12 +59,12 @@ def tuning_section(result, key='tuning', title='Offline tuning'):
     return Section(key, title, body)
 
 
-def _words(name):
+def _words(name: str) -> str:
     words = str(name).replace('_', ' ')
     return f'{words[:-3]} [mm]' if words.endswith(' mm') else words
 
 
-def _shown(value):
+def _shown(value: bool | float | str) -> int | str:
     if isinstance(value, bool):
         return 'yes' if value else 'no'
     return f'{value:.5g}' if isinstance(value, float) else value
