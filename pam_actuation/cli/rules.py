@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int | None:
         payload['saved'] = args.save
         shown += f'\n\nrule file: {args.save}'
     if args.html is not None:
-        from pam_actuation.rules.page import page
+        from pam_actuation.report.rules import page
         from pam_sim.files import write_text
         payload['page'] = str(write_text(args.html, page(found, view, args.top)))
         shown += f'\n\npage: {payload["page"]}'

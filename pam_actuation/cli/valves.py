@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int | None:
     """Measure, print both tables, write the page asked for."""
     from pam_actuation.valves.compare import compare, STAGES
     from pam_actuation.valves.energy import power_arguments
-    from pam_actuation.valves.present import as_page, as_text
+    from pam_actuation.report.valves import as_page, as_text
     from pam_actuation.valves.table42 import statements
     from pam_sim import load_rig
     from pam_sim.files import write_text

@@ -19,7 +19,9 @@ import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.inputs import INPUT, write_inputs
+from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
@@ -164,5 +166,8 @@ class CompiledController:
 
     def to_yaml(self) -> str:
         """Return YAML text from which ``load_controller`` builds an identical controller."""
-        from pam_actuation.control.config import controller_to_yaml
         return controller_to_yaml(self)
+
+    def file_entries(self) -> dict[str, object]:
+        """Return what the file of the controller has besides settings and rules."""
+        return {'static_inverse': inverse_to_mapping(self.static_inverse)}

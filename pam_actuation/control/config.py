@@ -36,23 +36,20 @@ import os
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.lqi import LqiController
-
-from pam_actuation.control.lqi_files import lqi_from_tree, lqi_to_mapping
+from pam_actuation.control.controller_text import INDEX_FORMS
+from pam_actuation.control.lqi_files import lqi_from_tree
 from pam_actuation.control.made_for import check_made_for, read_facts
-from pam_actuation.control.modes.files import KEYS as MODE_KEYS, mode_to_mapping, read_mode
-from pam_actuation.control.modes.tracked import FORCE, tracked_by
+from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.wrapped import WrappedLaw
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
-from pam_actuation.control.sofc.persistence import (
-    load_rules, rules_from_mapping, rules_to_mapping)
+from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
 from pam_actuation.control.static_inverse import (
-    inverse_to_mapping, static_inverse, tabulate_static_inverse)
+    static_inverse, tabulate_static_inverse)
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
-from pam_sim.located_yaml import dump_yaml, load_yaml, Located
+from pam_sim.located_yaml import load_yaml, Located
 
 if TYPE_CHECKING:
     from pam_actuation.control.modes.force import ForceMode
@@ -67,7 +64,6 @@ _OWN_KEYS = {
     'sofc': ('static_inverse', 'rules', 'initial_rules'), 'pid': ('static_inverse',),
     'lqi': ('model', 'gains')}
 _ALL_KEYS = _KEYS + _OWN_KEYS['sofc'] + _OWN_KEYS['lqi']
-_INDEX_FORMS = ('linear', 'table')
 
 
 def rig_identity(rig: 'JointRig | Rig') -> str:
@@ -146,8 +142,8 @@ def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Any:
     settings = dict(located.plain()) if located is not None else {}
     where = located.where if located is not None else tree.where
     if kind == 'sofc' and isinstance(settings.get('index_form'), str):
-        form = located.require('index_form', str, choices=_INDEX_FORMS)
-        settings['index_form'] = float(_INDEX_FORMS.index(form))
+        form = located.require('index_form', str, choices=INDEX_FORMS)
+        settings['index_form'] = float(INDEX_FORMS.index(form))
     mode = read_mode(tree, rig)
     identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
     if kind == 'lqi':
@@ -200,29 +196,3 @@ def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',
     if isinstance(rig, JointRig):
         raise InputError(f'{rig.name} is a joint: it has no `static_inverse`', tree.where())
     return tabulate_static_inverse(rig)
-
-
-def controller_to_yaml(controller: Controller,
-                       rules_file: str | os.PathLike[str] | None = None) -> str:
-    """
-    Return YAML text that rebuilds a controller bit for bit, its present rules included.
-
-    A recording keeps this text, so that it can be replayed without rig, preset or rule file.
-    With ``rules_file`` the text names that file, to lie in the same folder, instead.
-    """
-    settings: dict[str, Any] = dict(controller.settings)
-    if 'index_form' in settings:
-        settings['index_form'] = _INDEX_FORMS[int(round(settings['index_form']))]
-    data = {
-        'controller': controller.kind, 'rig': controller.rig_name,
-        **({'made_for': dict(controller.made_for)} if controller.made_for else {}),
-        'settings': settings, **mode_to_mapping(controller)}
-    if isinstance(controller, LqiController):
-        data.update(lqi_to_mapping(controller))
-    elif tracked_by(controller) != FORCE:       # there the surface says it
-        data['static_inverse'] = inverse_to_mapping(controller.static_inverse)
-    if controller.rules is not None and rules_file is not None:
-        data['rules'] = os.path.basename(rules_file)
-    elif controller.rules is not None:
-        data['initial_rules'] = rules_to_mapping(controller.rules)
-    return dump_yaml(data)

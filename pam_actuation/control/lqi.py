@@ -30,7 +30,7 @@ from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack
+from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack, used_numbers
 from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.settings import checked_settings, parameter_record, Setting
 from pam_sim.annotations import FloatArray
@@ -256,3 +256,13 @@ class LqiController(FixedLawController):
         self.model = model
         self.gains = pack(model, checked)
         super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name)
+
+    def file_entries(self) -> dict[str, object]:
+        """Return linear model and gains; an LQI controller has no static inverse."""
+        model = self.model
+        return {
+            'model': {
+                'rate_hz': model.rate_hz, 'delay_ticks': model.delay_ticks,
+                'denominator': list(model.denominator), 'numerator': list(model.numerator),
+                'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa},
+            'gains': self.gains[used_numbers(self.gains)].tolist()}

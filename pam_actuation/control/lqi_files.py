@@ -78,17 +78,6 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
     return controller
 
 
-def lqi_to_mapping(controller: LqiController) -> dict[str, object]:
-    """Return what ``controller_to_yaml`` adds for an LQI controller."""
-    model = controller.model
-    return {
-        'model': {
-            'rate_hz': model.rate_hz, 'delay_ticks': model.delay_ticks,
-            'denominator': list(model.denominator), 'numerator': list(model.numerator),
-            'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa},
-        'gains': controller.gains[used_numbers(controller.gains)].tolist()}
-
-
 def _model(table: Located) -> LinearModel:
     """Return the model of a file."""
     table.check_keys(('delay_ticks', *(name for name, *_ in _NUMBERS + _LISTS)))

@@ -106,7 +106,8 @@ class SofcNode(LearningSwitch, ControllerNode):
         return f'rules saved to {self._path()}'
 
     def _load(self) -> str:
-        rules = type(self.controller.rules).load(self._path(), self.controller.rules)
+        from pam_actuation.control.sofc.persistence import load_rules
+        rules = load_rules(self._path(), self.controller.rules)
         with self.loops.lock:
             self.controller.replace_rules(rules, self._path())
         return f'rules loaded from {self._path()}'

@@ -26,7 +26,7 @@ from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING, TypeVar
 
-from pam_actuation.control.config import controller_to_yaml
+from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.made_for import facts_of
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import ClosedLoop

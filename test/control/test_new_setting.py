@@ -30,7 +30,8 @@ LAWS = {'sofc': 'pam_actuation.control.sofc.settings', 'pid': 'pam_actuation.con
 LOAD = """
 import importlib, json, sys
 from pathlib import Path
-from pam_actuation.control.config import controller_to_yaml, load_controller
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.controller_text import controller_to_yaml
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.records import size_of

@@ -20,8 +20,9 @@ import os
 
 import numpy as np
 from pam_actuation.control.sofc import persistence
-from pam_actuation.control.sofc.persistence import load_rules, rules_to_mapping, save_rules
+from pam_actuation.control.sofc.persistence import load_rules
 from pam_actuation.control.sofc.rule_table import RuleBase
+from pam_actuation.control.sofc.rule_text import rules_to_mapping, save_rules
 from pam_sim.errors import InputError
 import pytest
 from rule_files import signed, spoiled

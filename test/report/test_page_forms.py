@@ -25,9 +25,9 @@ from pam_actuation.models.page import page as models_page
 from pam_actuation.report import figures, svg
 from pam_actuation.report.assets import COLOURS, CSS, SCRIPT
 from pam_actuation.report.page import paragraph, render, Section, table
+from pam_actuation.report.rules import chart
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.rules.grids import Axis, Grid
-from pam_actuation.rules.page import chart
 from pam_sim.catalogue import catalogue
 from pam_sim.gap.result import GapResult
 import pytest

@@ -18,8 +18,8 @@ import json
 import re
 
 import numpy as np
+from pam_actuation.report.rules import page
 from pam_actuation.rules.grids import grids
-from pam_actuation.rules.page import page
 from pam_actuation.rules.source import FoundRules
 from pam_actuation.rules.text import as_text
 from pam_actuation.rules.view import view_of

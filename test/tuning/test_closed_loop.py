@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc.persistence import load_rules
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_sim import load_rig
@@ -60,7 +61,7 @@ def test_learned_rules_stay_good_when_frozen_and_saved(loop, tmp_path):
     learned = loop.run(controller).cycle_rmse_m()
     controller.rules.save(tmp_path / 'rules.json')
     fresh = controller_of(loop)
-    fresh.replace_rules(type(fresh.rules).load(tmp_path / 'rules.json', fresh.rules))
+    fresh.replace_rules(load_rules(tmp_path / 'rules.json', fresh.rules))
     frozen = loop.run(fresh, learn=False).cycle_rmse_m()
     assert frozen[-1] < 0.5 * learned[0]
 

@@ -20,11 +20,11 @@ import math
 
 import numpy as np
 from pam_actuation.cli.main import main
+from pam_actuation.report.valves import as_text
 from pam_actuation.valves import measure
 from pam_actuation.valves.chain import Bench
 from pam_actuation.valves.compare import CHAINS, compare
 from pam_actuation.valves.energy import power_values, supplied_kg
-from pam_actuation.valves.present import as_text
 from pam_actuation.valves.table42 import number_rows, statements
 from pam_sim import load_rig
 from pam_sim.errors import InputError

@@ -14,11 +14,11 @@
 
 """The mode of a controller file: which there are, what they add to the file."""
 
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-from pam_actuation.control.modes.force import force_to_mapping, ForceMode
-from pam_actuation.control.modes.joint import joint_to_mapping, JointMode
-from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED, tracked_by
+from pam_actuation.control.modes.force import ForceMode
+from pam_actuation.control.modes.joint import JointMode
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
@@ -86,13 +86,3 @@ def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | Join
         raise InputError(
             f'`mode: joint` needs a joint; {rig.name} is a single muscle', tree.where('mode'))
     return JointMode(tree, rig)
-
-
-def mode_to_mapping(controller: Any) -> dict[str, Any]:
-    """Return what the mode of a controller adds to its file, as plain data."""
-    tracked = tracked_by(controller)
-    if tracked == FORCE:
-        return {'mode': FORCE.mode, **force_to_mapping(controller)}
-    if tracked == JOINT:
-        return {'mode': JOINT.mode, **joint_to_mapping(controller)}
-    return {}

@@ -266,6 +266,12 @@ class ForceController(WrappedLaw):
         self._state.contraction_m[...] = self._state.ahead_m[...] = self.contraction_m
         self._error_n = math.nan
 
+    def file_entries(self) -> dict[str, object]:
+        """Return what ``ForceMode`` reads; the surface says the static inverse."""
+        return {'mode': FORCE.mode, 'force': {
+            'stiffness_n_per_m': self.stiffness_n_per_m, 'contraction_m': self.contraction_m,
+            'surface': surface_to_mapping(self.surface)}}
+
 
 class ForceMode:
     """What a controller file says of force mode, and how a law is made to fit it."""
@@ -327,11 +333,3 @@ class ForceMode:
     def wrap(self, law: CompiledController) -> ForceController:
         """Return the law in this mode."""
         return ForceController(law, self.surface, self.stiffness_n_per_m, self.contraction_m)
-
-
-def force_to_mapping(controller: ForceController) -> dict[str, object]:
-    """Return what ``ForceMode`` reads, as plain data."""
-    return {'force': {
-        'stiffness_n_per_m': controller.stiffness_n_per_m,
-        'contraction_m': controller.contraction_m,
-        'surface': surface_to_mapping(controller.surface)}}

@@ -31,6 +31,7 @@ from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
+from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
@@ -320,6 +321,11 @@ class JointController(WrappedLaw):
         self._commands[:] = P_ATM_PA
         self._error_rad = math.nan
 
+    def file_entries(self) -> dict[str, object]:
+        """Return what ``JointMode`` reads, and the static inverse."""
+        return {'mode': JOINT.mode, 'joint': {key: getattr(self, key) for key in KEYS},
+                'static_inverse': inverse_to_mapping(self.static_inverse)}
+
 
 def limits_gauge_pa(settings: Mapping[str, float]) -> tuple[float, float]:
     """Return the lowest and highest gauge pressure [Pa] of a law's settings."""
@@ -396,8 +402,3 @@ class JointMode:
                 self._joint, P_ATM_PA + controller.co_contraction_gauge_pa, P_ATM_PA + lowest,
                 P_ATM_PA + highest)
         return controller
-
-
-def joint_to_mapping(controller: JointController) -> dict[str, object]:
-    """Return what ``JointMode`` reads, as plain data."""
-    return {'joint': {key: getattr(controller, key) for key in KEYS}}

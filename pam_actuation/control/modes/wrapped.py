@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.modes.tracked import Tracked
 from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_actuation.control.static_inverse import static_inverse
@@ -123,7 +124,10 @@ class WrappedLaw:
         self.law.reset()
         self.pause()
 
+    def file_entries(self) -> dict[str, object]:
+        """Return what the file of the controller has besides settings and rules."""
+        raise NotImplementedError
+
     def to_yaml(self) -> str:
         """Return YAML text from which ``load_controller`` builds an identical controller."""
-        from pam_actuation.control.config import controller_to_yaml
         return controller_to_yaml(self)

@@ -21,7 +21,6 @@ fired. A sha256 covers all of that in canonical form. Nothing of a file is used 
 has been checked.
 """
 
-import hashlib
 import json
 import math
 import os
@@ -31,12 +30,12 @@ import numpy as np
 from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
+from pam_actuation.control.sofc.rule_text import ARRAYS, digest_of, SCHEMA
 from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.files import refuse_pipe, write_text
+from pam_sim.files import refuse_pipe
 
-SCHEMA = 2
 VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
@@ -44,25 +43,7 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
     'feedback': (2, SET_COUNT, SET_COUNT),
     'feedforward': (2, 'reference_knots'),
     'motion': ('motion_position_knots', 'motion_rate_knots')}
-_ARRAYS = tuple(
-    name + suffix for suffix in ('', '_initial', '_fired') for name in RuleBase.NAMES)
-_KEYS = ('schema', 'shape', 'scaling', *_ARRAYS, 'sha256')
-
-
-def _digest(content: dict[str, Any]) -> str:
-    """Return the sha256 of the canonical JSON text of a mapping."""
-    text = json.dumps(content, sort_keys=True, separators=(',', ':'))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def rules_to_mapping(rules: RuleBase) -> dict[str, Any]:
-    """Return a rule base as a mapping of plain numbers and lists, checksum included."""
-    content = {
-        'schema': SCHEMA,
-        'shape': {name: list(getattr(rules, name).shape) for name in RuleBase.NAMES},
-        'scaling': dict(rules.scaling)}
-    content.update({name: getattr(rules, name).tolist() for name in _ARRAYS})
-    return {**content, 'sha256': _digest(content)}
+_KEYS = ('schema', 'shape', 'scaling', *ARRAYS, 'sha256')
 
 
 def rules_from_mapping(mapping: dict[str, Any], where: str,
@@ -89,7 +70,7 @@ def rules_from_mapping(mapping: dict[str, Any], where: str,
     _check_whole(mapping, where)
     scaling = _checked_scaling(mapping['scaling'], where)
     rules = RuleBase(scaling=scaling, **{
-        name: _checked_array(mapping, name, scaling, where) for name in _ARRAYS})
+        name: _checked_array(mapping, name, scaling, where) for name in ARRAYS})
     for table in rules.tables():
         for kind in ('values', 'initial'):
             worst = float(np.max(np.abs(getattr(table, kind))))
@@ -117,7 +98,7 @@ def _check_whole(mapping: dict[str, Any], where: str) -> None:
     if foreign:
         raise InputError(f'rule file has the unknown entries {", ".join(foreign[:5])}', where)
     try:
-        digest = _digest({name: mapping[name] for name in mapping if name != 'sha256'})
+        digest = digest_of({name: mapping[name] for name in mapping if name != 'sha256'})
     except (TypeError, ValueError, RecursionError):
         raise InputError('rule file holds what is no number, text, list or mapping',
                          where) from None
@@ -242,24 +223,6 @@ def _stated(value: object) -> str:
     if value is None:
         return 'not stated'
     return f'{value:.10g}' if isinstance(value, float) else str(value)
-
-
-def save_rules(rules: RuleBase, path: str | os.PathLike[str]) -> None:
-    """
-    Write a rule base to a file: temporary file, flushed to disk, then renamed over.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written, or the rules hold values that are not finite; what stood
-        in the file before is still there.
-
-    """
-    spoiled = [name for name in _ARRAYS if not np.all(np.isfinite(getattr(rules, name)))]
-    if spoiled:
-        raise InputError(
-            f'rules are not saved: {spoiled[0]} holds values that are not finite', str(path))
-    write_text(path, json.dumps(rules_to_mapping(rules), indent=1) + '\n', parents=False)
 
 
 def load_rules(path: str | os.PathLike[str], expected: RuleBase | None = None) -> RuleBase:

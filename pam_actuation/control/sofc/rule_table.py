@@ -36,6 +36,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from pam_actuation.control.sofc.membership import (
     SET_COUNT, SET_WORDS, signed_logarithmic_knots)
+from pam_actuation.control.sofc.rule_text import NAMES, save_rules
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.short_repr import short_repr
@@ -157,7 +158,7 @@ class RuleBase:
 
     """
 
-    NAMES = ('feedback', 'feedforward', 'motion')
+    NAMES = NAMES
 
     feedback: FloatArray
     feedforward: FloatArray
@@ -254,12 +255,5 @@ class RuleBase:
             self.feedforward.shape[1])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the rules to a file atomically; see ``persistence.save_rules``."""
-        from pam_actuation.control.sofc.persistence import save_rules
+        """Write the rules to a file, whole or not at all; see ``rule_text.save_rules``."""
         save_rules(self, path)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str], expected: 'RuleBase | None' = None) -> 'RuleBase':
-        """Return the rules of a file, refused whole if they do not fit ``expected``."""
-        from pam_actuation.control.sofc.persistence import load_rules
-        return load_rules(path, expected)
