@@ -33,9 +33,9 @@ import subprocess
 import sys
 import time
 
-from pam_actuation.nodes.transport import prepare_middleware, RANGE, unprepared
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_with_parent
+from pam_actuation.transport import prepare_middleware, RANGE, unprepared
 from tqdm import tqdm
 
 LISTENERS = 3

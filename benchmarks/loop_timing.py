@@ -41,10 +41,10 @@ import time
 from pam_actuation.nodes.loops import LoopSet
 from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import Latency, LoopTiming
-from pam_actuation.nodes.transport import unprepared
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT
 from pam_actuation.rigging.processes import end_with_parent
+from pam_actuation.transport import unprepared
 from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
 
 ALLOWED_MISSED = 0.001

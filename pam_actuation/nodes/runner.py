@@ -34,7 +34,7 @@ from pam_actuation import interrupts
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.transport import prepare_middleware
+from pam_actuation.transport import prepare_middleware
 from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import ExternalShutdownException

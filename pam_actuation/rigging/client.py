@@ -20,9 +20,9 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from pam_actuation.nodes import qos
-from pam_actuation.nodes.transport import prepare_middleware, RANGE
 from pam_actuation.topics.codec import Reader
+from pam_actuation.topics.quality import USUAL
+from pam_actuation.transport import prepare_middleware, RANGE
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -81,8 +81,9 @@ class RigClient:
         self.statuses = {}
         self.changes = []
         self._read = Reader('diagnostics')
+        # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
         self.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, qos.CONSUMER, raw=True)
+            DiagnosticArray, '/diagnostics', self._on_diagnostics, USUAL.consumer.depth, raw=True)
 
     def _on_diagnostics(self, raw):
         for status in self._read(raw) or ():

@@ -24,7 +24,7 @@ import sys
 import time
 from typing import Any
 
-from pam_actuation.nodes.transport import prepare_middleware
+from pam_actuation.transport import prepare_middleware
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None

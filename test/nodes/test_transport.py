@@ -19,10 +19,10 @@ from pathlib import Path
 import subprocess
 import sys
 
-from pam_actuation.nodes.transport import LOCALHOST_ONLY, LOOPBACK, NETWORK, prepare_middleware
-from pam_actuation.nodes.transport import PROFILES, RANGE, TRANSPORTS, unprepared
 from pam_actuation.rigging.processes import node_environment
 from pam_actuation.topics.table import TOPICS
+from pam_actuation.transport import LOCALHOST_ONLY, LOOPBACK, NETWORK, prepare_middleware
+from pam_actuation.transport import PROFILES, RANGE, TRANSPORTS, unprepared
 import pytest
 
 LOCAL = {RANGE: 'LOCALHOST'}
