@@ -31,6 +31,8 @@ ROW = """
         limits={'temperature_k': (250.0, 400.0)}),
 )
 """
+# A copy would be compiled anew, and no number of this test depends on machine code.
+INTERPRETED = {'NUMBA_DISABLE_JIT': '1'}
 COPIED = ('pam_actuation', 'pam_sim', 'config', 'msg_docs', 'package.xml')
 # What becomes of messages of the new topic, the last of them out of the limits.
 RECORD = """
@@ -106,7 +108,8 @@ def house(tmp_path_factory):
 
 def run(house, *arguments, **options):
     """Run Python in the copy; return what it printed."""
-    environment = {**os.environ, 'PYTHONPATH': str(house), **options.pop('environment', {})}
+    environment = {**os.environ, **INTERPRETED, 'PYTHONPATH': str(house),
+                   **options.pop('environment', {})}
     done = subprocess.run(
         [sys.executable, *map(str, arguments)], cwd=house, env=environment, capture_output=True,
         text=True, timeout=300.0)
@@ -138,6 +141,7 @@ def test_it_is_documented(house):
 
 
 @pytest.mark.ros
+@pytest.mark.shared
 def test_a_recorder_takes_it_and_says_so(house, tmp_path):
     pytest.importorskip('rclpy')
     from pam_actuation.bags.info import bag_info
@@ -146,7 +150,8 @@ def test_a_recorder_takes_it_and_says_so(house, tmp_path):
     shown = run(house, '-m', 'pam_actuation.cli.main', 'nodes', 'experiment_recorder')
     assert '| takes | `muscle_temperature` | `sensor_msgs/msg/Temperature` |' in shown
     lock = DomainLock()
-    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONPATH': str(house)}
+    environment = {
+        **node_environment(lock.domain_id, tmp_path), **INTERPRETED, 'PYTHONPATH': str(house)}
     recorder = subprocess.Popen(
         [sys.executable, '-m', 'pam_actuation.nodes.experiment_recorder', '--ros-args', '-r',
          '__ns:=/muscle', '-p', f'output:={tmp_path / "bag"}'], env=environment, cwd=house)
