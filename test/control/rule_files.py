@@ -18,7 +18,7 @@ import copy
 import json
 
 import numpy as np
-from pam_actuation.control.sofc import persistence
+from pam_actuation.control.sofc.rule_text import digest_of
 
 # Values that have no business where a number, a list or a text is expected.
 ODD = (None, True, '', 'x', [], {}, [[]], [1, [2]], -1, 1e400, float('nan'), 10**400, 1e-320,
@@ -28,7 +28,7 @@ ODD = (None, True, '', 'x', [], {}, [[]], [1, [2]], -1, 1e400, float('nan'), 10*
 def signed(mapping):
     """Return a mapping with the checksum that fits its content."""
     content = {name: value for name, value in mapping.items() if name != 'sha256'}
-    return {**content, 'sha256': persistence._digest(content)}
+    return {**content, 'sha256': digest_of(content)}
 
 
 def _places(node, path=()):
