@@ -21,9 +21,12 @@ A short offline tuning, the gap to the nominal model and one page follow. Every 
 ``pam`` verbs do, called in a row.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import os
+from pathlib import Path
 import time
+from typing import Any
 
 import joblib
 from pam_actuation.bags.check import independent_readers
@@ -33,15 +36,18 @@ from pam_actuation.bags.place import check_bag_target
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.parallel import in_processes
-from pam_actuation.replay.controller import replay_controller
+from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.report.demo_page import demo_report, DemoPart
 from pam_actuation.report.gap import FILES, free_run_overlay, write_gap
 from pam_actuation.rigging.session import run_experiment
-from pam_actuation.tuning.tune import tune
+from pam_actuation.tuning.tune import tune, TuneResult
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.files import check_folder, make_folder
+from pam_sim.files import check_folder, make_folder, StrPath
+from pam_sim.gap import GapResult
+from pam_sim.run import Run
 
+Progress = Callable[[float], None]      # takes the share that is done, 0 to 1
 RIG = 'dmsp_5_300_realistic'
 NOMINAL = 'dmsp_5_300_hanging_mass'
 SEED = 1
@@ -61,7 +67,7 @@ TEXT_HSV = (
     'controller sees the same interface.')
 
 
-def check_place(folder):
+def check_place(folder: StrPath) -> None:
     """Look whether the demo can write into a folder; InputError where not, or over a file."""
     check_folder(folder, ('report.html', 'tuned.yaml'), overwrite=False)
     check_folder(os.path.join(folder, 'gap'), FILES, overwrite=False)
@@ -75,17 +81,17 @@ class DemoResult:
 
     folder: str
     page: str = ''
-    bags: dict = field(default_factory=dict)
-    numbers: dict = field(default_factory=dict)
-    findings: list = field(default_factory=list)
+    bags: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, dict[str, Any]] = field(default_factory=dict)
+    findings: list[str] = field(default_factory=list)
     wall_s: float = 0.0
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
         return {'folder': self.folder, 'page': self.page, 'bags': self.bags,
                 'numbers': self.numbers, 'findings': self.findings, 'wall_s': self.wall_s}
 
-    def text(self):
+    def text(self) -> str:
         """Return the result for people."""
         lines = [f'done in {self.wall_s:.0f} s']
         for title, facts in self.numbers.items():
@@ -116,16 +122,21 @@ class Demo:
 
     """
 
-    def __init__(self, folder, progress=lambda share, what: None, quick=False):
+    def __init__(self, folder: StrPath,
+                 progress: Callable[[float, str], object] = lambda share, what: None,
+                 quick: bool = False) -> None:
         self.result = DemoResult(folder=os.path.abspath(folder))
         self._progress = progress
         self._long, self._short = ('short_sine', 'short_sine') if quick else (
             'sine_quarter_hz', 'sine_quarter_hz_short')
         self._gap_search_s = QUICK_GAP_SEARCH_S if quick else GAP_SEARCH_S
-        self._runs, self._replays, self._checks = {}, {}, []
-        self._tuning = self._gap = None
+        self._runs: dict[str, Run] = {}
+        self._replays: dict[str, ReplayResult] = {}
+        self._checks: list[list[str]] = []
+        self._tuning: TuneResult | None = None
+        self._gap: GapResult | None = None
 
-    def run(self):
+    def run(self) -> DemoResult:
         """Run all steps and return the DemoResult."""
         started = time.perf_counter()
         make_folder(self.result.folder)
@@ -133,7 +144,8 @@ class Demo:
         total = sum(seconds for seconds, _, _ in steps)
         done = 0.0
         for seconds, what, step in steps:
-            def inner(share, done=done, seconds=seconds, what=what):
+            def inner(share: float, done: float = done, seconds: float = seconds,
+                      what: str = what) -> None:
                 self._progress((done + seconds * share) / total, what)
             inner(0.0)
             step(inner)
@@ -142,7 +154,7 @@ class Demo:
         self.result.wall_s = time.perf_counter() - started
         return self.result
 
-    def _steps(self):
+    def _steps(self) -> list[tuple[float, str, Callable[[Progress], object]]]:
         """Return (expected seconds, name, function) of each step."""
         return [
             (52, 'PPR, learning', lambda p: self._live('ppr_learning', self._long, True, p)),
@@ -155,7 +167,7 @@ class Demo:
             (3, 'writing the page', self._write_page),
         ]
 
-    def _live(self, name, experiment, learning, progress):
+    def _live(self, name: str, experiment: str, learning: bool, progress: Progress) -> None:
         """Run one experiment on live nodes and load its bag."""
         valve = name.split('_')[0]
         result = run_experiment(
@@ -174,7 +186,7 @@ class Demo:
         self.result.findings += [f'{TITLES[name]}: {text}' for text in result.findings]
         self._runs[name] = load_run(result.bag)
 
-    def _check(self, progress):
+    def _check(self, progress: Progress) -> None:
         """Open every bag with readers this project did not write, and count."""
         bags = self.result.bags
         read_by_others = in_processes(2, (
@@ -190,7 +202,7 @@ class Demo:
                 if not same:
                     self.result.findings.append(f'{name}: {reader} reads other counts')
 
-    def _replay(self, progress):
+    def _replay(self, progress: Progress) -> None:
         """Replay every recorded controller."""
         for name, run in self._runs.items():
             self._replays[name] = replay_controller(run)
@@ -198,7 +210,7 @@ class Demo:
                 self.result.findings.append(
                     f'{TITLES[name]}: {self._replays[name].sentence()}')
 
-    def _tune(self, progress):
+    def _tune(self, progress: Progress) -> None:
         """Tune an untuned controller on the recorded rig and experiment, for a few seconds."""
         metadata = self._runs['ppr_learning'].metadata
         rig = load_rig(metadata['rig'])
@@ -206,15 +218,15 @@ class Demo:
             rig, load_controller('sofc_untuned', rig), load_experiment(self._short),
             budget=TUNING_ROLLOUTS, seed=SEED,
             progress=lambda done: progress(done / TUNING_ROLLOUTS))
-        self._tuning.save(os.path.join(self.result.folder, 'tuned.yaml'))
+        self._tuning.save(Path(self.result.folder, 'tuned.yaml'))
 
-    def _look_at_gap(self, progress):
+    def _look_at_gap(self, progress: Progress) -> None:
         """Hold the recording against the nominal model."""
         self._gap = write_gap(
             [self._runs['ppr_learning']], NOMINAL, os.path.join(self.result.folder, 'gap'),
             seconds=self._gap_search_s, progress=progress)
 
-    def _write_page(self, progress):
+    def _write_page(self, progress: Progress) -> None:
         """Put everything on one page."""
         runs, replays = self._runs, self._replays
         ppr = [(TITLES[name], runs[name]) for name in ('ppr_learning', 'ppr_frozen')]

@@ -20,24 +20,32 @@ Write what ``pam characterise`` found: table, numbers, the chapter's figures, a 
 """
 
 import base64
+from collections.abc import Mapping
 import csv
 import io
 import json
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from pam_actuation.report import figures, svg
 from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
-from pam_sim.files import whole_files, write_text
+from pam_sim.files import StrPath, whole_files, write_text
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from pam_sim.characterise.characterise import Characterisation
+    from pam_sim.characterise.holds import Hold
+    from pam_sim.characterise.surfaces import Surfaces
 
 ISOBARS = 6                 # pressures in the figure of force against contraction
 HOLD_COLUMNS = ('load_n', 'load_u_n', 'branch', 'pressure_pa', 'pressure_u_pa',
                 'contraction_m', 'contraction_u_m', 'drift_m')
 
 
-def force_figure(surfaces):
+def force_figure(surfaces: 'Surfaces') -> str:
     """Return Figure 4.2 as SVG: force against % contraction, one curve per pressure."""
     law = surfaces.law()
     top = surfaces.pressure_gauge_pa[-1]
@@ -58,7 +66,7 @@ def force_figure(surfaces):
                           'Force against contraction for several pressures')
 
 
-def pressure_figure(surfaces):
+def pressure_figure(surfaces: 'Surfaces') -> str | None:
     """Return Figure 4.6 as SVG: pressure over loading and mass of air; None without a mass."""
     if surfaces.air_mass_kg is None:
         return None
@@ -69,7 +77,7 @@ def pressure_figure(surfaces):
         'Pressure over loading and mass of air')
 
 
-def contraction_figure(surfaces):
+def contraction_figure(surfaces: 'Surfaces') -> str:
     """Return Figure 4.7 as SVG: % contraction over pressure and loading."""
     load, pressure = np.meshgrid(surfaces.load_n, 1e-3 * surfaces.pressure_gauge_pa)
     return svg.surface_chart(
@@ -91,7 +99,7 @@ FILES = ('characterise.json', 'report.html', 'holds.csv', 'lookup.csv',
          *(f'{name}.svg' for name in FIGURES))
 
 
-def save_characterisation(result, out_dir):
+def save_characterisation(result: 'Characterisation', out_dir: StrPath) -> dict[str, str]:
     """
     Write the folder of a result; return {name: path} of what was written.
 
@@ -102,8 +110,8 @@ def save_characterisation(result, out_dir):
 
     """
     out = Path(out_dir)
-    pictures = {name: draw(result.surfaces) for name, draw in FIGURES.items()}
-    pictures = {name: text for name, text in pictures.items() if text is not None}
+    pictures = {name: text for name, draw in FIGURES.items()
+                if (text := draw(result.surfaces)) is not None}
     texts = {'characterise.json': json.dumps(document(result), allow_nan=False) + '\n',
              'report.html': _page(result, pictures)}
     texts.update({f'{name}.svg': text for name, text in pictures.items()})
@@ -117,7 +125,7 @@ def save_characterisation(result, out_dir):
         return {path.name: str(out / path.name) for path in folder.iterdir()}
 
 
-def summary(result):
+def summary(result: 'Characterisation') -> dict[str, Any]:
     """Return the short result for programs, plain data."""
     surfaces = result.surfaces
     half = surfaces.half_distance[np.isfinite(surfaces.half_distance)]
@@ -139,7 +147,7 @@ def summary(result):
         'remarks': result.remarks}
 
 
-def document(result):
+def document(result: 'Characterisation') -> dict[str, Any]:
     """Return everything as plain data: surfaces, uncertainties, holds, losses, summary."""
     s = result.surfaces
     return {
@@ -161,23 +169,23 @@ def document(result):
                   for one in result.loads]}
 
 
-def _plain(values):
+def _plain(values: 'ArrayLike | None') -> list[Any] | None:
     """Return nested lists of six significant digits; what is not finite becomes None."""
     if values is None:
         return None
-    values = np.asarray(values, dtype=float)
-    if values.ndim > 1:
-        return [_plain(row) for row in values]
-    return [float(f'{value:.6g}') if np.isfinite(value) else None for value in values]
+    array = np.asarray(values, dtype=float)
+    if array.ndim > 1:
+        return [_plain(row) for row in array]
+    return [float(f'{value:.6g}') if np.isfinite(value) else None for value in array]
 
 
-def _hold(hold):
+def _hold(hold: 'Hold') -> dict[str, Any]:
     data = {name: getattr(hold, name) for name in hold.__dataclass_fields__}
     return {name: None if isinstance(value, float) and not np.isfinite(value) else value
             for name, value in data.items()}
 
 
-def holds_csv(result):
+def holds_csv(result: 'Characterisation') -> str:
     """Return the settled holds as a table that ``pam characterise`` reads again."""
     stream = io.StringIO()
     for line in result.provenance:
@@ -192,7 +200,7 @@ def holds_csv(result):
     return stream.getvalue()
 
 
-def _page(result, pictures):
+def _page(result: 'Characterisation', pictures: Mapping[str, str]) -> str:
     """Return the page: figures, uncertainty, loads, provenance."""
     s, short = result.surfaces, summary(result)
     numbers = [
@@ -222,14 +230,14 @@ def _page(result, pictures):
                   'mean curve.', sections, numbers, FOOTER)
 
 
-def _picture(text, caption):
+def _picture(text: str, caption: str) -> str:
     """Return a figure whose image is in the page, in its colours, with its caption."""
     data = base64.b64encode(svg.as_image(text).encode('utf-8')).decode('ascii')
     return (f'<figure><img src="data:image/svg+xml;base64,{data}" '
             f'alt="{caption}"><figcaption>{caption}</figcaption></figure>')
 
 
-def _uncertainty(s):
+def _uncertainty(s: 'Surfaces') -> str:
     """Return the plots of uncertainty and branch distance over pressure, and the parts."""
     rms = table(['part', 'rms over the grid [% contraction]'], [
         [name, f'{100 * np.sqrt(np.mean(part ** 2)):.4f}'] for name, part in s.parts.items()])

@@ -14,9 +14,11 @@
 
 """The page of the demo: several experiments, tuning and the gap together."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TYPE_CHECKING
 
-from pam_actuation.report.metrics import run_metrics
+from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import (
     paragraph, render, Section, signed, table)
 from pam_actuation.report.pages import FOOTER, muscle_volume, summary
@@ -24,12 +26,21 @@ from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
 from pam_actuation.report.sections.provenance import provenance
-from pam_actuation.report.sections.replay import controller_replays, overlays
+from pam_actuation.report.sections.replay import controller_replays, Overlay, overlays
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.sections.tuning import tuning_section
-from pam_sim.files import write_text
+from pam_sim.files import StrPath, write_text
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
+    from pam_actuation.replay.controller import ReplayResult
+    from pam_actuation.tuning.tune import TuneResult
+    from pam_sim.gap import GapResult
+    from pam_sim.run import Run
+
+Number = tuple[str, str, str, str]      # key number on top of a page: value, what, remark, mood
 
 LEAD = ('A pneumatic muscle lifts a mass along a sine while a self-organizing fuzzy controller '
         'rewrites its own rules. Every part of the rig ran as its own process and talked over '
@@ -59,14 +70,18 @@ class DemoPart:
 
     title: str
     text: str
-    runs: list
-    rules_before: object = None
-    rules_after: object = None
-    overlay: list = field(default_factory=list)
-    replays: list = field(default_factory=list)
+    runs: 'list[tuple[str, Run]]'
+    rules_before: 'RuleBase | None' = None
+    rules_after: 'RuleBase | None' = None
+    overlay: list[Overlay] = field(default_factory=list)
+    replays: 'list[tuple[str, ReplayResult]]' = field(default_factory=list)
 
 
-def demo_report(out_path, parts, tuning=None, gap=None, checks=None, notes=()):
+def demo_report(out_path: StrPath, parts: Sequence[DemoPart],
+                tuning: 'TuneResult | dict[str, Any] | None' = None,
+                gap: 'GapResult | None' = None,
+                checks: Sequence[Sequence[str]] | None = None,
+                notes: Iterable[str] = ()) -> dict[str, dict[str, Any]]:
     """
     Write the page of the demo.
 
@@ -91,8 +106,10 @@ def demo_report(out_path, parts, tuning=None, gap=None, checks=None, notes=()):
         Main numbers of every run by title, plain data, SI.
 
     """
-    sections, numbers, facts = [], [], {}
-    everything = []
+    sections: list[Section | None] = []
+    numbers: list[Number] = []
+    facts: dict[str, dict[str, Any]] = {}
+    everything: list[tuple[str, Run]] = []
     for index, part in enumerate(parts):
         measured = [(title, run, run_metrics(run, volume_m3=muscle_volume(run)))
                     for title, run in part.runs]
@@ -119,15 +136,17 @@ def demo_report(out_path, parts, tuning=None, gap=None, checks=None, notes=()):
     return facts
 
 
-def _part(index, part, measured):
+def _part(index: int, part: DemoPart, measured: 'Sequence[tuple[str, Run, RunMetrics]]'
+          ) -> list[Section | None]:
     """Return the sections of one experiment."""
     tag = f'part{index + 1}'
     named = [(title, m) for title, _, m in measured]
-    sections = [Section(tag, part.title, paragraph(part.text), group=True),
-                cycles(named, f'{tag}-cycles', remark=cycle_sentence(named)),
-                metrics(named, f'{tag}-metrics'),
-                time_plots(part.runs[0][1], f'{tag}-signals',
-                           f'Signals over time: {part.runs[0][0]}', POINTS)]
+    sections: list[Section | None] = [
+        Section(tag, part.title, paragraph(part.text), group=True),
+        cycles(named, f'{tag}-cycles', remark=cycle_sentence(named)),
+        metrics(named, f'{tag}-metrics'),
+        time_plots(part.runs[0][1], f'{tag}-signals',
+                   f'Signals over time: {part.runs[0][0]}', POINTS)]
     if part.rules_after is not None:
         sections.append(rules(part.rules_before, part.rules_after, f'{tag}-rules'))
     if part.overlay:
@@ -141,7 +160,7 @@ def _part(index, part, measured):
     return sections
 
 
-def _after_the_run(tuning, gap):
+def _after_the_run(tuning: object, gap: object) -> Section:
     said = []
     if tuning is not None:
         said.append('the controller was tuned on the model of the rig')
@@ -153,7 +172,7 @@ def _after_the_run(tuning, gap):
         group=True)
 
 
-def cycle_sentence(named):
+def cycle_sentence(named: Sequence[tuple[str, RunMetrics]]) -> str:
     """Return one sentence on first and last cycle of every (title, RunMetrics)."""
     parts = []
     for title, m in named:
@@ -169,7 +188,7 @@ def cycle_sentence(named):
     return '; '.join(parts) + '.' if parts else ''
 
 
-def part_numbers(named):
+def part_numbers(named: Sequence[tuple[str, RunMetrics]]) -> list[Number]:
     """Return the key numbers of (title, RunMetrics) pairs: RMSE of first and last cycle."""
     numbers = []
     for title, m in named:
@@ -184,7 +203,7 @@ def part_numbers(named):
     return numbers
 
 
-def gap_numbers(gap):
+def gap_numbers(gap: 'GapResult') -> list[Number]:
     """Return the key number of a gap look: contraction, the signal people ask for first."""
     one = gap.signals.get('contraction')
     if one is None:

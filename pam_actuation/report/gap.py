@@ -19,11 +19,13 @@ Run the gap workflow on loaded bags and write its folder.
 not at all.
 """
 
+from collections.abc import Sequence
 import json
 import os
 from pathlib import Path
 import shlex
 import tempfile
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -40,7 +42,7 @@ from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
-from pam_sim.files import check_folder, whole_files, write_text
+from pam_sim.files import check_folder, StrPath, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, recorded_valve
 from pam_sim.gap.data.recording import Recording
@@ -48,12 +50,17 @@ from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
+if TYPE_CHECKING:
+    from pam_sim.gap import GapResult
+    from pam_sim.run import Run
+
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
 
-def write_gap(runs, model, out_dir, certify=None, of='', **options):
+def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
+              certify: 'Run | None' = None, of: str = '', **options: Any) -> 'GapResult':
     """
     Find the gap between recordings and a model and write the result folder.
 
@@ -95,7 +102,7 @@ def write_gap(runs, model, out_dir, certify=None, of='', **options):
     return result
 
 
-def model_for(run, model):
+def model_for(run: 'Run', model: 'StrPath | Rig') -> Rig:
     """Return the rig of a model, with the recorded valve if the model is a preset."""
     if isinstance(model, Rig):
         return model
@@ -103,7 +110,7 @@ def model_for(run, model):
     return load_rig(model, valve=(recorded_valve(run) or None) if named else None)
 
 
-def save_gap(result, run, out_dir, of=''):
+def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') -> None:
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
@@ -113,7 +120,7 @@ def save_gap(result, run, out_dir, of=''):
         _save_into(folder, result, run, of)
 
 
-def _save_into(out_dir, result, run, of):
+def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
     write_text(out_dir / 'gap.json',
                json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
     write_text(out_dir / 'model.yaml', result.model_yaml)
@@ -128,16 +135,16 @@ def _save_into(out_dir, result, run, of):
          provenance([('recording', run)])], footer=FOOTER, of=of))
 
 
-def next_command(result, path):
+def next_command(result: 'GapResult', path: StrPath) -> str:
     """Return the command that runs the next experiment on the rig that was recorded."""
     return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
 
 
-def write_compare(result, namespace, path):
+def write_compare(result: 'GapResult', namespace: str, path: StrPath) -> None:
     """Write measured and simulated signals and their residuals as one MCAP file."""
     path = Path(path)
     prefix = '/' + namespace.strip('/') if namespace.strip('/') else ''
-    rows = []
+    rows: list[tuple[int, str, str, float]] = []
     for signal, trace in result.traces.items():
         curves = (trace.measured, trace.before, trace.refit, trace.after,
                   trace.measured - trace.before, trace.measured - trace.after)
@@ -156,7 +163,7 @@ def write_compare(result, namespace, path):
         os.replace(bag.file, path)
 
 
-def free_run_overlay(run, rig):
+def free_run_overlay(run: 'Run', rig: Rig) -> list[Overlay]:
     """
     Return the Overlays of a model's free run on a recording; [] if it cannot be compared.
 

@@ -82,7 +82,7 @@ def joint_metrics(run: Run) -> JointMetrics:
     error, cycles = angle_error(run), metrics.find_cycles(run)
     pressures = [pair for side in SIDES
                  if (pair := signals.series(run, f'{side}/pressure')) is not None]
-    of_cycles = np.empty(0)
+    of_cycles: FloatArray = np.empty(0)
     if error is not None and cycles is not None:
         start_s, period_s, count = cycles
         of_cycles = metrics.split_rmse(*error, period_s, start_s, count)

@@ -20,14 +20,25 @@ they need. They return None if a topic is missing, so a page can leave a cell em
 failing.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
+from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 from pam_sim.units import RHO_REFERENCE
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+    from pam_sim.run import Run
+
+Signal = tuple[FloatArray, FloatArray]          # time [s], values
+Cycles = tuple[float, float, int]               # start [s], period [s], count
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
 STEP_WITHIN_S = 0.03
@@ -68,27 +79,27 @@ class RunMetrics:
     rmse_m: float | None
     max_error_m: float | None
     mean_error_m: float | None
-    cycle_rmse_m: np.ndarray
-    steps: tuple
+    cycle_rmse_m: FloatArray
+    steps: tuple[StepResponse, ...]
     saturation_low: float | None
     saturation_high: float | None
     air_use_kg: float | None
-    timing: tuple
-    interruptions: tuple | None = None
+    timing: tuple[LoopTiming, ...]
+    interruptions: tuple[int, float] | None = None
     air_fed_kg: float | None = None
     rmse_n: float | None = None
     max_error_n: float | None = None
-    cycle_rmse_n: np.ndarray = field(default_factory=lambda: np.empty(0))
+    cycle_rmse_n: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
-def rmse(error):
+def rmse(error: ArrayLike) -> float | None:
     """Return the root mean square of the finite values, or None if there is none."""
-    error = np.asarray(error, dtype=float)
-    error = error[np.isfinite(error)]
-    return float(np.sqrt(np.mean(error ** 2))) if error.size else None
+    values = np.asarray(error, dtype=float)
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values ** 2))) if values.size else None
 
 
-def tracking_error(run):
+def tracking_error(run: 'Run') -> Signal | None:
     """
     Return (time_s, error_m) with error = reference - contraction, or None.
 
@@ -100,12 +111,12 @@ def tracking_error(run):
                       signals.series(run, 'contraction'))
 
 
-def force_error(run):
+def force_error(run: 'Run') -> Signal | None:
     """Return (time_s, error_n) with error = wanted - measured force, or None."""
     return difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
 
 
-def difference(reference, measured):
+def difference(reference: Signal | None, measured: Signal | None) -> Signal | None:
     """Return (time_s, reference - measured) where both exist, or None."""
     if reference is None or measured is None or len(reference[0]) < 2:
         return None
@@ -116,7 +127,8 @@ def difference(reference, measured):
     return tx[inside], np.interp(tx[inside], tr, r) - x[inside]
 
 
-def split_rmse(time_s, error, period_s, start_s, count=None):
+def split_rmse(time_s: ArrayLike, error: ArrayLike, period_s: float, start_s: float,
+               count: int | None = None) -> FloatArray:
     """
     Return the RMSE of every complete period from start_s on, as an array.
 
@@ -130,22 +142,23 @@ def split_rmse(time_s, error, period_s, start_s, count=None):
         Number of cycles; by default as many as are complete.
 
     """
-    time_s, error = np.asarray(time_s, dtype=float), np.asarray(error, dtype=float)
-    if time_s.size < 2 or period_s <= 0.0:
+    time, errors = np.asarray(time_s, dtype=float), np.asarray(error, dtype=float)
+    if time.size < 2 or period_s <= 0.0:
         return np.empty(0)
     # The last sample lies up to one sample before the end of the last cycle.
-    complete = int(np.floor((time_s[-1] - start_s) / period_s + 0.02))
+    complete = int(np.floor((time[-1] - start_s) / period_s + 0.02))
     complete = max(complete if count is None else min(complete, int(count)), 0)
     values = []
     for k in range(complete):
-        inside = ((time_s >= start_s + k * period_s)
-                  & (time_s < start_s + (k + 1) * period_s))
-        value = rmse(error[inside])
+        inside = ((time >= start_s + k * period_s)
+                  & (time < start_s + (k + 1) * period_s))
+        value = rmse(errors[inside])
         values.append(np.nan if value is None else value)
     return np.array(values)
 
 
-def cycle_rmse(run, period_s, start_s, count=None):
+def cycle_rmse(run: 'Run', period_s: float, start_s: float, count: int | None = None
+               ) -> FloatArray:
     """Return the tracking RMSE [m] of each cycle of a run; empty if nothing is tracked."""
     tracked = tracking_error(run)
     if tracked is None:
@@ -153,7 +166,7 @@ def cycle_rmse(run, period_s, start_s, count=None):
     return split_rmse(*tracked, period_s, start_s, count)
 
 
-def find_cycles(run):
+def find_cycles(run: 'Run') -> Cycles | None:
     """
     Return (start_s, period_s, count) of the run's repeating reference, or None.
 
@@ -172,27 +185,27 @@ def find_cycles(run):
     return None if reference is None else cycles_of_signal(*reference)
 
 
-def cycles_of_signal(time_s, value):
+def cycles_of_signal(time_s: ArrayLike, value: ArrayLike) -> Cycles | None:
     """Return (start_s, period_s, count) of an evenly repeating signal, or None."""
-    time_s, value = np.asarray(time_s, dtype=float), np.asarray(value, dtype=float)
-    if value.size < 8 or np.ptp(value) <= 0.0:
+    time, values = np.asarray(time_s, dtype=float), np.asarray(value, dtype=float)
+    if values.size < 8 or np.ptp(values) <= 0.0:
         return None
-    centred = value - 0.5 * (value.max() + value.min())
+    centred = values - 0.5 * (values.max() + values.min())
     rising = np.flatnonzero((centred[:-1] < 0.0) & (centred[1:] >= 0.0))
     if rising.size < 3:
         return None
     share = -centred[rising] / (centred[rising + 1] - centred[rising])
-    crossing = time_s[rising] + share * (time_s[rising + 1] - time_s[rising])
+    crossing = time[rising] + share * (time[rising + 1] - time[rising])
     gaps = np.diff(crossing)
     period = float(np.median(gaps))
     even = np.abs(gaps - period) < 0.03 * period
     if even.sum() < 2 or even.sum() < 0.8 * even.size:
         return None
     start = float(crossing[np.flatnonzero(even)[0]])
-    return start, period, int((time_s[-1] - start) / period + 0.02)
+    return start, period, int((time[-1] - start) / period + 0.02)
 
 
-def step_responses(run):
+def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
     """
     Return a StepResponse for every step of the reference.
 
@@ -200,7 +213,7 @@ def step_responses(run):
     until the next step or the end; ``settling_s`` is None if it never does.
     """
     reference, tracked = signals.series(run, 'reference'), tracking_error(run)
-    if tracked is None:
+    if reference is None or tracked is None:
         return ()
     tr, r = reference
     te, error = tracked
@@ -225,7 +238,8 @@ def step_responses(run):
     return tuple(found)
 
 
-def _step_response(time_s, error, start_s, size_m):
+def _step_response(time_s: FloatArray, error: FloatArray, start_s: float, size_m: float
+                   ) -> StepResponse:
     if not time_s.size:
         return StepResponse(start_s, size_m, None, 0.0)
     band = max(SETTLING_BAND * abs(size_m), SETTLING_BAND_MIN_M)
@@ -239,7 +253,7 @@ def _step_response(time_s, error, start_s, size_m):
         start_s, size_m, float(time_s[outside[-1] + 1] - start_s), overshoot)
 
 
-def saturation_share(run, high_v=6.0):
+def saturation_share(run: 'Run', high_v: float = 6.0) -> tuple[float | None, float] | None:
     """
     Return (low, high): share of valve messages at the lower / upper limit, or None.
 
@@ -247,8 +261,8 @@ def saturation_share(run, high_v=6.0):
     meaning there (both shut is the wanted rest state) and is None.
     """
     duty = signals.series(run, 'valve_signal', 'fill_duty')
-    if duty is not None:
-        vent = signals.series(run, 'valve_signal', 'vent_duty')
+    vent = signals.series(run, 'valve_signal', 'vent_duty')
+    if duty is not None and vent is not None:
         full = (duty[1] >= 0.999) | (vent[1] >= 0.999)
         return None, float(np.mean(full))
     volts = signals.series(run, 'valve_signal', 'ppr_voltage')
@@ -257,7 +271,7 @@ def saturation_share(run, high_v=6.0):
     return float(np.mean(volts[1] <= 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
 
 
-def interruptions(run):
+def interruptions(run: 'Run') -> tuple[int, float] | None:
     """
     Return (count, seconds) of stretches in which the controller vented for want of input.
 
@@ -276,7 +290,7 @@ def interruptions(run):
     return int(begins.size), float(np.sum(np.diff(time_s)[vented[:-1]]))
 
 
-def loop_timing(run, topic):
+def loop_timing(run: 'Run', topic: str) -> LoopTiming | None:
     """Return the LoopTiming of a topic's header stamps, or None with under 3 messages."""
     stamps = signals.stamps_s(run, topic)
     if stamps is None or stamps.size < 3:
@@ -289,7 +303,9 @@ def loop_timing(run, topic):
         float(np.mean(periods > 1.5 * median)))
 
 
-def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
+def air_use(pressure_pa: ArrayLike, contraction_m: ArrayLike,
+            volume_m3: Callable[[FloatArray], FloatArray], temperature_k: float = 293.15
+            ) -> float:
     """
     Return the air [kg] filled in over a record, by mass balance of the muscle.
 
@@ -322,7 +338,8 @@ def air_use(pressure_pa, contraction_m, volume_m3, temperature_k=293.15):
     return float(used)
 
 
-def air_fed(run, conductance_m3_per_s_pa, critical_ratio, supply_pa):
+def air_fed(run: 'Run', conductance_m3_per_s_pa: float, critical_ratio: float,
+            supply_pa: float) -> float | None:
     """
     Return the air [kg] that flowed through the fill valve of an HSV pair, None without one.
 
@@ -356,7 +373,9 @@ def air_fed(run, conductance_m3_per_s_pa, critical_ratio, supply_pa):
     return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(time_s)))
 
 
-def run_metrics(run, cycles=None, volume_m3=None, rig=None):
+def run_metrics(run: 'Run', cycles: Cycles | None = None,
+                volume_m3: Callable[[FloatArray], FloatArray] | None = None,
+                rig: 'Rig | None' = None) -> RunMetrics:
     """
     Return the RunMetrics of a run.
 

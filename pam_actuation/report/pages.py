@@ -14,9 +14,12 @@
 
 """The page about one experiment or several runs of it."""
 
+from collections.abc import Callable, Sequence
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 from pam_actuation.bags.ending import early_sentences
-from pam_actuation.report.metrics import run_metrics
+from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
@@ -29,13 +32,22 @@ from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.files import write_text
+from pam_sim.files import StrPath, write_text
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
+    from pam_actuation.replay.controller import ReplayResult
+    from pam_actuation.report.sections.replay import Overlay
+    from pam_sim.annotations import FloatArray
+    from pam_sim.gap import GapResult
+    from pam_sim.rig import Rig
+    from pam_sim.run import Run
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
 
 
-def recorded_rig(run):
+def recorded_rig(run: 'Run') -> 'Rig | None':
     """Return the rig in a run's metadata, or None."""
     content = (run.metadata or {}).get('rig')
     if not content:
@@ -46,7 +58,7 @@ def recorded_rig(run):
         return None
 
 
-def muscle_volume(run):
+def muscle_volume(run: 'Run') -> 'Callable[[FloatArray], FloatArray] | None':
     """Return the volume function [m^3 over m] of the rig in a run's metadata, or None."""
     rig = recorded_rig(run)
     if rig is None:
@@ -55,8 +67,14 @@ def muscle_volume(run):
         np.clip(contraction_m, 0.0, rig.muscle.stroke_m))
 
 
-def experiment_report(runs, out_path, titles=None, rules_before=None, rules_after=None,
-                      overlay=None, replays=None, gap=None, page_title=None, of=''):
+def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
+                      titles: Sequence[str] | None = None,
+                      rules_before: 'RuleBase | None' = None,
+                      rules_after: 'RuleBase | None' = None,
+                      overlay: 'list[Overlay] | None' = None,
+                      replays: 'list[tuple[str, ReplayResult]] | None' = None,
+                      gap: 'GapResult | None' = None, page_title: str | None = None,
+                      of: str = '') -> dict[str, dict[str, Any]]:
     """
     Write the HTML page of one or several runs.
 
@@ -121,13 +139,13 @@ def experiment_report(runs, out_path, titles=None, rules_before=None, rules_afte
     return {title: summary(m) for title, m in named}
 
 
-def _early(runs):
+def _early(runs: 'Sequence[Run]') -> Section | None:
     """Return the section that warns of runs that stopped early, None without any."""
     found = early_sentences(runs)
     return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None
 
 
-def _implausible(runs):
+def _implausible(runs: 'Sequence[tuple[str, Run]]') -> Section | None:
     """Return the section on values that cannot be right, None where there are none."""
     found = [(title, sentence) for title, run in runs
              for sentence in getattr(run, 'implausible', ())]
@@ -138,9 +156,9 @@ def _implausible(runs):
             ['recording', 'what was read'], found))
 
 
-def default_titles(runs):
+def default_titles(runs: 'Sequence[Run]') -> list[str]:
     """Return a short distinct name of every run, from path or experiment."""
-    names = []
+    names: list[str] = []
     for k, run in enumerate(runs):
         name = str(run.path).rstrip('/').rsplit('/', 1)[-1] or (
             run.metadata or {}).get('experiment_name') or f'run {k + 1}'
@@ -148,7 +166,7 @@ def default_titles(runs):
     return names
 
 
-def run_numbers(named):
+def run_numbers(named: Sequence[tuple[str, RunMetrics]]) -> list[tuple[str, str, str, str]]:
     """Return the key numbers on top of a page for (title, RunMetrics) pairs."""
     numbers = []
     for title, m in named[:4]:
@@ -169,7 +187,7 @@ def run_numbers(named):
     return numbers
 
 
-def summary(m):
+def summary(m: RunMetrics) -> dict[str, Any]:
     """Return the main numbers of a RunMetrics as plain data, SI."""
     return {'duration_s': m.duration_s, 'tracking_rmse_m': m.rmse_m,
             'max_error_m': m.max_error_m,
@@ -184,7 +202,8 @@ def summary(m):
             'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
 
 
-def bag_report(runs, out_path, titles=None, of=''):
+def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] | None = None,
+               of: str = '') -> dict[str, dict[str, Any]]:
     """
     Write the page of some bags; as ``experiment_report``, and return the main numbers.
 

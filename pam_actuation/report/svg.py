@@ -20,12 +20,18 @@ work without a script. matplotlib draws them; it is imported with the first figu
 takes a while.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import io
 import re
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.report.assets import COLOURS
+from pam_sim.annotations import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SIZE_IN = (7.5, 5.0)
 MESHES = (32, 20)           # at most along a surface's rows and columns: files stay small
@@ -52,12 +58,13 @@ class Curve:
     """
 
     name: str
-    x: np.ndarray
-    y: np.ndarray
-    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    x: FloatArray
+    y: FloatArray
+    points: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
-def line_chart(curves, x_title, y_title, title, legend_share=0.16):
+def line_chart(curves: Sequence[Curve], x_title: str, y_title: str, title: str,
+               legend_share: float = 0.16) -> str:
     """
     Return the SVG text of curves over two axes, each named in a legend.
 
@@ -71,7 +78,7 @@ def line_chart(curves, x_title, y_title, title, legend_share=0.16):
         Share of the width that the legend takes.
 
     """
-    def draw(figure):
+    def draw(figure: 'Figure') -> None:
         from matplotlib import colormaps
         axes = figure.add_subplot(xlabel=x_title, ylabel=y_title)
         for k, curve in enumerate(curves):
@@ -91,7 +98,7 @@ def line_chart(curves, x_title, y_title, title, legend_share=0.16):
     return _svg(draw, title)
 
 
-def _limits(arrays, room):
+def _limits(arrays: Sequence[FloatArray], room: float) -> tuple[float, float]:
     """Return the ends of an axis from zero over all values, with room beyond them."""
     lowest = min(float(np.min(array)) for array in arrays)
     highest = max(float(np.max(array)) for array in arrays)
@@ -108,13 +115,13 @@ class HeatMap:
     """
 
     name: str
-    x_labels: tuple
-    y_labels: tuple
-    values: np.ndarray
-    dotted: np.ndarray
+    x_labels: tuple[str, ...]
+    y_labels: tuple[str, ...]
+    values: FloatArray
+    dotted: BoolArray
 
 
-def heat_map_chart(maps, titles, title):
+def heat_map_chart(maps: Sequence[HeatMap], titles: tuple[str, str, str], title: str) -> str:
     """
     Return the SVG text of maps side by side in one scale of colours, white at zero.
 
@@ -128,7 +135,7 @@ def heat_map_chart(maps, titles, title):
         What the picture shows.
 
     """
-    def draw(figure):
+    def draw(figure: 'Figure') -> None:
         from matplotlib.colors import LinearSegmentedColormap
         figure.set_layout_engine('constrained')
         limit = max([float(np.max(np.abs(one.values))) for one in maps] + [1e-9])
@@ -156,7 +163,8 @@ def heat_map_chart(maps, titles, title):
     return _svg(draw, title, (5.0 * len(maps), 4.6))
 
 
-def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
+def surface_chart(x: FloatArray, y: FloatArray, z: FloatArray, titles: tuple[str, str, str],
+                  title: str, turn_deg: float = -125.0, tilt_deg: float = 24.0) -> str:
     """
     Return the SVG text of a surface over three axes, coloured by height.
 
@@ -173,9 +181,10 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
         Where the eye stands: about the upright axis, and above the floor.
 
     """
-    def draw(figure):
-        axes = figure.add_axes((0.0, 0.03, 1.0, 1.0), projection='3d', azim=turn_deg,
-                               elev=tilt_deg, proj_type='ortho')
+    def draw(figure: 'Figure') -> None:
+        # An Axes3D, as the projection says.
+        axes: Any = figure.add_axes((0.0, 0.03, 1.0, 1.0), projection='3d', azim=turn_deg,
+                                    elev=tilt_deg, proj_type='ortho')
         axes.set_box_aspect((4.0, 4.0, 3.0), zoom=1.0)
         surface = axes.plot_surface(x, y, z, rcount=MESHES[0], ccount=MESHES[1], cmap='viridis',
                                     edgecolor=(0.0, 0.0, 0.0, 0.3), linewidth=0.3)
@@ -190,7 +199,7 @@ def surface_chart(x, y, z, titles, title, turn_deg=-125.0, tilt_deg=24.0):
     return _svg(draw, title)
 
 
-def in_page(picture):
+def in_page(picture: str) -> str:
     """
     Return a figure of this module as an element of a page, in the colours of the page.
 
@@ -212,7 +221,7 @@ def in_page(picture):
         r'stroke: \1; stroke: color-mix(in srgb, \1 var(--pure), white)', picture)
 
 
-def as_image(picture):
+def as_image(picture: str) -> str:
     """
     Return a figure of this module as a file that is an image in a page.
 
@@ -223,7 +232,8 @@ def as_image(picture):
     return f'{picture[:end]}<style>{COLOURS}</style>{picture[end:]}'
 
 
-def _svg(draw, title, size_in=SIZE_IN):
+def _svg(draw: 'Callable[[Figure], None]', title: str,
+         size_in: tuple[float, float] = SIZE_IN) -> str:
     """Return what a function draws on an empty figure as SVG text."""
     from matplotlib import style
     from matplotlib.figure import Figure

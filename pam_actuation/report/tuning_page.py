@@ -14,6 +14,9 @@
 
 """The page of a tuning: what was searched, what came out, how the recordings judge it."""
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
@@ -21,8 +24,15 @@ from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.tuning import tuning_section
 from pam_actuation.tuning.problem import rebuild
-from pam_sim.files import write_text
+from pam_sim.files import StrPath, write_text
 from pam_sim.rig_text import rig_title
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_actuation.tuning.recording import RecordingCheck
+    from pam_actuation.tuning.tune import TuneResult
+    from pam_sim.rig import Rig
+    from pam_sim.run import Run
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '
@@ -30,7 +40,9 @@ LEAD = ('Settings and initial rules of the controller were searched on a model, 
         'error, in mm.')
 
 
-def tuning_report(out_path, result, recordings, rig, experiments, runs):
+def tuning_report(out_path: StrPath, result: 'TuneResult',
+                  recordings: 'Sequence[RecordingCheck]', rig: 'Rig',
+                  experiments: 'Sequence[Experiment]', runs: 'Sequence[Run]') -> None:
     """
     Write the page of a tuning.
 
@@ -50,18 +62,20 @@ def tuning_report(out_path, result, recordings, rig, experiments, runs):
         The bags, may be empty.
 
     """
+    start, problem = result.start, result.problem
+    assert start is not None and problem is not None      # a result of ``tune`` has both
     sections = [tuning_section(result), _tracking(result)]
     if recordings:
         sections.append(_recordings(recordings))
     after = result.controller.rules
     if after is not None:
-        untaught = rebuild(result.start, result.controller.settings).rules
+        untaught = rebuild(start, result.controller.settings).rules
         sections.append(rules(untaught, after, title='The initial rules'))
     sections.append(Section('setup', 'Set-up', table([], [
         ['model', rig_title(rig)], ['valve', rig.valve.upper()],
         ['controller', result.controller.kind],
         ['experiments', ', '.join(one.name for one in experiments)],
-        ['closed loops of the search', len(result.problem.loops)]], 'facts')))
+        ['closed loops of the search', len(problem.loops)]], 'facts')))
     if runs:
         sections.append(provenance([(str(run.path), run) for run in runs]))
     numbers = [
@@ -72,11 +86,13 @@ def tuning_report(out_path, result, recordings, rig, experiments, runs):
     write_text(out_path, render('pam_actuation: offline tuning', LEAD, sections, numbers, FOOTER))
 
 
-def _tracking(result):
+def _tracking(result: 'TuneResult') -> Section:
     """Return the section with the error on one held-out run, before and after."""
-    loop = result.check.loops[0]
+    check, start = result.check, result.start
+    assert check is not None and start is not None        # a result of ``tune`` has both
+    loop = check.loops[0]
     lines = []
-    for name, controller, role in (('before', result.start, 'before'),
+    for name, controller, role in (('before', start, 'before'),
                                    ('after', result.controller, 'after')):
         run = loop.run(rebuild(controller, {}))
         lines.append(figures.line(run.time_s, run.error_m * 1e3, name, role))
@@ -86,7 +102,7 @@ def _tracking(result):
             figures.stack([('reference [mm]', [wanted]), ('error [mm]', lines)], 'time [s]')))
 
 
-def _recordings(recordings):
+def _recordings(recordings: 'Sequence[RecordingCheck]') -> Section:
     body = ''
     for one in recordings:
         body += ''.join(paragraph(text) for text in one.lines())

@@ -14,8 +14,10 @@
 
 """The session's own ROS node: lifecycle requests out, diagnostics in."""
 
+from collections.abc import Callable, Iterable, Sequence
 import os
 import time
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
@@ -36,7 +38,7 @@ TRANSITIONS = {
 }
 
 
-def local_context(domain_id, arguments=()):
+def local_context(domain_id: int, arguments: Sequence[str] = ()) -> rclpy.Context:
     """Return an open rclpy context in a ROS domain, looking at this machine only."""
     context = rclpy.Context()
     before = os.environ.get(RANGE)
@@ -71,21 +73,21 @@ class RigClient:
 
     """
 
-    def __init__(self, domain_id):
+    def __init__(self, domain_id: int) -> None:
         context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
         self.node = Node(NAME, context=context, use_global_arguments=False, enable_rosout=False,
                          start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self.node.context)
         self._executor.add_node(self.node)
-        self._clients = {}
-        self.statuses = {}
-        self.changes = []
+        self._clients: dict[str, Any] = {}
+        self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
+        self.changes: list[tuple[float, str, int, str]] = []
         self._read = Reader('diagnostics')
         # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
         self.node.create_subscription(
             DiagnosticArray, '/diagnostics', self._on_diagnostics, USUAL.consumer.depth, raw=True)
 
-    def _on_diagnostics(self, raw):
+    def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():
             known = self.statuses.get(status.name)
             if known is None or known[:2] != (status.level, status.message):
@@ -93,7 +95,7 @@ class RigClient:
                     (time.monotonic(), status.name, status.level, status.message))
             self.statuses[status.name] = (status.level, status.message, dict(status.values))
 
-    def spin(self, duration_s):
+    def spin(self, duration_s: float) -> None:
         """Handle messages for a while."""
         deadline = time.monotonic() + duration_s
         while True:
@@ -102,7 +104,8 @@ class RigClient:
                 return
             self._executor.spin_once(timeout_sec=left_s)
 
-    def change_states(self, full_names, transition, timeout_s, alive=lambda name: True):
+    def change_states(self, full_names: Iterable[str], transition: str, timeout_s: float,
+                      alive: Callable[[str], bool] = lambda name: True) -> list[str]:
         """
         Ask nodes for a transition at the same time and wait for the answers.
 
@@ -124,8 +127,8 @@ class RigClient:
 
         """
         deadline = time.monotonic() + timeout_s
-        waiting = dict.fromkeys(full_names)
-        refused = []
+        waiting: dict[str, Any] = dict.fromkeys(full_names)      # future of each request
+        refused: list[str] = []
         while waiting and time.monotonic() < deadline:
             for name, future in list(waiting.items()):
                 if future is None:
@@ -142,7 +145,7 @@ class RigClient:
                 self._executor.spin_once(timeout_sec=0.02)
         return refused + list(waiting)
 
-    def _request(self, full_name, transition):
+    def _request(self, full_name: str, transition: str) -> Any:
         """Return the future of a request, None while the node offers no service yet."""
         client = self._clients.get(full_name)
         if client is None:
@@ -154,9 +157,9 @@ class RigClient:
         request.transition.id = TRANSITIONS[transition]
         return client.call_async(request)
 
-    def published(self):
+    def published(self) -> dict[str, int]:
         """Return full topic name to messages published, by the last status of every node."""
-        counts = {}
+        counts: dict[str, int] = {}
         for _, _, values in self.statuses.values():
             for key, value in values.items():
                 if key.startswith('published.'):
@@ -164,7 +167,7 @@ class RigClient:
                     counts[topic] = counts.get(topic, 0) + int(value)
         return counts
 
-    def close(self):
+    def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()

@@ -20,11 +20,20 @@ import os
 from pathlib import Path
 import shutil
 import tempfile
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
 from pam_actuation.namespaces import namespace_of, node_name_of
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
+
+if TYPE_CHECKING:
+    from pam_actuation.control.config import Controller
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.rig import Rig
+
+Parameters = dict[str, Any]      # of a node: name to value
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
     'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
@@ -40,20 +49,23 @@ class RigPlan:
     become active; ``controller_node`` is '' for an experiment without controller.
     """
 
-    experiment: object
-    rig: object
-    controller: object
+    experiment: 'Experiment'
+    rig: 'Rig'
+    controller: 'Controller | None'
     controller_node: str
-    parameters: dict
+    parameters: dict[str, Parameters]
     folder: Path
 
-    def remove(self):
+    def remove(self) -> None:
         """Delete the files made for the nodes."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learning=True, seed=0,
-              namespace='/muscle', overwrite=False, realtime=True):
+def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
+              controller: 'StrPath | Controller | None' = None, valve: str | None = None,
+              bag: StrPath | None = None, *, learning: bool = True, seed: int = 0,
+              namespace: str = '/muscle', overwrite: bool = False, realtime: bool = True
+              ) -> RigPlan:
     """
     Load experiment, rig and controller and write them down for the nodes.
 
@@ -91,30 +103,30 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.limits import check_tracked
     from pam_sim import load_rig
-    if not hasattr(experiment, 'to_yaml'):
-        experiment = load_experiment(experiment)
-    if not hasattr(rig, 'to_yaml'):
-        rig = load_rig(rig, valve=valve)
-    elif valve and valve != rig.valve:
-        rig = rig.with_(valve=valve)
-    experiment.check_reachable(rig)
-    if not experiment.tracked:
-        controller = None
-    elif not hasattr(controller, 'to_yaml'):
-        controller = load_controller(controller or preset_for(experiment, rig), rig)
-    check_tracked(experiment, controller)
+    asked: Experiment = load_experiment(os.fspath(experiment)) if isinstance(
+        experiment, (str, os.PathLike)) else experiment
+    model: Rig = load_rig(rig, valve=valve) if isinstance(rig, (str, os.PathLike)) else rig
+    if valve and valve != model.valve:
+        model = model.with_(valve=valve)
+    asked.check_reachable(model)
+    law: Controller | None = None
+    if asked.tracked:
+        if controller is None or isinstance(controller, (str, os.PathLike)):
+            law = load_controller(controller or preset_for(asked, model), model)
+        else:
+            law = controller
+    check_tracked(asked, law)
     if bag is not None:
         if os.path.exists(bag) and not overwrite:
             raise InputError(
                 'exists already; choose another folder or allow to replace it', str(bag))
         check_bag_target(bag, overwrite)
-    _compile(rig, controller)
+    _compile(model, law)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
-    plan = RigPlan(experiment, rig, controller, '', {}, folder)
-    if controller is not None:
+    plan = RigPlan(asked, model, law, '', {}, folder)
+    if law is not None:
         # The node of fixed gains runs every controller without rules.
-        plan.controller_node = (
-            'sofc_controller' if controller.kind == 'sofc' else 'pid_controller')
+        plan.controller_node = 'sofc_controller' if law.kind == 'sofc' else 'pid_controller'
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
     if realtime:
         for parameters in plan.parameters.values():
@@ -122,7 +134,7 @@ def make_plan(experiment, rig, controller=None, valve=None, bag=None, *, learnin
     return plan
 
 
-def _compile(rig, controller):
+def _compile(rig: 'Rig', controller: 'Controller | None') -> None:
     """Run every compiled function once, so that its machine code is in the cache."""
     from pam_actuation.drivers.loop import DriverLoop
     rig.plant().step((0.0,) * len(rig.signal_names))
@@ -133,12 +145,13 @@ def _compile(rig, controller):
         spare.step(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def _parameters(plan, bag, learning, seed, namespace, overwrite):
+def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, namespace: str,
+                overwrite: bool) -> dict[str, Parameters]:
     """Return node name to parameters and write the files they name."""
     from pam_actuation.experiments import ReferenceLoop
     rig, controller = plan.rig, plan.controller
     rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
-    nodes = {}
+    nodes: dict[str, Parameters] = {}
     if bag is not None:
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
@@ -175,6 +188,6 @@ def _parameters(plan, bag, learning, seed, namespace, overwrite):
     return nodes
 
 
-def _write(path, text):
+def _write(path: Path, text: str) -> str:
     path.write_text(text, encoding='utf-8')
     return str(path)

@@ -22,26 +22,36 @@ the signal that vents, the plant a little later, the recorder last. The same ord
 Ctrl-C and when a node dies.
 """
 
+from collections.abc import Callable, Iterable
 import contextlib
 from dataclasses import dataclass, field
 import json
 import os
 from pathlib import Path
 import time
+from typing import Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.domain import DomainLock
-from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE
+from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE, RigPlan
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
     TRANSITION_TIMEOUT_S)
 from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import InputError
-from pam_sim.files import write_text
+from pam_sim.files import StrPath, write_text
 import yaml
+
+if TYPE_CHECKING:
+    from pam_actuation.control.config import Controller
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_actuation.rigging.client import RigClient
+    from pam_sim.rig import Rig
+
+Progress = Callable[[float, float], object]     # takes seconds done, seconds in all
 
 START_TIMEOUT_S = 60.0        # a busy machine compiles for long
 VENT_S = 0.6                  # after the end, so that the recording shows the vent
@@ -77,19 +87,19 @@ class Result:
     bag: str
     duration_s: float = 0.0
     failure: str = ''
-    findings: list = field(default_factory=list)
-    published: dict = field(default_factory=dict)
-    recorded: dict = field(default_factory=dict)
-    exit_codes: dict = field(default_factory=dict)
-    cpu_share: dict = field(default_factory=dict)
+    findings: list[str] = field(default_factory=list)
+    published: dict[str, int] = field(default_factory=dict)
+    recorded: dict[str, int] = field(default_factory=dict)
+    exit_codes: dict[str, int | None] = field(default_factory=dict)
+    cpu_share: dict[str, float] = field(default_factory=dict)
 
     @property
-    def stopped(self):
+    def stopped(self) -> bool:
         """Tell whether the user ended it, by Ctrl-C or SIGTERM."""
         return self.failure == STOPPED
 
     @property
-    def complete(self):
+    def complete(self) -> bool:
         """Tell whether the experiment ended as planned and every message was recorded."""
         return not self.failure and (not self.bag or self.published == self.recorded)
 
@@ -109,29 +119,30 @@ class RigSession:
 
     """
 
-    def __init__(self, plan, namespace='/muscle', domain_id=None):
+    def __init__(self, plan: RigPlan, namespace: str = '/muscle', domain_id: int | None = None
+                 ) -> None:
         try:
             from pam_actuation.rigging.client import RigClient
             self._new_client = RigClient
         except ImportError as error:
-            raise InputError(ros_missing(error.name)) from None
+            raise InputError(ros_missing(error.name or 'rclpy')) from None
         self.plan = plan
         self.namespace = namespace_of(namespace)
-        self.processes = {}
+        self.processes: dict[str, NodeProcess] = {}
         self._lock = DomainLock(domain_id)
         self.domain_id = self._lock.domain_id
-        self.client = None
-        self._cpu = {}
-        self._active = set()
+        self.client: RigClient | None = None
+        self._cpu: dict[str, float | None] = {}
+        self._active: set[str] = set()
         self._may_record = False
-        self._active_since = None
-        self.ended_at = None
+        self._active_since: float | None = None
+        self.ended_at: float | None = None
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         """Return the session."""
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """End all processes of this session."""
         with undisturbed():
             end_all(self.processes.values())
@@ -139,7 +150,12 @@ class RigSession:
                 self.client.close()
             self._lock.release()
 
-    def start(self):
+    def _started(self) -> 'RigClient':
+        """Return the client, which there is from ``start`` on."""
+        assert self.client is not None
+        return self.client
+
+    def start(self) -> None:
         """
         Start all processes and bring them up, the reference last.
 
@@ -163,11 +179,12 @@ class RigSession:
         self._active_since = time.monotonic()
         self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
 
-    def change(self, names, transition, timeout_s=TRANSITION_TIMEOUT_S):
+    def change(self, names: Iterable[str], transition: str,
+               timeout_s: float = TRANSITION_TIMEOUT_S) -> None:
         """Ask nodes for a transition at the same time; SessionFailed if one does not make it."""
-        change(self.client, [self.processes[name] for name in names], transition, timeout_s)
+        change(self._started(), [self.processes[name] for name in names], transition, timeout_s)
 
-    def run(self, progress=None):
+    def run(self, progress: Progress | None = None) -> None:
         """
         Wait for the end of the experiment.
 
@@ -184,32 +201,33 @@ class RigSession:
         """
         total_s = self.plan.experiment.duration_s
         reference = self.processes[REFERENCE].full_name
-        begin = time.monotonic()
+        client, begin = self._started(), time.monotonic()
         while True:
-            self.client.spin(0.05)
+            client.spin(0.05)
             done_s = time.monotonic() - begin
             if progress is not None:
                 progress(min(done_s, total_s), total_s)
             for process in self.processes.values():
                 if not process.running:
                     raise SessionFailed(self._describe_loss(process, done_s))
-            if self.client.statuses.get(reference, (0, ''))[1].startswith(FINISHED):
+            if client.statuses.get(reference, (0, '', {}))[1].startswith(FINISHED):
                 return
             if done_s > total_s + OVERDUE_S:
                 raise SessionFailed(
                     f'the reference did not finish within {total_s + OVERDUE_S:.0f} s')
 
-    def _describe_loss(self, process, done_s):
+    def _describe_loss(self, process: NodeProcess, done_s: float) -> str:
         """Return a sentence on a node that ended, and on what the driver made of it."""
         sentence = f'{process.how_it_ended()} {done_s:.1f} s into the experiment'
         driver = self.processes[DRIVER]
         if process is driver:
             return f'{sentence}; nobody drives the valve'
-        self.client.spin(0.4)
-        level, message, _ = self.client.statuses.get(driver.full_name, (0, '', {}))
+        client = self._started()
+        client.spin(0.4)
+        level, message, _ = client.statuses.get(driver.full_name, (0, '', {}))
         return f'{sentence}; valve_driver: {message}' if level else sentence
 
-    def finish(self, ended='', because=''):
+    def finish(self, ended: str = '', because: str = '') -> list[str]:
         """
         Stop the nodes in order; what cannot be stopped is left to the end of the processes.
 
@@ -226,7 +244,7 @@ class RigSession:
         """
         self._note_cpu()
         self.ended_at = time.monotonic()
-        problems = []
+        problems: list[str] = []
         if self.client is None:
             return problems
         problems += self._deactivate([REFERENCE, self.plan.controller_node, DRIVER])
@@ -239,14 +257,14 @@ class RigSession:
         end_all(self.processes.values())
         return problems
 
-    def _tell_recorder(self, ended, because):
+    def _tell_recorder(self, ended: str, because: str) -> None:
         """Write down why the run ended, for the bag; without a word the recorder judges."""
         if ended:
             write_text(self.plan.folder / ENDED_FILE,
                        json.dumps({'ended': ended, 'because': because}))
 
-    def _deactivate(self, names, timeout_s=STOP_TIMEOUT_S):
-        problems = []
+    def _deactivate(self, names: Iterable[str], timeout_s: float = STOP_TIMEOUT_S) -> list[str]:
+        problems: list[str] = []
         for name in names:
             if name in self._active and self.processes[name].running:
                 try:
@@ -257,24 +275,24 @@ class RigSession:
                     end_all([self.processes[name]])
         return problems
 
-    def _note_cpu(self):
+    def _note_cpu(self) -> None:
         if self._active_since is None:
             return
         span_s = time.monotonic() - self._active_since
         for name, process in self.processes.items():
-            now = process.cpu_s()
-            if process.running and now is not None and self._cpu.get(name) is not None:
-                self._cpu[name] = (now - self._cpu[name]) / span_s
+            now, before = process.cpu_s(), self._cpu.get(name)
+            if process.running and now is not None and before is not None:
+                self._cpu[name] = (now - before) / span_s
             else:
                 self._cpu.pop(name, None)
 
-    def _bag(self, bag):
+    def _bag(self, bag: str) -> str:
         """Return where the recorder put the bag: not in the place of another if ended early."""
         with contextlib.suppress(OSError, ValueError, KeyError):
-            return json.loads((self.plan.folder / RECORDED_FILE).read_text())['path']
+            return str(json.loads((self.plan.folder / RECORDED_FILE).read_text())['path'])
         return bag
 
-    def fill(self, result):
+    def fill(self, result: Result) -> None:
         """Enter counts, exit codes and findings into a Result."""
         if not self._may_record or not os.path.isdir(result.bag):
             result.bag = ''         # there is none, or only that of an earlier run
@@ -284,13 +302,14 @@ class RigSession:
         result.bag = self._bag(result.bag)
         result.recorded = recorded_counts(result.bag) if result.bag else {}
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
-        result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()}
+        result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()
+                            if share is not None}
         result.findings += [
             f'{name}: {message}' for when, name, level, message in self.client.changes
-            if level >= LEVEL_ERROR and when < self.ended_at]
+            if level >= LEVEL_ERROR and self.ended_at is not None and when < self.ended_at]
 
 
-def recorded_counts(bag):
+def recorded_counts(bag: StrPath) -> dict[str, int]:
     """Return full topic name to number of messages of a bag, {} if it was not finished."""
     path = Path(bag) / 'metadata.yaml'
     if not path.is_file():
@@ -300,9 +319,13 @@ def recorded_counts(bag):
             for topic in information['topics_with_message_count']}
 
 
-def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valve=None,
-                   out_dir=None, *, learning=True, seed=0, domain_id=None, progress=None,
-                   with_recorder=True, namespace='/muscle', overwrite=False, realtime=True):
+def run_experiment(experiment: 'StrPath | Experiment',
+                   rig: 'StrPath | Rig' = 'dmsp_5_300_realistic',
+                   controller: 'StrPath | Controller | None' = None, valve: str | None = None,
+                   out_dir: StrPath | None = None, *, learning: bool = True, seed: int = 0,
+                   domain_id: int | None = None, progress: Progress | None = None,
+                   with_recorder: bool = True, namespace: str = '/muscle',
+                   overwrite: bool = False, realtime: bool = True) -> Result:
     """
     Run one experiment on live nodes and record it.
 
@@ -363,9 +386,10 @@ def run_experiment(experiment, rig='dmsp_5_300_realistic', controller=None, valv
     return result
 
 
-def run_guarded(session, result, progress):
+def run_guarded(session: RigSession, result: Result, progress: Progress | None) -> None:
     """Start, run and stop; a failure or Ctrl-C goes into the result."""
-    begin, ended = None, ()
+    begin: float | None = None
+    ended: tuple[str, ...] = ()
     try:
         session.start()
         begin = time.monotonic()

@@ -20,11 +20,13 @@ measures, the watchdogs, the drivers, the controllers, the reference. The end, w
 cause, goes the other way round: the drivers vent while plant and recorder still run.
 """
 
+from collections.abc import Iterable
 import os
 from pathlib import Path
 import shutil
 import tempfile
 import time
+from typing import Self, TYPE_CHECKING
 
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.rigging.domain import DomainLock
@@ -35,6 +37,10 @@ from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S)
 from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.rigging.client import RigClient
+    from pam_actuation.rigging.layouts import NodeSpec
 
 START_TIMEOUT_S = 60.0
 VENT_S = 0.6                  # for the air, before the plant stops
@@ -61,11 +67,12 @@ class Supervisor:
 
     """
 
-    def __init__(self, nodes, domain_id=None, realtime_priority=0):
+    def __init__(self, nodes: 'Iterable[NodeSpec]', domain_id: int | None = None,
+                 realtime_priority: int = 0) -> None:
         try:
             from pam_actuation.rigging.client import RigClient
         except ImportError as error:
-            raise InputError(ros_missing(error.name)) from None
+            raise InputError(ros_missing(error.name or 'rclpy')) from None
         self._new_client = RigClient
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
@@ -73,15 +80,15 @@ class Supervisor:
         self._nodes = sorted(nodes, key=lambda node: ORDER.index(node.name))
         self._priority = realtime_priority
         self._folder = Path(tempfile.mkdtemp(prefix='pam_nodes_'))
-        self.processes = {}
-        self.client = None
-        self._active = []
+        self.processes: dict[str, NodeProcess] = {}
+        self.client: RigClient | None = None
+        self._active: list[NodeProcess] = []
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         """Return the supervisor."""
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """End all processes."""
         with undisturbed():
             drivers = [one for one in self.processes.values() if one.name == DRIVER]
@@ -92,7 +99,12 @@ class Supervisor:
             self._lock.release()
             shutil.rmtree(self._folder, ignore_errors=True)
 
-    def start(self):
+    def _started(self) -> 'RigClient':
+        """Return the client, which there is from ``start`` on."""
+        assert self.client is not None
+        return self.client
+
+    def start(self) -> None:
         """
         Start all processes and bring them up in order.
 
@@ -120,7 +132,7 @@ class Supervisor:
             self._active += of_a_kind
             change(self.client, of_a_kind, 'activate')
 
-    def watch(self, seconds=None):
+    def watch(self, seconds: float | None = None) -> None:
         """
         Return when the time is over; None: watch until a node ends.
 
@@ -132,12 +144,12 @@ class Supervisor:
         """
         deadline = None if seconds is None else time.monotonic() + seconds
         while deadline is None or time.monotonic() < deadline:
-            self.client.spin(0.05)
+            self._started().spin(0.05)
             for full_name, process in self.processes.items():
                 if not process.running:
                     raise SessionFailed(f'{full_name}: {process.how_it_ended()}')
 
-    def finish(self):
+    def finish(self) -> list[str]:
         """
         Take the nodes down, the last one to come first.
 
@@ -147,13 +159,13 @@ class Supervisor:
             What did not go as it should.
 
         """
-        problems = []
+        problems: list[str] = []
         for name in reversed(ORDER):
             of_a_kind = [one for one in self._active if one.name == name and one.running]
             if not of_a_kind:
                 continue
             try:
-                change(self.client, of_a_kind, 'deactivate',
+                change(self._started(), of_a_kind, 'deactivate',
                        CLOSE_TIMEOUT_S if name == RECORDER else STOP_TIMEOUT_S)
             except SessionFailed as error:
                 if all(one.running for one in of_a_kind):       # those that ended come below
@@ -161,7 +173,7 @@ class Supervisor:
                 # The driver, which vents, must not wait for a node that does not answer.
                 end_all(of_a_kind)
             if name == DRIVER:
-                self.client.spin(VENT_S)
+                self._started().spin(VENT_S)
         self._active = []
         end_all(self.processes.values())
         return problems + [

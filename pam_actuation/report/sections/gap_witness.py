@@ -14,6 +14,9 @@
 
 """What the gap depends on: binned maps as a second witness, residuals coloured by condition."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pam_actuation.report import figures
@@ -21,11 +24,15 @@ from pam_actuation.report.page import paragraph, plot, table
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.gap.report.fingerprint import CONDITIONS, conditions_of, MOTIONS
 
+if TYPE_CHECKING:
+    from pam_sim.annotations import FloatArray
+    from pam_sim.gap.result import GapResult, Trace
+
 COLOURS = dict(zip(MOTIONS, ('simulated', 'residual', 'after')))
 MOST_POINTS = 700            # of each colour
 
 
-def witness_part(result):
+def witness_part(result: 'GapResult') -> str:
     """Return the table of what binned maps of the errors explain, before and after."""
     rows = []
     for subsystem, found in result.fingerprint.items():
@@ -51,7 +58,7 @@ def witness_part(result):
         'in the time since the last reversal.', 'note')
 
 
-def coloured_part(result):
+def coloured_part(result: 'GapResult') -> str:
     """Return residuals of the proof over pressure and contraction, coloured by direction."""
     if not {'pressure', 'contraction'} <= set(result.traces):
         return ''
@@ -71,7 +78,8 @@ def coloured_part(result):
     return body
 
 
-def _at(result, trace, name, abscissa):
+def _at(result: 'GapResult', trace: 'Trace', name: str, abscissa: str
+        ) -> 'tuple[FloatArray, FloatArray]':
     """Return (abscissa as shown, -1, 0 or 1 by motion) at the stamps of a trace."""
     factor, offset, _, _ = SHOWN[abscissa]
     recording = _Measured(result.traces)
@@ -85,9 +93,10 @@ def _at(result, trace, name, abscissa):
 class _Measured:
     """What :func:`conditions_of` reads of a recording, from the traces of a result."""
 
-    def __init__(self, traces):
+    def __init__(self, traces: 'Mapping[str, Trace]') -> None:
         self.start_ns = min(int(t.stamp_ns[0]) for t in traces.values())
-        self.time_s = {s: (t.stamp_ns - self.start_ns) * 1e-9 for s, t in traces.items()}
-        self.measured = {s: t.measured for s, t in traces.items()}
+        self.time_s: Mapping[str, FloatArray] = {
+            s: (t.stamp_ns - self.start_ns) * 1e-9 for s, t in traces.items()}
+        self.measured: Mapping[str, FloatArray] = {s: t.measured for s, t in traces.items()}
         end = max(float(t[-1]) for t in self.time_s.values())
         self.grid_s = np.arange(0.0, end, 1e-3)

@@ -14,12 +14,20 @@
 
 """The table of figures of merit, one column per run."""
 
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
 from pam_actuation.report.page import paragraph, Section, signed, table
+from pam_sim.annotations import FloatArray
+
+if TYPE_CHECKING:
+    from pam_actuation.report.metrics import RunMetrics
 
 AIR_DENSITY = 1.185          # kg/m^3 at the reference atmosphere of ISO 8778
 
 
-def metrics(named, key='metrics', title='Figures of merit'):
+def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
+            title: str = 'Figures of merit') -> Section:
     """
     Return the table of metrics.
 
@@ -31,7 +39,7 @@ def metrics(named, key='metrics', title='Figures of merit'):
         Anchor and heading.
 
     """
-    rows = [
+    found: list[tuple[str, list[str | int | None]]] = [
         ('Tracking RMSE', _mm(m.rmse_m for _, m in named)),
         ('Largest error', _mm(m.max_error_m for _, m in named)),
         ('Mean error (reference − contraction)', [
@@ -56,7 +64,7 @@ def metrics(named, key='metrics', title='Figures of merit'):
         ('Controller loop', [_loop(m, 'pressure_command') for _, m in named]),
         ('Driver loop', [_loop(m, 'valve_signal') for _, m in named]),
     ]
-    rows = [[name, *cells] for name, cells in rows if any(c is not None for c in cells)]
+    rows = [[name, *cells] for name, cells in found if any(c is not None for c in cells)]
     body = table([''] + [name for name, _ in named], rows)
     if any(m.air_use_kg is not None for _, m in named):
         body += paragraph(
@@ -69,53 +77,53 @@ def metrics(named, key='metrics', title='Figures of merit'):
     return Section(key, title, body)
 
 
-def _mm(values):
+def _mm(values: Iterable[float | None]) -> list[str | int | None]:
     return [None if v is None else f'{v * 1e3:.3f} mm' for v in values]
 
 
-def _n(values):
+def _n(values: Iterable[float | None]) -> list[str | int | None]:
     return [None if v is None else f'{v:.3f} N' for v in values]
 
 
-def _percent(value):
+def _percent(value: float | None) -> str | None:
     return None if value is None else f'{100.0 * value:.1f} % of the messages'
 
 
-def _cycle(m, index):
+def _cycle(m: 'RunMetrics', index: int) -> float | None:
     return _at(m.cycle_rmse_m, index)
 
 
-def _at(values, index):
+def _at(values: FloatArray, index: int) -> float | None:
     return float(values[index]) if len(values) else None
 
 
-def _change(m):
+def _change(m: 'RunMetrics') -> str | None:
     if len(m.cycle_rmse_m) < 2:
         return None
     return f'{signed(100.0 * (m.cycle_rmse_m[-1] / m.cycle_rmse_m[0] - 1.0))} %'
 
 
-def _settling(m):
+def _settling(m: 'RunMetrics') -> str | None:
     if not m.steps:
         return None
     return ', '.join('not settled' if s.settling_s is None else f'{s.settling_s:.2f} s'
                      for s in m.steps)
 
 
-def _interrupted(m):
+def _interrupted(m: 'RunMetrics') -> str | None:
     if m.interruptions is None:
         return None
     count, seconds = m.interruptions
     return 'never' if not count else f'{count} times, {seconds:.2f} s in all'
 
 
-def _air(value):
+def _air(value: float | None) -> str | None:
     if value is None:
         return None
     return f'{value * 1e3:.2f} g ({value / AIR_DENSITY * 1e3:.2f} l)'
 
 
-def _loop(m, topic):
+def _loop(m: 'RunMetrics', topic: str) -> str | None:
     """Return period, jitter and late share of one loop; None if it was not recorded."""
     timing = next((t for t in m.timing if t.topic == topic), None)
     if timing is None:

@@ -15,7 +15,7 @@
 """Simulated against recorded, and the bit-exact replay of the controller."""
 
 from dataclasses import dataclass
-from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from pam_actuation.report import figures
 from pam_actuation.report.metrics import rmse
 from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.replay.controller import ReplayResult
 
 # SI to what people read: factor, offset, unit, row title.
 SHOWN = {'pressure': (1e-3, -P_ATM_PA, 'kPa', 'pressure [kPa gauge]'),
@@ -80,7 +83,7 @@ def overlays(signals: list[Overlay], key: str = 'overlays',
         figures.stack(rows, 'time since the start of the experiment [s]', row_px=170)))
 
 
-def controller_replays(named: list[tuple[str, SimpleNamespace]], key: str = 'replay',
+def controller_replays(named: 'list[tuple[str, ReplayResult]]', key: str = 'replay',
                        title: str = 'Controller replayed offline') -> Section:
     """
     Return the table of controller replays.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _MOST_WORDS = 12
 
 
-def rules(before: 'RuleBase', after: 'RuleBase', key: str = 'rules',
+def rules(before: 'RuleBase | None', after: 'RuleBase', key: str = 'rules',
           title: str = 'What the rules learned') -> Section:
     """
     Return the section of the rule base.

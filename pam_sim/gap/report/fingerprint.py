@@ -28,7 +28,7 @@ the last.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
@@ -61,7 +61,15 @@ PAIRS = (('pressure', 'contraction'), ('pressure', 'direction'), ('contraction',
 Errors = tuple[dict[str, FloatArray], IntArray, FloatArray, FloatArray, float]
 
 
-def conditions_of(recording: Recording, subsystem: str, time_s: FloatArray
+class Measured(Protocol):
+    """What ``conditions_of`` reads of a recording."""
+
+    grid_s: FloatArray
+    time_s: Mapping[str, FloatArray]
+    measured: Mapping[str, FloatArray]
+
+
+def conditions_of(recording: 'Measured | Recording', subsystem: str, time_s: FloatArray
                   ) -> dict[str, FloatArray]:
     """
     Return what was measured at instants [s], one array per condition.
