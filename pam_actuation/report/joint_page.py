@@ -20,9 +20,10 @@ import os
 from typing import Any
 
 import numpy as np
-from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report import figures, metrics, signals
-from pam_actuation.report.page import paragraph, plot, render, Section, table
+from pam_actuation.report.page import plot, render, Section, table
+from pam_actuation.report.pages import default_titles, early_section
+from pam_actuation.report.sections.metrics_table import interrupted_text, value_at
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_sim.annotations import FloatArray
@@ -120,7 +121,6 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
         No run was given, or one of a single muscle.
 
     """
-    from pam_actuation.report.pages import default_titles
     for run in runs:
         if 'joint_state' not in run:
             raise InputError('is no recording of a joint; give it a page of its own',
@@ -128,9 +128,7 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     titles = default_titles(runs)
     found = [joint_metrics(run) for run in runs]
     named = list(zip(titles, found))
-    early = early_sentences(runs)
-    sections = [Section('ended', 'Stopped early', ''.join(map(paragraph, early)))] if early else []
-    sections.append(_merits(named))
+    sections = [*filter(None, [early_section(runs)]), _merits(named)]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(_plots(run, f'signals-{k}', heading))
@@ -149,11 +147,11 @@ def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:
     rows = [
         ('Tracking RMSE', cells(lambda m: _degrees(m.rmse_rad))),
         ('Largest error', cells(lambda m: _degrees(m.max_error_rad))),
-        ('RMSE of the first cycle', cells(lambda m: _degrees(_at(m.cycle_rmse_rad, 0)))),
-        ('RMSE of the last cycle', cells(lambda m: _degrees(_at(m.cycle_rmse_rad, -1)))),
+        ('RMSE of the first cycle', cells(lambda m: _degrees(value_at(m.cycle_rmse_rad, 0)))),
+        ('RMSE of the last cycle', cells(lambda m: _degrees(value_at(m.cycle_rmse_rad, -1)))),
         ('Mean pressure of both muscles', cells(lambda m: (
             None if m.co_contraction_pa is None else f'{m.co_contraction_pa * 1e-3:.1f} kPa'))),
-        ('Vented for missing or old input', cells(_interrupted))]
+        ('Vented for missing or old input', cells(interrupted_text))]
     body = table(['', *(title for title, _ in named)],
                  [[name, *row] for name, row in rows if any(cell is not None for cell in row)])
     return Section('metrics', 'Figures of merit', body)
@@ -171,19 +169,8 @@ def _key_numbers(named: Sequence[tuple[str, JointMetrics]]) -> list[tuple[str, s
     return numbers
 
 
-def _at(values: FloatArray, place: int) -> float | None:
-    return float(values[place]) if len(values) else None
-
-
 def _degrees(angle_rad: float | None) -> str | None:
     return None if angle_rad is None else f'{np.degrees(angle_rad):.3f}°'
-
-
-def _interrupted(one: JointMetrics) -> str | None:
-    if one.interruptions is None:
-        return None
-    count, seconds = one.interruptions
-    return 'never' if not count else f'{count} times, {seconds:.2f} s in all'
 
 
 def _plots(run: Run, key: str, title: str) -> Section:

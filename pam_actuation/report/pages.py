@@ -116,7 +116,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
                 for run in runs]
     named = list(zip(titles, measured))
-    sections = [_early(runs), _implausible(list(zip(titles, runs))),
+    sections = [early_section(runs), _implausible(list(zip(titles, runs))),
                 metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
@@ -139,7 +139,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     return {title: summary(m) for title, m in named}
 
 
-def _early(runs: 'Sequence[Run]') -> Section | None:
+def early_section(runs: 'Sequence[Run]') -> Section | None:
     """Return the section that warns of runs that stopped early, None without any."""
     found = early_sentences(runs)
     return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None

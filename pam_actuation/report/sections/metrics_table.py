@@ -21,6 +21,7 @@ from pam_actuation.report.page import paragraph, Section, signed, table
 from pam_sim.annotations import FloatArray
 
 if TYPE_CHECKING:
+    from pam_actuation.report.joint_page import JointMetrics
     from pam_actuation.report.metrics import RunMetrics
 
 AIR_DENSITY = 1.185          # kg/m^3 at the reference atmosphere of ISO 8778
@@ -50,15 +51,15 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
         ('Last cycle against the first', [_change(m) for _, m in named]),
         ('Force tracking RMSE', _n(m.rmse_n for _, m in named)),
         ('Largest force error', _n(m.max_error_n for _, m in named)),
-        ('Force RMSE of the first cycle', _n(_at(m.cycle_rmse_n, 0) for _, m in named)),
-        ('Force RMSE of the last cycle', _n(_at(m.cycle_rmse_n, -1) for _, m in named)),
+        ('Force RMSE of the first cycle', _n(value_at(m.cycle_rmse_n, 0) for _, m in named)),
+        ('Force RMSE of the last cycle', _n(value_at(m.cycle_rmse_n, -1) for _, m in named)),
         ('Cycles', [len(m.cycle_rmse_m) or len(m.cycle_rmse_n) or None for _, m in named]),
         ('Settling into 5 % after a step', [_settling(m) for _, m in named]),
         ('Overshoot of steps', _mm(max((s.overshoot_m for s in m.steps), default=None)
                                    for _, m in named)),
         ('Valve at its upper limit', [_percent(m.saturation_high) for _, m in named]),
         ('Valve at its lower limit', [_percent(m.saturation_low) for _, m in named]),
-        ('Vented for missing or old input', [_interrupted(m) for _, m in named]),
+        ('Vented for missing or old input', [interrupted_text(m) for _, m in named]),
         ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
         ('Air through the fill valve', [_air(m.air_fed_kg) for _, m in named]),
         ('Controller loop', [_loop(m, 'pressure_command') for _, m in named]),
@@ -90,10 +91,11 @@ def _percent(value: float | None) -> str | None:
 
 
 def _cycle(m: 'RunMetrics', index: int) -> float | None:
-    return _at(m.cycle_rmse_m, index)
+    return value_at(m.cycle_rmse_m, index)
 
 
-def _at(values: FloatArray, index: int) -> float | None:
+def value_at(values: FloatArray, index: int) -> float | None:
+    """Return one of the values, None of no values."""
     return float(values[index]) if len(values) else None
 
 
@@ -110,7 +112,8 @@ def _settling(m: 'RunMetrics') -> str | None:
                      for s in m.steps)
 
 
-def _interrupted(m: 'RunMetrics') -> str | None:
+def interrupted_text(m: 'RunMetrics | JointMetrics') -> str | None:
+    """Return in words how often and how long a run was vented; None where it does not tell."""
     if m.interruptions is None:
         return None
     count, seconds = m.interruptions
