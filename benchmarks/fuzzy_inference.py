@@ -21,11 +21,11 @@ outputs equal to 1e-6, inference and learning within 10 microseconds a step.
 
 What is compared. Both get the same triangular sets over error and change of error
 and the same 49 rules, each with an output of its own. Ours multiplies the degrees
-and takes the weighted mean of the outputs. scikit-fuzzy knows no rules with a
-number as their output, but it defines the same thing when told to multiply
-(``and_func``), to add where rules share an output (``accumulation_method``), and
-when each output is a rectangle so narrow that its centroid is the number and its
-clipped area is proportional to the degree. Degrees, firing strengths and outputs
+and takes the weighted mean of the outputs. scikit-fuzzy has no rules with a
+number as their output. Three settings make it define the same surface. It multiplies
+(``and_func``) and adds where rules share an output (``accumulation_method``). Each
+output is a narrow rectangle: its centroid is the number, and its clipped area is
+proportional to the degree. Degrees, firing strengths and outputs
 are then compared one by one. Its own defaults (minimum, maximum, seven triangular
 output sets) define another surface; they are timed too, and the faster of the two
 is what ours is measured against. Most of its time goes into the graph of rules it

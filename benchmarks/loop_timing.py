@@ -17,10 +17,10 @@ Measure whether the loops of a live rig keep their periods, and how late a comma
 
     python benchmarks/loop_timing.py --seconds 600
 
-Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live. Beside them, in the same
-run and with the real-time priority of the plant, a bare echo: one rclpy node with a timer,
-another one with a callback, the message of the valve signal, by what rclpy takes by default, 97
-times per second: rarely enough not to load the cores itself, and in no step with the loops.
+Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live. A bare echo runs beside
+them with the real-time priority of the plant: one rclpy node with a timer, another one with a
+callback. It sends the message of the valve signal with the defaults of rclpy, 97 times per second.
+That loads the cores little and is in no step with the loops.
 Prints for each loop the ticks that did not run and how irregular the others were, and the age of
 a valve signal when the plant applies it beside that of a message in the callback of the echo. A
 bare loop of 1 kHz without ROS, that does nothing and goes before

@@ -18,9 +18,9 @@ Do the sizes of `pam gap --plan` hold? Effects at and below them, simulated and 
     python benchmarks/planned_sizes.py                       # every effect, Markdown table
     python benchmarks/planned_sizes.py --effects coulomb_friction,leakage --times 0.5,1.5
 
-Each effect is put into the rig at multiples of the size from which on the plan says it can be
-named, the protocol is simulated with the noise of the sensors, and the gap workflow looks at the
-record with the nominal model, every fifth block kept for the proof.
+The plan says from which size on an effect can be named. Each effect is put into the rig at
+multiples of that size, and the protocol is simulated with the noise of the sensors. The gap
+workflow then compares the record with the nominal model; every fifth block is kept for the proof.
 """
 
 import argparse

@@ -19,11 +19,11 @@
 
 FOLDER holds ``steps_100hz.csv`` and ``quasi_static_loop.csv``, transcribed from
 github.com/tbazina/pam_lqi_pid; they are no part of this project. Another muscle than the one of
-the thesis, behind a pressure regulator, its load not stated and no load cell. So the model is
-re-parameterised first: the zero of the pressure sensor is its reading without command, the
-gain of the regulator the slope of the loop, and the load a mass and a spring that balance
-the force law half-way between the branches of the first cycle. Names are found on that
-cycle and judged on the second one and on the steps, which neither fit nor choice saw.
+the thesis, behind a pressure regulator, its load not stated and no load cell. So the model gets
+its parameters from the records first. The zero of the pressure sensor is its reading without
+command, and the gain of the regulator is the slope of the loop. The load is a mass and a spring.
+They balance the force law half-way between the branches of the first cycle. Names are found on
+that cycle and judged on the second one and on the steps, which neither fit nor choice saw.
 
 The loop was read once per 0.6 s. Between readings it is taken as straight, and noise of the
 resolution is added, so its fast part says nothing: only names of muscle and load are tried.

@@ -22,12 +22,11 @@ One step of the joint: two muscles over pulleys turn a limb.
     J theta'' = r_f T_f - r_e T_e - m g l sin(theta - theta_h) - d theta' - dry + T_ext
     x_f = x_f0 + r_f theta,   x_e = x_e0 - r_e theta
 
-Velocity Verlet: the angle at the end of a step follows from angle, velocity and
-acceleration at its start, both muscles (valve, air, memory) are advanced to the
-contractions that belong to it, and the velocity follows from the mean of both
-accelerations; the forces that depend on velocity are read at the velocity
-predicted, which keeps the order. A stop hit or a reversal under dry friction is
-located within the step, and the limb starts again from rest there.
+The scheme is velocity Verlet. The angle at the end of a step follows from angle, velocity and
+acceleration at its start. Both muscles (valve, air, memory) then advance to the contractions at
+that angle. The velocity follows from the mean of both accelerations. Forces that depend on
+velocity use the predicted velocity, which keeps the order. A stop hit or a reversal under dry
+friction is located within the step, and the limb starts again from rest there.
 """
 
 import math

@@ -20,11 +20,11 @@ the arrays of the kernel. ``beyond`` tells whether effects act or the law is ano
 of the nominal rig; it is a constant where the step is called, so that the nominal rig gets
 machine code of its own, without hooks.
 
-Scheme of one physics step h: the regulator's lag exactly; air mass by
-Runge-Kutta of fourth order; the motion by a Nystroem step whose contraction at
-middle and end follow from accelerations already known, so that the force map is
-read twice a step, velocities by Simpson's rule. Third order or better; second where
-an effect's force depends on velocity. Contraction and velocity end at events
+Scheme of one physics step h: the lag of the regulator is exact, and the air mass follows from
+Runge-Kutta of fourth order. A Nystroem step moves the load. Its contractions at middle and end
+follow from accelerations already known, so that the force map is read twice a step. Velocities
+follow from Simpson's rule. The order is three or better, and two where the force of an effect
+depends on velocity. Contraction and velocity end at events
 (end stop, reversal under dry friction).
 """
 
