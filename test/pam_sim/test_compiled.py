@@ -68,6 +68,8 @@ def stepped(folder):
 def test_a_changed_source_of_a_stored_function_is_noticed(
         tmp_path, monkeypatch, imported, called):
     monkeypatch.setenv('PYTHONPATH', str(Path(pam_sim.__file__).parents[1]))
+    # Python knows the age of a source to the second, and here one changes twice within it.
+    monkeypatch.setenv('PYTHONDONTWRITEBYTECODE', '1')
     (tmp_path / 'pam_stored').mkdir()
     (tmp_path / 'pam_stored' / '__init__.py').touch()
     (tmp_path / 'stored_driver.py').write_text(DRIVER.format(imported=imported, called=called))
