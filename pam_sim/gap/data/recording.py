@@ -15,6 +15,7 @@
 """A run on the physics grid: inputs held between their stamps, outputs at theirs."""
 
 from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
@@ -24,6 +25,22 @@ from pam_sim.run import Run, Series
 
 GRID_S = 0.001
 START_S = 0.05               # the state at the start is read from this stretch
+
+
+class Measured(Protocol):
+    """What was measured: the grid of the physics, and each signal at instants of its own [s]."""
+
+    @property
+    def grid_s(self) -> FloatArray:
+        """Instants of the physics [s]."""
+
+    @property
+    def time_s(self) -> Mapping[str, FloatArray]:
+        """Instants of each signal [s]."""
+
+    @property
+    def measured(self) -> Mapping[str, FloatArray]:
+        """Values of each signal."""
 
 
 class Recording:

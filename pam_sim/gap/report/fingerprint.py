@@ -28,14 +28,14 @@ the last.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd
-from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.data.recording import GRID_S, Measured, Recording
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
@@ -61,15 +61,7 @@ PAIRS = (('pressure', 'contraction'), ('pressure', 'direction'), ('contraction',
 Errors = tuple[dict[str, FloatArray], IntArray, FloatArray, FloatArray, float]
 
 
-class Measured(Protocol):
-    """What ``conditions_of`` reads of a recording."""
-
-    grid_s: FloatArray
-    time_s: Mapping[str, FloatArray]
-    measured: Mapping[str, FloatArray]
-
-
-def conditions_of(recording: 'Measured | Recording', subsystem: str, time_s: FloatArray
+def conditions_of(recording: Measured, subsystem: str, time_s: FloatArray
                   ) -> dict[str, FloatArray]:
     """
     Return what was measured at instants [s], one array per condition.
