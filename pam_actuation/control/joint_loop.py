@@ -36,13 +36,14 @@ an angle again. Every change is bumpless: each law starts from what the other on
 from collections.abc import Callable
 from functools import partial
 import math
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control import reference_buffer, tick as codes
 from pam_actuation.control.effort_buffer import EffortBuffer
 from pam_actuation.control.following import CommandFollowing, FOLLOWS, UNKNOWN
 from pam_actuation.control.frozen import FrozenMeasurement, JOINT_SWING_PA
-from pam_actuation.control.joint_torque import JointTorque
+from pam_actuation.control.joint_tick import (
+    JointTickCore, JointTickInputs, Measured, Pair)
 from pam_actuation.control.joint_trajectory import angle_trajectory, TOLERANCE_RAD
 from pam_actuation.control.loop import (
     fresh, measurement_reason, reason_text, REFERENCE_REASONS, STALL_NS)
@@ -53,7 +54,6 @@ from pam_actuation.control.slack_muscle import SlackMuscle
 from pam_actuation.messages import (
     AngleReference, AngleTrajectory, ControllerState, Force, JointAngle, NamedEfforts,
     NamedTrajectory, Pressure)
-from pam_actuation.slow_rise import SlowRise
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
@@ -63,36 +63,8 @@ if TYPE_CHECKING:
 
 _REASONS = (codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD, codes.ANGLE_NOT_FINITE,
             codes.ANGLE_IMPLAUSIBLE)
-# Of a muscle while a law runs: a driver that vents shows by not following it.
-_LEAST_PA = P_ATM_PA + 5_000.0
 _MARGIN_RAD = 0.05           # of an encoder's zero and noise, where the joint lies on a stop
 _STOP_RAD = 0.01             # this near an end of its range the joint may lie on a stop
-_INPUT_NAMES = (
-    'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced', 'joint_state_stamp_sec',
-    'joint_state_stamp_nanosec', 'angle_rad', *codes.reference_names('rad'), 'elapsed_s',
-    *(f'{side}_pressure_pa' for side in SIDES), *(f'{side}_force_n' for side in SIDES),
-    codes.HELD_BACK)
-_TORQUE_NAMES = (
-    'follows_torque', 'joint_effort_stamp_sec', 'joint_effort_stamp_nanosec', 'wanted_torque_n_m',
-    *JointTorque.STATE_NAMES)
-
-
-Pair = tuple[float, float]      # of flexor and extensor
-
-
-class Inputs(NamedTuple):
-    """What a law is given in a tick, NaN where there is nothing; pressures absolute."""
-
-    angle_rad: float = math.nan
-    reference_rad: float = math.nan
-    reference_rate_rad_per_s: float = math.nan
-    lead_rad: float = math.nan
-    lead_rate_rad_per_s: float = math.nan
-    elapsed_s: float = math.nan
-    flexor_pressure_pa: float = math.nan
-    extensor_pressure_pa: float = math.nan
-    flexor_force_n: float = math.nan
-    extensor_force_n: float = math.nan
 
 
 class JointControllerLoop:
@@ -122,7 +94,7 @@ class JointControllerLoop:
             raise InputError('this controller tracks a single muscle; a joint needs one with '
                              '`mode: joint`', controller.rig_name)
         self.controller = controller
-        self.torque = JointTorque(joint, controller)
+        self._core = JointTickCore(controller, joint)
         lower, upper = joint.range_rad
         self.references = ReferenceBuffer(JOINT, (lower - TOLERANCE_RAD, upper + TOLERANCE_RAD))
         self.efforts = EffortBuffer(name)
@@ -131,8 +103,6 @@ class JointControllerLoop:
         self.refusal = ''           # why the newest trajectory was not taken
         self.reason = codes.REASONS[codes.NO_ANGLE]
         self.two_sensors = ''       # the sentence while two nodes send the angle
-        self.ticks = 0
-        self.names = _INPUT_NAMES + tuple(controller.state_names) + _TORQUE_NAMES
         self._range = lower, upper
         self._plausible = lower - _MARGIN_RAD, upper + _MARGIN_RAD
         between = lower + _STOP_RAD, upper - _STOP_RAD
@@ -141,12 +111,12 @@ class JointControllerLoop:
         self._frozen_both = FrozenMeasurement(*between, JOINT_SWING_PA)
         self._following = CommandFollowing(), CommandFollowing()        # flexor, extensor
         self._slack = [SlackMuscle(following) for following in self._following]
-        self._rises = SlowRise(active=False), SlowRise(active=False)
         self._name = name
         self._trajectory: NamedTrajectory | None = None      # that arrived since the last tick
         self._angle: JointAngle | None = None
         self._pressures: list[Pressure | None] = [None, None]
         self._forces: list[Force | None] = [None, None]
+        self._co_contraction_pa = math.nan      # asked for, absolute
         self._last_tick_ns: int | None = None
         self._used_ns: int | None = None
         self._commands_pa: Pair | None = None     # of the last tick, while a law runs
@@ -155,6 +125,11 @@ class JointControllerLoop:
     def rate_hz(self) -> float:
         """Rate [Hz] at which ``tick`` is to be called."""
         return self.controller.rate_hz
+
+    @property
+    def ticks(self) -> int:
+        """Return the number of ticks run."""
+        return self._core.ticks
 
     @property
     def rejected_references(self) -> int:
@@ -245,7 +220,7 @@ class JointControllerLoop:
     def on_co_contraction(self, message: Pressure) -> None:
         """Take a wanted mean ``Pressure`` of both muscles, absolute."""
         if math.isfinite(message.pressure_pa):
-            self.controller.want_co_contraction(message.pressure_pa - P_ATM_PA)
+            self._co_contraction_pa = message.pressure_pa
 
     def tick(self, now_ns: int,
              learning: bool = True) -> tuple[tuple[Pressure, Pressure], ControllerState]:
@@ -260,7 +235,24 @@ class JointControllerLoop:
             Every input used and every internal of the tick.
 
         """
-        controller = self.controller
+        inputs = self._gather(now_ns, learning)
+        commands_pa, values = self._core.run(inputs)
+        self._commands_pa = commands_pa if inputs.reason in codes.RUNNING else None
+        for following, command_pa in zip(self._following, commands_pa):
+            following.sent(now_ns, command_pa)
+        self.reason = reason_text(inputs.reason, self.two_sensors)
+        flexor_pa, extensor_pa = commands_pa
+        return ((Pressure(now_ns, flexor_pa), Pressure(now_ns, extensor_pa)),
+                ControllerState(now_ns, self._core.names, values))
+
+    def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
+        """Run one tick; return what it sends by topic relative to the joint, as ``tick``."""
+        commands, state = self.tick(now_ns, learning)
+        return {**{f'{side}/pressure_command': command for side, command in zip(SIDES, commands)},
+                'controller_state': state}
+
+    def _gather(self, now_ns: int, learning: bool) -> JointTickInputs:
+        """Return the ``JointTickInputs`` of now."""
         if self._trajectory is not None:
             self._take_trajectory(self._trajectory, now_ns)
             self._trajectory = None
@@ -270,44 +262,26 @@ class JointControllerLoop:
         self._last_tick_ns = now_ns
         measured_pa = self._fresh_pressures_pa(now_ns)
         reason = self._reason(now_ns, measured_pa)
-        self.reason = reason_text(reason, self.two_sensors)
-        running = reason in codes.RUNNING
-        if stalled or not running:
-            controller.pause()
-            self.torque.pause()
+        if stalled:
             self._commands_pa = None
-        may_learn = bool(learning and reason == codes.OK and not self.follows_torque
-                         and not controller.freeze_learning)
-        inputs = Inputs()
-        stamp_ns = -1
+        inputs = JointTickInputs(
+            reason=reason, restarted=stalled, follows_torque=self.follows_torque,
+            effort_stamp_ns=self.efforts.stamp_ns, torque_n_m=self.efforts.torque_n_m,
+            co_contraction_pa=self._co_contraction_pa,
+            learning=bool(learning and reason == codes.OK and not self.follows_torque
+                          and not self.controller.freeze_learning))
         held_back = self._held_back(now_ns, measured_pa)
-        if running and self._angle is not None:
-            stamp_ns = self._angle.stamp_ns
-            inputs = self._inputs(now_ns, self._angle, measured_pa, changed)
-            commands_pa = self._commands_pa = self._risen(
-                self._run(inputs, may_learn, held_back))
-        else:
-            commands_pa = self._vented(now_ns, reason)
-        for following, command_pa in zip(self._following, commands_pa):
-            following.sent(now_ns, command_pa)
-        self._used_ns = stamp_ns if running else None
-        values = (
-            float(self.ticks), float(reason), float(may_learn), float(stalled),
-            float(controller.rules_replaced), *codes.split_stamp(stamp_ns), *inputs,
-            held_back if running else FOLLOWS, *controller.state_values(),
-            float(self.follows_torque),
-            *codes.split_stamp(self.efforts.stamp_ns), self.efforts.torque_n_m,
-            *self.torque.state_values())
-        self.ticks += 1
-        flexor_pa, extensor_pa = commands_pa
-        return ((Pressure(now_ns, flexor_pa), Pressure(now_ns, extensor_pa)),
-                ControllerState(now_ns, self.names, values))
-
-    def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
-        """Run one tick; return what it sends by topic relative to the joint, as ``tick``."""
-        commands, state = self.tick(now_ns, learning)
-        return {**{f'{side}/pressure_command': command for side, command in zip(SIDES, commands)},
-                'controller_state': state}
+        if reason not in codes.RUNNING or self._angle is None:
+            self._used_ns = None
+            if reason == codes.MUSCLE_SLACK:
+                flexor, extensor = self._slack
+                inputs.proves = flexor.proves(now_ns), extensor.proves(now_ns)
+            return inputs
+        inputs.held_back = held_back
+        inputs.angle_stamp_ns = self._angle.stamp_ns
+        inputs.measured = self._measured(now_ns, self._angle, measured_pa, changed)
+        self._used_ns = self._angle.stamp_ns
+        return inputs
 
     def _choose_law(self, now_ns: int) -> bool:
         """Let a fresh wish of an angle decide, else a fresh torque; return if that changed."""
@@ -374,47 +348,12 @@ class JointControllerLoop:
         # A list: both are to be asked.
         found = [following.judge(now_ns, pressure_pa) for following, pressure_pa in zip(
             self._following, pressures_pa)]
-        if any(rise.limiting for rise in self._rises):
+        if any(rise.limiting for rise in self._core.rises):
             return UNKNOWN
         return FOLLOWS if found == [FOLLOWS, FOLLOWS] else UNKNOWN
 
-    def _risen(self, commands_pa: Pair) -> Pair:
-        """Return the commands [Pa] that both muscles may have now."""
-        flexor_pa, extensor_pa = (
-            rise.limited(max(command_pa, _LEAST_PA), 1.0 / self.rate_hz)
-            for rise, command_pa in zip(self._rises, commands_pa))
-        return flexor_pa, extensor_pa
-
-    def _vented(self, now_ns: int, reason: int) -> Pair:
-        """Return the commands [Pa] of a tick in which no law runs."""
-        for rise in self._rises:
-            rise.begin()
-        if reason != codes.MUSCLE_SLACK:
-            return P_ATM_PA, P_ATM_PA
-        flexor, extensor = self._slack
-        return flexor.command_pa(now_ns), extensor.command_pa(now_ns)
-
-    def _run(self, inputs: Inputs, may_learn: bool, held_back: float) -> Pair:
-        """Return the commands [Pa] of the law that counts; the other one stands aside."""
-        controller = self.controller
-        pressures_pa = inputs.flexor_pressure_pa, inputs.extensor_pressure_pa
-        forces_n = inputs.flexor_force_n, inputs.extensor_force_n
-        if not self.follows_torque:
-            self.torque.pause()
-            return controller.step(
-                inputs.angle_rad, inputs.reference_rad, inputs.reference_rate_rad_per_s,
-                inputs.lead_rad, inputs.lead_rate_rad_per_s, may_learn, inputs.elapsed_s,
-                pressures_pa, forces_n, held_back)
-        if held_back != FOLLOWS:
-            forces_n = math.nan, math.nan       # the feedback stands still
-        commands_pa = self.torque.step(
-            inputs.angle_rad, self.efforts.torque_n_m, controller.wanted_co_contraction_pa,
-            forces_n, pressures_pa)
-        controller.stand_aside(commands_pa)
-        return commands_pa
-
-    def _inputs(self, now_ns: int, measured: JointAngle, pressures_pa: Pair,
-                changed: bool) -> Inputs:
+    def _measured(self, now_ns: int, measured: JointAngle, pressures_pa: Pair,
+                  changed: bool) -> Measured:
         """Return angle, references, time passed, pressures and forces."""
         reference = lead = (math.nan, math.nan)
         if not self.follows_torque:
@@ -428,4 +367,4 @@ class JointControllerLoop:
             pressures_pa = self._commands_pa    # a law goes on from the commands of the other
         forces = (force.force_n if fresh(force, now_ns) else math.nan
                   for force in self._forces)
-        return Inputs(measured.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)
+        return Measured(measured.angle_rad, *reference, *lead, elapsed_s, *pressures_pa, *forces)

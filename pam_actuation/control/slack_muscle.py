@@ -113,7 +113,6 @@ class SlackMuscle:
             return False
         return not self._following.told or self._following.followed_pa > SLACK_PA
 
-    def command_pa(self, now_ns: int) -> float:
-        """Return what to ask of it [absolute Pa] while a muscle of the joint is slack."""
-        proves = self.slack and now_ns - self._noticed_ns >= RESUME_NS
-        return PROOF_PA if proves else P_ATM_PA
+    def proves(self, now_ns: int) -> bool:
+        """Return whether ``PROOF_PA`` is to be asked of it while both muscles are vented."""
+        return self.slack and now_ns - self._noticed_ns >= RESUME_NS
