@@ -103,6 +103,7 @@ class JointTickCore:
     Parameters
     ----------
     controller : JointController
+        The law that tracks an angle.
     joint : pam_sim.joint.JointRig
         Its muscles turn wanted torques into pressures.
 

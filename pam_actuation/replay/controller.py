@@ -145,7 +145,7 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     unit = tracked_by(chosen).unit
     columns = _columns(states, unit, run.path)
     order = np.argsort(columns['tick'], kind='stable')
-    _check_complete(columns, order, run.path)
+    check_complete(columns, order, run.path)
     lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
     command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
 
@@ -211,7 +211,7 @@ def _columns(states: 'Series', unit: str, path: str) -> dict[str, FloatArray]:
     return columns
 
 
-def _check_complete(columns: dict[str, FloatArray], order: IntArray, path: str) -> None:
+def check_complete(columns: dict[str, FloatArray], order: IntArray, path: str) -> None:
     """Raise InputError unless the ticks run from 0 without a hole and with the same rules."""
     ticks = columns['tick'][order]
     if len(ticks) == 0 or ticks[0] != 0:

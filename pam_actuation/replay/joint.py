@@ -15,10 +15,13 @@
 """
 Replay the recording of a joint: controller, drivers and plant, each by itself or chained.
 
-All parts are the live loops on a bus. A part that is replayed alone ticks at the recorded times
-and gets what had arrived by then. The messages of the other parts come from the recording. A
-simulated bag is reproduced to the bit. Of a live one the moment at which a message reached a node
-is not recorded: near a tick a message may count one tick early or late.
+The controller alone is given the inputs that its states name (``joint_controller``): it is
+reproduced to the bit, simulated or live. The other parts are the live loops on a bus. A part that
+is replayed alone ticks at the recorded times and gets what had arrived by then. The messages of
+the other parts come from the recording. A simulated bag is reproduced to the bit. Of a live one
+the moment at which a message reached a driver or the plant is not recorded: near a tick a message
+may count one tick early or late. So it is with the controller in recordings of versions whose
+states lack some inputs.
 """
 
 from dataclasses import dataclass, field
@@ -29,8 +32,10 @@ import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.modes.joint import JointController
 from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
+from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 from pam_sim.joint import JointRig, load_joint
@@ -41,7 +46,7 @@ if TYPE_CHECKING:
 
 PARTS = ('controller', 'driver', 'plant')
 _WORDS = {
-    'controller': 'both commands from what had arrived at its ticks',
+    'controller': 'both commands from the inputs of its ticks',
     'driver': 'the signals of both drivers on the recorded commands and pressures',
     'plant': 'the joint on the recorded valve signals'}
 
@@ -60,7 +65,7 @@ class JointReplay:
     counterfactual : bool
         True if another controller than the recorded one was asked for.
     exact : bool
-        Whether a difference of the controller would be a mistake: the bag is simulated.
+        Whether a difference of the controller would be a mistake: all its inputs are recorded.
     notes : dict of str to str
         Why a part that was asked for is missing.
     remarks : tuple of str
@@ -166,6 +171,9 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         if name == 'controller' and (law is None or 'controller_state' not in run):
             notes[name] = 'the bag has no recorded controller'
             continue
+        if name == 'controller' and isinstance(law, JointController) and states_suffice(run):
+            parts[name], internals = replay_joint_controller(run, law, joint)
+            continue
         loops = RepeatedLoops(joint, law, recorded_seed(run), run.namespace.rpartition('/')[2],
                               (name,))
         loops.run(recorded_topics_of_joint(run))
@@ -175,7 +183,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         raise InputError('nothing to replay: ' + '; '.join(notes.values()), path)
     return JointReplay(
         parts, {} if controller is not None else internals, controller is not None,
-        run.metadata.get('origin') != 'live', notes, remarks)
+        states_suffice(run) or run.metadata.get('origin') != 'live', notes, remarks)
 
 
 def _law(run: Run, joint: JointRig, controller: 'Controller | str | os.PathLike[str] | None'

@@ -22,14 +22,21 @@ import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.cli.main import main
+from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.joint_loop import JointControllerLoop
+from pam_actuation.control.joint_tick import ADDED_NAMES
 from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.messages import AngleReference, ControllerState, NamedEfforts, Pressure
 from pam_actuation.replay.joint import is_joint, PARTS, replay_joint
+from pam_actuation.replay.joint_controller import COMMANDS
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
 from pam_sim.joint.parameters import SIDES
+from pam_sim.run import Run, Series
 import pytest
 
 EXPERIMENT = """
@@ -65,6 +72,13 @@ def with_integral(text, gain):
     changed, count = re.subn(r'integral_pa_per_m_s: \S+', f'integral_pa_per_m_s: {gain}', text)
     assert count == 1
     return changed
+
+
+def without_added_states(topics):
+    """Return the topics as versions before recorded them."""
+    states = topics['controller_state']
+    return {**topics, 'controller_state': replace(states, values={
+        name: column for name, column in states.values.items() if name not in ADDED_NAMES})}
 
 
 def test_a_run_of_a_joint_has_the_topics_of_joint_and_muscles(run, bag):
@@ -117,12 +131,64 @@ def test_a_changed_recording_is_noticed(run):
     changed = replace(run, metadata={**run.metadata, 'controller': other})
     found = replay_joint(changed, only='controller')
     assert found.unexpected_difference and 'integral_pa' in found.internals
-    live = replace(run, metadata={**changed.metadata, 'origin': 'live'})
-    assert not replay_joint(live, only='controller').unexpected_difference
+    live = replace(run, metadata={**run.metadata, 'origin': 'live'})
+    assert replay_joint(live, only='controller').parts['controller'].identical
+    # In recordings of versions before, what a live tick had got was not recorded.
+    older = replace(changed, metadata={**changed.metadata, 'origin': 'live'},
+                    topics=without_added_states(run.topics))
+    found = replay_joint(older, only='controller')
+    assert found.internals and not found.unexpected_difference
+    states = run['controller_state']
+    cut = replace(run, topics={**run.topics, 'controller_state': replace(
+        states, stamp_ns=states.stamp_ns[1:],
+        values={name: column[1:] for name, column in states.values.items()})})
+    with pytest.raises(InputError, match='begins with controller tick 1, not 0'):
+        replay_joint(cut)
     with pytest.raises(InputError, match='which joint'):
         replay_joint(replace(run, metadata={}))
     with pytest.raises(InputError, match='no recorded controller'):
         replay_joint(replace(run, metadata={'rig': run.metadata['rig']}), only='controller')
+
+
+def test_torques_faults_and_co_contraction_are_reproduced_from_the_states_alone():
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='ppr')
+    control = JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint, 'knee')
+    told = {topic: [] for topic in ('joint_state', 'controller_state', *COMMANDS)}
+    text, taken = control.controller.to_yaml(), control.on_joint_state
+    control.on_joint_state = lambda plain: (told['joint_state'].append(plain), taken(plain))
+    loops = JointLoops(joint, control, seed=4)
+    for k in range(2400):
+        now_ns = loops.now_ns + loops.period_ns
+        if k < 600 or k > 2100:
+            control.on_joint_reference(AngleReference(now_ns, 0.2 * np.sin(0.02 * k), np.nan))
+        if k == 300:
+            control.on_co_contraction(Pressure(now_ns, 401325.7))
+        if k > 750:
+            control.on_named_efforts(NamedEfforts(now_ns, ('knee',), (0.1,)))
+        missing = {'flexor/pressure': None} if 1100 < k < 1250 else {}
+        commands = loops.tick(**missing)
+        told['controller_state'].append(loops.state)
+        for topic, command in zip(COMMANDS, commands):
+            told[topic].append(command)
+    run = Run({topic: series_of(messages) for topic, messages in told.items()},
+              {'rig': joint.to_yaml(), 'controller': text, 'origin': 'live'}, path='memory')
+    states = run['controller_state']
+    assert {codes.OK, codes.REFERENCE_HELD, codes.MUSCLE_SLACK} <= set(states['input_reason'])
+    assert states['follows_torque'].max() == 1.0 and states['flexor_proves'].max() == 1.0
+    found = replay_joint(run, only='controller')
+    assert found.parts['controller'].identical and found.internals == {}
+
+
+def series_of(messages):
+    """Return plain messages as a Series of their numbers."""
+    first = messages[0]
+    if isinstance(first, ControllerState):
+        columns = zip(first.names, zip(*(one.values for one in messages)))
+    else:
+        columns = ((name, [getattr(one, name) for one in messages])
+                   for name in first.__slots__ if name != 'stamp_ns')
+    return Series(np.array([one.stamp_ns for one in messages]),
+                  {name: np.array(column) for name, column in columns})
 
 
 def test_the_verbs_take_a_joint(bag, tmp_path, capsys):

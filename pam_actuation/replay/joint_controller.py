@@ -1,0 +1,128 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Step a joint's controller offline on the inputs a recording says it used, and compare.
+
+As ``controller`` for a single muscle. ``controller_state`` of a joint holds the values of all
+inputs of a tick, the angle with its stamp; so a live recording is reproduced to the bit as well.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pam_actuation.bags.load_joint import MEASURED
+from pam_actuation.control.joint_tick import (
+    ADDED_NAMES, CO_CONTRACTION, JointTickCore, JointTickInputs, Measured, MEASURED_NAMES, PROVES)
+from pam_actuation.control.tick import HELD_BACK, join_stamp
+from pam_actuation.replay.chain import ChainReplay, same_bits
+from pam_actuation.replay.controller import check_complete
+from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
+
+if TYPE_CHECKING:
+    from pam_actuation.control.modes.joint import JointController
+    from pam_sim.joint import JointRig
+    from pam_sim.run import Run
+
+COMMANDS = tuple(f'{side}/pressure_command' for side in SIDES)
+
+
+def states_suffice(run: 'Run') -> bool:
+    """Return whether ``controller_state`` of a recording holds all inputs of its ticks."""
+    states = run.topics.get('controller_state')
+    return states is not None and set(ADDED_NAMES) <= set(states.values)
+
+
+def replay_joint_controller(run: 'Run', controller: 'JointController',
+                            joint: 'JointRig') -> tuple[ChainReplay, dict[str, int]]:
+    """
+    Replay the controller of a joint's recording.
+
+    Parameters
+    ----------
+    run : pam_sim.run.Run
+        One for which ``states_suffice``.
+    controller : JointController
+        The recorded one, or another; it is stepped.
+    joint : pam_sim.joint.JointRig
+        The recorded one.
+
+    Returns
+    -------
+    ChainReplay
+        Both commands, recorded and replayed, of every tick whose command was recorded.
+    dict of str to int
+        Numbers of ``controller_state`` that differ, with the number of ticks.
+
+    Raises
+    ------
+    InputError
+        The recording does not begin with the first tick, lacks ticks or an angle that was used,
+        or the rules were exchanged on the way.
+
+    """
+    states = run.require('controller_state')
+    columns, path = states.values, str(run.path)
+    order = np.argsort(columns['tick'], kind='stable')
+    check_complete(columns, order, path)
+    angles = run.require(MEASURED)
+    angle_at = dict(zip(angles.stamp_ns.tolist(), angles.values['angle_rad'].tolist()))
+    sent_at = {topic: dict(zip(run.topics[topic].stamp_ns.tolist(),
+                               run.topics[topic].values['pressure_pa'].tolist()))
+               for topic in COMMANDS if topic in run}
+    core = JointTickCore(controller, joint)
+    compared = [(name, columns[name], core.names.index(name))
+                for name in core.names if name in columns]
+    differing: dict[str, int] = {}
+    replayed = np.empty((len(order), len(COMMANDS)))
+    for place, row in enumerate(order.tolist()):
+        commands_pa, values = core.run(_inputs(columns, row, angle_at, path))
+        replayed[place] = commands_pa
+        for name, column, index in compared:
+            if not same_bits(column[row], values[index]):
+                differing[name] = differing.get(name, 0) + 1
+    stamp_ns = states.stamp_ns[order]
+    stamps, recorded, computed = {}, {}, {}
+    for topic, column in zip(COMMANDS, replayed.T):
+        name, at = f'{topic}.pressure_pa', sent_at.get(topic, {})
+        known = np.array([stamp in at for stamp in stamp_ns.tolist()])      # else it was lost
+        stamps[name], computed[name] = stamp_ns[known], column[known]
+        recorded[name] = np.array([at[stamp] for stamp in stamp_ns[known].tolist()])
+    return ChainReplay(joint.name, stamps, recorded, computed, run.start_ns), differing
+
+
+def _inputs(columns: dict[str, FloatArray], row: int, angle_at: dict[int, float],
+            path: str) -> JointTickInputs:
+    """Return the ``JointTickInputs`` of one recorded tick, the angle taken from its topic."""
+    angle_ns, effort_ns = (
+        join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])
+        for name in (MEASURED, 'joint_effort'))
+    measured = Measured(*(float(columns[name][row]) for name in MEASURED_NAMES))
+    if angle_ns >= 0:
+        angle_rad = angle_at.get(angle_ns)
+        if angle_rad is None:
+            raise InputError(
+                f'the {MEASURED} message of stamp {angle_ns} ns that controller tick '
+                f'{int(columns["tick"][row])} used is not in the recording', path)
+        measured = measured._replace(angle_rad=angle_rad)
+    flexor, extensor = (bool(columns[name][row]) for name in PROVES)
+    return JointTickInputs(
+        reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
+        restarted=bool(columns['restarted'][row]), angle_stamp_ns=angle_ns, measured=measured,
+        held_back=float(columns[HELD_BACK][row]),
+        follows_torque=bool(columns['follows_torque'][row]), effort_stamp_ns=effort_ns,
+        torque_n_m=float(columns['wanted_torque_n_m'][row]),
+        co_contraction_pa=float(columns[CO_CONTRACTION][row]), proves=(flexor, extensor))
