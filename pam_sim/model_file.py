@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import StrPath
+from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import Located, LocatedList
 from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
@@ -29,8 +30,37 @@ from pam_sim.rig_parameters import rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import hsv
 
-KEYS = ('name', 'rig', 'muscle', 'law', 'load', 'valve', 'fidelity', 'parameters', 'tolerance',
-        'effects', 'sensors')
+KEYS = (
+    Key('name', str, 'What the rig is called in bags and reports.', otherwise='name of the file'),
+    Key('rig', str, 'Preset to start from; the other keys say what differs. `muscle` and `load` '
+        'are then given by it.', otherwise='none: state `muscle` and `load`'),
+    Key('muscle', str, 'A muscle by name, or a mapping with the keys of a muscle below.',
+        otherwise='required without `rig`'),
+    Key('law', str, 'Force law of the muscle: a name, or a mapping with the keys of a law below.',
+        otherwise='that of the muscle'),
+    Key('load', str, 'What the muscle pulls.', otherwise='required without `rig`',
+        choices=tuple(LOADS)),
+    Key('valve', str, 'Proportional regulator or pair of on/off valves.',
+        otherwise='that of `rig`, else ppr', choices=VALVES),
+    Key('fidelity', str, 'Whether the on/off valves follow the mean of their pulses, or each '
+        'pulse.', otherwise='that of `rig`, else averaged', choices=hsv.FIDELITIES),
+    Key('parameters', dict, 'Numbers of muscle, load and valves that differ from the nominal '
+        'ones.', otherwise='nominal'),
+    Key('tolerance', dict, 'Relative standard deviation with which a number of `parameters` is '
+        'known; 0 is exactly. `pam gap` adjusts a number within it.',
+        otherwise='that of the parameter', lower=0.0, upper=1.0),
+    Key('effects', list, 'Effects added to the nominal physics, each a mapping.',
+        otherwise='those of `rig`'),
+    Key('sensors', dict, 'Noise, resolution and stamp jitter of the sensors.',
+        otherwise='those of `rig`, else ideal'),
+)
+EFFECT_KEYS = (
+    Key('name', str, 'Which effect; `pam models` lists them.', required=True),
+    Key('parameters', dict, 'Its numbers that differ from the nominal ones.',
+        otherwise='nominal'),
+    Key('source', dict, 'Where the numbers come from; `pam gap` writes intervals here.',
+        otherwise='none'),
+)
 _PRESETS = NamedFiles('presets')
 
 
@@ -80,7 +110,7 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
     if data.get('load') == 'antagonistic_joint' or 'joint' in data:
         raise data.error('describes a joint with two muscles; `pam_sim.load_joint` reads it',
                          'load' if 'load' in data else 'joint')
-    data.check_keys(KEYS)
+    data.check_keys(names_of(KEYS))
     name = data.get('name', str, name)
     if 'rig' in data:
         base_name = data.require('rig', str, choices=preset_names())
@@ -140,7 +170,7 @@ def _effects(data: Located, base: Rig) -> list[EffectSetting]:
         if not isinstance(item, Located):
             raise InputError('an effect is a mapping with `name` and `parameters`',
                              listed.where(index))
-        item.check_keys(('name', 'parameters', 'source'))
+        item.check_keys(names_of(EFFECT_KEYS))
         name = item.require('name', str)
         effect = get_effect(name, item.where('name'))
         if name in stated:

@@ -44,7 +44,7 @@ def pages():
     """Return the path below docs/ and the text of each page."""
     found = verbs()
     made = {f'reference/cli/{name}.md': page(name, *rest) for name, rest in found.items()}
-    rows = ''.join(f'| [`pam {name}`]({name}.md) | {_plain(line)} |\n'
+    rows = ''.join(f'| [`pam {name}`]({name}.md) | {plain(line)} |\n'
                    for name, (_, line) in found.items())
     tree = '\n```{toctree}\n:hidden:\n\n' + ''.join(f'{n}\n' for n in found) + '```\n'
     made['reference/cli/index.md'] = _INDEX + f'| verb | does |\n|---|---|\n{rows}' + tree
@@ -55,7 +55,7 @@ def page(name, parser, line):
     """Return the page of one verb."""
     usage = parser.format_usage().partition(': ')[2].strip()
     usage = re.sub(r'\n +', '\n    ', usage)
-    parts = [f'# pam {name}', _plain(line), _plain(parser.description or ''),
+    parts = [f'# pam {name}', plain(line), plain(parser.description or ''),
              f'```text\n{usage}\n```']
     if parser.epilog:
         parts.append(f'```console\n$ {parser.epilog.removeprefix("Example: ").strip()}\n```')
@@ -67,7 +67,7 @@ def page(name, parser, line):
             group.title, group.title)
         parts.append(f'## {heading}')
         if group.description:
-            parts.append(_plain(group.description))
+            parts.append(plain(group.description))
         parts.append('| name | what it does | default |\n|:---|:---|:---|\n' + '\n'.join(
             _row(action, parser) for action in actions))
     return '\n\n'.join(part for part in parts if part) + '\n'
@@ -86,10 +86,10 @@ def _row(action, parser):
     hidden = (default in (None, False, argparse.SUPPRESS, '', [], ()) or action.nargs == 0
               or 'default:' in text)
     shown_default = '' if hidden else f'`{default}`'
-    return f'| {shown.replace("|", BAR)} | {_plain(text)} | {shown_default} |'
+    return f'| {shown.replace("|", BAR)} | {plain(text)} | {shown_default} |'
 
 
-def _plain(text):
+def plain(text):
     """Return a text of the parser as Markdown in which nothing else is markup."""
     text = ' '.join(text.split())
     return re.sub(r'([\\|*_<>\[\]`])', r'\\\1', text)

@@ -14,7 +14,7 @@
 
 """Puts together what Sphinx reads: the pages of docs/, those from outside, the generated ones."""
 
-from generate import api, command_line, outside
+from generate import api, command_line, outside, yaml_files
 
 # What is no page, in docs/.
 _LEFT_OUT = ('generate', 'conf.py', '__pycache__')
@@ -36,7 +36,8 @@ def write_all(root, source, target):
             text = outside.with_site_links(data.decode(), f'docs/{name}', name, root, target)
             made[name] = text.encode()
     generated = {
-        **outside.copies(root, target), **api.pages(root), **command_line.pages()}
+        **outside.copies(root, target), **api.pages(root), **command_line.pages(),
+        **yaml_files.pages()}
     made.update((name, text.encode()) for name, text in generated.items())
     for name, data in made.items():
         path = target / name

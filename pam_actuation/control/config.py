@@ -37,7 +37,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.controller_text import INDEX_FORMS
-from pam_actuation.control.lqi_files import lqi_from_tree
+from pam_actuation.control.lqi_files import KEYS as LQI_KEYS, lqi_from_tree
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.wrapped import WrappedLaw
@@ -49,6 +49,7 @@ from pam_actuation.control.static_inverse import (
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import load_yaml, Located
 
 if TYPE_CHECKING:
@@ -59,11 +60,35 @@ if TYPE_CHECKING:
 Controller = CompiledController | WrappedLaw
 
 _KINDS = ('sofc', 'pid', 'lqi')
-_KEYS = ('controller', 'rig', 'made_for', 'settings', *MODE_KEYS)
-_OWN_KEYS = {
-    'sofc': ('static_inverse', 'rules', 'initial_rules'), 'pid': ('static_inverse',),
-    'lqi': ('model', 'gains')}
-_ALL_KEYS = _KEYS + _OWN_KEYS['sofc'] + _OWN_KEYS['lqi']
+KEYS = (
+    Key('controller', str, 'Which control law.', required=True, choices=_KINDS),
+    Key('rig', str, 'Name and valve of the rig that its rules belong to.',
+        otherwise='the rig it runs on'),
+    Key('made_for', dict, 'What of a rig matters to it; a rig that differs is refused.',
+        otherwise='fits any rig'),
+    Key('settings', dict, 'Numbers of the control law that differ from the defaults.',
+        otherwise='the defaults'),
+    *MODE_KEYS)
+_INVERSE = Key('static_inverse', dict, 'Pressure over contraction at rest, as a recording '
+               'keeps it.', otherwise='from the rig')
+OWN_KEYS = {
+    'sofc': (_INVERSE,
+             Key('rules', str, 'Rule file to start from, path relative to this file.',
+                 otherwise='blank rules'),
+             Key('initial_rules', dict, 'Content of a rule file, as a recording keeps it.',
+                 otherwise='blank rules')),
+    'pid': (_INVERSE,),
+    'lqi': LQI_KEYS}
+INVERSE_KEYS = (
+    Key('lower_m', float, 'Contraction of the first pressure.', required=True, unit='m',
+        lower=-0.1, upper=0.3),
+    Key('step_m', float, 'Contraction between two pressures.', required=True, unit='m',
+        lower=1e-6, upper=0.1),
+    Key('pressure_pa', list, 'Absolute pressures, two or more.', required=True, unit='Pa',
+        lower=0.0, upper=1e7),
+)
+_NAMES = names_of(KEYS)
+_ALL_NAMES = _NAMES + names_of(OWN_KEYS['sofc'] + OWN_KEYS['lqi'])
 
 
 def rig_identity(rig: 'JointRig | Rig') -> str:
@@ -123,7 +148,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
 def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, folder: str = '.',
                          accept_other_rig: bool = False) -> Any:
     """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
-    tree.check_keys(_ALL_KEYS)
+    tree.check_keys(_ALL_NAMES)
     if rig is None:
         facts, other_rig = read_facts(tree) if 'made_for' in tree else None, ''
     else:
@@ -136,7 +161,7 @@ def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, fol
 def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Any:
     kind = tree.require('controller', str, choices=_KINDS)
     for key in tree:
-        if key not in _KEYS + _OWN_KEYS[kind]:
+        if key not in _NAMES + names_of(OWN_KEYS[kind]):
             raise tree.error(f'a {kind} controller has no `{key}`', key)
     located = tree.get('settings', dict)
     settings = dict(located.plain()) if located is not None else {}
@@ -179,14 +204,14 @@ def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',
     """Return the table of the file, else that of the mode or the rig."""
     if 'static_inverse' in tree:
         table = tree.require('static_inverse', dict)
-        table.check_keys(('lower_m', 'step_m', 'pressure_pa'))
-        lower_m = table.require('lower_m', float, lower=-0.1, upper=0.3, unit='m')
-        step_m = table.require('step_m', float, lower=1e-6, upper=0.1, unit='m')
-        nodes = table.require('pressure_pa', list)
+        table.check_keys(names_of(INVERSE_KEYS))
+        lower_m, step_m = INVERSE_KEYS[0].read(table), INVERSE_KEYS[1].read(table)
+        pressures = INVERSE_KEYS[2]
+        nodes = table.require(pressures.name, list)
         if len(nodes) < 2:
             raise table.error('`pressure_pa` needs at least two values', 'pressure_pa')
-        values = [nodes.require(i, float, lower=0.0, upper=1e7, unit='Pa')
-                  for i in range(len(nodes))]
+        values = [nodes.require(i, float, lower=pressures.lower, upper=pressures.upper,
+                                unit=pressures.unit) for i in range(len(nodes))]
         return static_inverse(lower_m, step_m, values)
     if mode is not None:
         return mode.blank_inverse()

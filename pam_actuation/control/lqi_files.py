@@ -39,14 +39,30 @@ from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, u
 from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
 from pam_actuation.control.settings import checked_settings
 from pam_sim.errors import InputError
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.records import fields
 from pam_sim.rig import Rig
 
 _NUMBERS = (
-    ('rate_hz', 20.0, 1000.0, 'Hz'), ('contraction_m', -0.1, 0.3, 'm'),
-    ('pressure_pa', 0.0, 1e7, 'Pa'))
-_LISTS = (('denominator', -1e3, 1e3, '-'), ('numerator', -1.0, 1.0, 'm/Pa'))
+    Key('rate_hz', float, 'Rate of the model.', required=True, unit='Hz', lower=20.0,
+        upper=1000.0),
+    Key('contraction_m', float, 'Contraction about which it is linear.', required=True,
+        unit='m', lower=-0.1, upper=0.3),
+    Key('pressure_pa', float, 'Absolute pressure that holds this contraction.', required=True,
+        unit='Pa', lower=0.0, upper=1e7))
+_DELAY = Key('delay_ticks', int, 'Dead time in periods of the rate.', required=True, lower=0,
+             upper=MAX_DELAY_TICKS)
+_LISTS = (
+    Key('denominator', list, f'Coefficients of the past contractions, 1 to {MAX_ORDER}.',
+        required=True, unit='-', lower=-1e3, upper=1e3),
+    Key('numerator', list, 'Coefficients of the past pressures, as many.', required=True,
+        unit='m/Pa', lower=-1.0, upper=1.0))
+_GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
+             otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
+KEYS = (Key('model', dict, 'Linear model of the muscle that the gains rest on.',
+            otherwise='identified on the rig'), _GAINS)
+MODEL_KEYS = (_DELAY, *_NUMBERS, *_LISTS)
 
 
 def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object], rig_name: str,
@@ -71,7 +87,7 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
     if 'gains' in tree:
         used = used_numbers(controller.gains)
         kept = controller.gains.copy()
-        controller.gains[used] = _floats(tree, 'gains', -1e12, 1e12, '', int(used.sum()))
+        controller.gains[used] = _floats(tree, _GAINS, int(used.sum()))
         before, now = fields(kept, MODEL), fields(controller.gains, MODEL)
         if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
             raise tree.error('`gains` are of a model of another order or delay', 'gains')
@@ -80,16 +96,14 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
 
 def _model(table: Located) -> LinearModel:
     """Return the model of a file."""
-    table.check_keys(('delay_ticks', *(name for name, *_ in _NUMBERS + _LISTS)))
-    values = {name: table.require(name, float, lower=lower, upper=upper, unit=unit)
-              for name, lower, upper, unit in _NUMBERS}
-    values['delay_ticks'] = table.require('delay_ticks', int, lower=0, upper=MAX_DELAY_TICKS)
+    table.check_keys(names_of(MODEL_KEYS))
+    values = {key.name: key.read(table) for key in (*_NUMBERS, _DELAY)}
     order = len(table.require('denominator', list))
     if not 1 <= order <= MAX_ORDER:
         raise table.error(f'`denominator` has {order} numbers; allowed 1 to {MAX_ORDER}',
                           'denominator')
-    for name, lower, upper, unit in _LISTS:
-        values[name] = tuple(_floats(table, name, lower, upper, unit, order))
+    for key in _LISTS:
+        values[key.name] = tuple(_floats(table, key, order))
     model = LinearModel(**values)
     if np.max(np.abs(np.roots(np.r_[1.0, model.denominator]))) >= 1.0:
         raise table.error('`denominator` is of an unstable model', 'denominator')
@@ -98,10 +112,10 @@ def _model(table: Located) -> LinearModel:
     return model
 
 
-def _floats(tree: Located, key: str, lower: float, upper: float, unit: str,
-            count: int) -> list[float]:
+def _floats(tree: Located, key: Key, count: int) -> list[float]:
     """Return a list of exactly ``count`` numbers within bounds."""
-    table = tree.require(key, list)
+    table = tree.require(key.name, list)
     if len(table) != count:
-        raise tree.error(f'`{key}` has {len(table)} numbers; expected {count}', key)
-    return [table.require(i, float, lower=lower, upper=upper, unit=unit) for i in range(count)]
+        raise tree.error(f'`{key.name}` has {len(table)} numbers; expected {count}', key.name)
+    return [table.require(i, float, lower=key.lower, upper=key.upper, unit=key.unit)
+            for i in range(count)]

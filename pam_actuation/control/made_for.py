@@ -29,19 +29,29 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.control.sofc.persistence import identity_parts
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
 
 if TYPE_CHECKING:
     from pam_sim.located_yaml import Located
     from pam_sim.rig import Rig
 
+_ANY = 'any'
 SIZE_TOLERANCE = 0.05         # of length and bore: a muscle is cut and measured to that
 LOAD_FACTOR = 2.0             # of mass or inertia
-_NUMBERS = {
-    'muscle_length_m': (1e-2, 20.0, 'm'), 'muscle_bore_m': (1e-4, 0.2, 'm'),
-    'mass_kg': (1e-6, 1e6, 'kg'), 'inertia_kg_m2': (1e-9, 1e6, 'kg m^2')}
-_TEXTS = {'valve': ('ppr', 'hsv'), 'load': ('hanging_mass', 'prescribed', 'joint')}
-KEYS = (*_NUMBERS, *_TEXTS)
+KEYS = (
+    Key('muscle_length_m', float, 'Length of the muscle at rest.', unit='m', lower=1e-2,
+        upper=20.0, otherwise=_ANY),
+    Key('muscle_bore_m', float, 'Bore of the muscle at rest.', unit='m', lower=1e-4, upper=0.2,
+        otherwise=_ANY),
+    Key('mass_kg', float, 'Hanging mass.', unit='kg', lower=1e-6, upper=1e6, otherwise=_ANY),
+    Key('inertia_kg_m2', float, 'Inertia of the limb about the joint axis.', unit='kg m^2',
+        lower=1e-9, upper=1e6, otherwise=_ANY),
+    Key('valve', str, 'Type of the valve.', choices=('ppr', 'hsv'), otherwise=_ANY),
+    Key('load', str, 'Kind of the load.', choices=('hanging_mass', 'prescribed', 'joint'),
+        otherwise=_ANY),
+)
+_TEXTS = ('valve', 'load')
 _OF_THE_LOAD = ('mass_kg', 'inertia_kg_m2')
 _WORDS = {
     'muscle_length_m': ('a muscle of', 1e3, 'mm length'),
@@ -72,15 +82,9 @@ def read_facts(tree: 'Located') -> dict[str, Any] | None:
     """
     if 'made_for' in tree:
         table = tree.require('made_for', dict)
-        table.check_keys(KEYS)
-        facts = {}
-        for key in table:
-            if key in _TEXTS:
-                facts[key] = table.require(key, str, choices=_TEXTS[key])
-            else:
-                lower, upper, unit = _NUMBERS[key]
-                facts[key] = table.require(key, float, lower=lower, upper=upper, unit=unit)
-        return facts
+        table.check_keys(names_of(KEYS))
+        by_name = {key.name: key for key in KEYS}
+        return {name: by_name[name].read(table) for name in table}
     name, valve, _ = identity_parts(tree.get('rig', str, default=''))
     return _shipped(name, valve)
 

@@ -23,15 +23,28 @@ from pam_actuation.experiments.limits import check_rig, jump_remarks, reach_rema
 from pam_actuation.resources import find_config
 from pam_sim.errors import InputError
 from pam_sim.files import check_name
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import check_value, dump_yaml, load_yaml, Located, LocatedList
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
-KEYS = (
-    'name', 'description', 'domain', 'needs', 'stop_after_s', 'segments', 'disturbance')
 NEEDS = ('pressure', 'contraction', 'force', 'supply_pressure')
+KEYS = (
+    Key('name', str, 'Name in bags and reports.', required=True),
+    Key('description', str, 'A sentence for people.', ''),
+    Key('domain', str, 'What the values are, and in which unit.', 'contraction',
+        choices=tuple(DOMAINS)),
+    Key('needs', list, 'Measured topics without which the experiment tells nothing: '
+        + ', '.join(NEEDS) + '.', otherwise='none'),
+    Key('stop_after_s', float, 'End before the last primitive does.', unit='s', lower=0.01,
+        upper=LONGEST_S, otherwise='never'),
+    Key('segments', list, 'Primitives one after the other, each from where the former ended.',
+        required=True),
+    Key('disturbance', list, 'Primitives of a force on the load, N, against contraction '
+        'positive.', otherwise='none'),
+)
 
 
 class Experiment:
@@ -182,16 +195,14 @@ def load_experiment(source: Path | str) -> Experiment:
     if '\n' not in str(source):
         source = find_config('experiments', source)
     data = load_yaml(source)
-    data.check_keys(KEYS)
+    data.check_keys(names_of(KEYS))
     nothing = LocatedList()
+    read = {key.name: key.read(data) for key in KEYS}
     return Experiment(
-        check_name(data.require('name', str), '`name`', data.where('name')),
-        data.get('description', str, ''),
-        data.get('domain', str, 'contraction', choices=tuple(DOMAINS)),
-        _segments(data.require('segments', list)), data.where('segments'),
-        _segments(data.get('disturbance', list, nothing)),
-        _needs(data.get('needs', list, nothing)),
-        data.get('stop_after_s', float, None, 0.01, LONGEST_S, unit='s'))
+        check_name(read['name'], '`name`', data.where('name')), read['description'],
+        read['domain'], _segments(read['segments']), data.where('segments'),
+        _segments(read['disturbance'] or nothing), _needs(read['needs'] or nothing),
+        read['stop_after_s'])
 
 
 def _needs(items: LocatedList) -> tuple[str, ...]:

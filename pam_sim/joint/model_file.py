@@ -19,6 +19,7 @@ import os
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import load_yaml, Located
 from pam_sim.model_file import load_rig
 from pam_sim.named_files import file_stem, NamedFiles
@@ -27,7 +28,18 @@ from pam_sim.rig import Rig
 
 
 _PRESETS = NamedFiles('joint/presets')
-KEYS = ('name', 'joint', 'load', *SIDES, 'parameters')
+KEYS = (
+    Key('name', str, 'What the joint is called in bags and reports.',
+        otherwise='name of the file'),
+    Key('joint', str, 'Preset to start from; the other keys say what differs.',
+        otherwise='none: state `load` and both sides'),
+    Key('load', str, 'Tells that the file describes a joint.',
+        otherwise='required without `joint`', choices=(NAME,)),
+    *(Key(side, dict, f'Rig of the {side}: a preset, or a mapping as in the file of a rig.',
+          otherwise='required without `joint`') for side in SIDES),
+    Key('parameters', dict, 'Numbers of the joint and its limb that differ from the nominal '
+        'ones.', otherwise='nominal'),
+)
 
 
 def joint_preset_names() -> list[str]:
@@ -119,7 +131,7 @@ def load_rig_or_side(source: str | os.PathLike[str], valve: str | None = None) -
 
 
 def _from_mapping(data: Located, name: str) -> JointRig:
-    data.check_keys(KEYS)
+    data.check_keys(names_of(KEYS))
     name = data.get('name', str, name)
     base = None
     if 'joint' in data:

@@ -29,6 +29,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_sim.annotations import Number
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
 from pam_sim.muscle.lookup_table import LookupTable, read_table
@@ -55,9 +56,31 @@ MUSCLE_PARAMETERS = (
     Parameter('damping_n_s_per_m', 'N s/m', 25.0, 0.0, 1e4, 0.02,
               'Viscous damping of the muscle.', 'design value'),
 )
-_KEYS = ('like', 'rests_on', 'law', *(parameter.name for parameter in DIMENSIONS))
-_LAW_KEYS = ('name', 'set', 'parameters', 'table')
-_TABLE_KEYS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg', 'source')
+KEYS = (
+    Key('like', str, 'Muscle to start from; the other keys say what differs.',
+        otherwise='none: state `length_m`, `bore_m` and `law`'),
+    Key('rests_on', str, 'Where the numbers come from, for reports.',
+        otherwise='stated by the model'),
+    Key('law', str, 'Force law: a name, or a mapping with the keys of a law.',
+        otherwise='required without `like`'),
+)
+LAW_KEYS = (
+    Key('name', str, 'Which law; `pam models` lists them.', otherwise='that of the muscle'),
+    Key('set', str, 'Named numbers of the law to start from.', otherwise='its first set'),
+    Key('parameters', dict, 'Coefficients that differ from the set.',
+        otherwise='those of the set'),
+    Key('table', dict, 'Law `lookup` only: path of a CSV file from `pam characterise`, or a '
+        'mapping with the keys of a table. A path is sought beside the model file too.',
+        otherwise='none'),
+)
+TABLE_KEYS = (
+    Key('pressure_gauge_pa', list, 'Gauge pressures of the grid, Pa, rising.', required=True),
+    Key('load_n', list, 'Loads of the grid, N, rising.', required=True),
+    Key('strain', list, 'Contraction over length, a row for each pressure.', required=True),
+    Key('air_mass_kg', list, 'Mass of air, kg, a row for each pressure.', required=True),
+    Key('source', str, 'Where the points come from.', ''),
+)
+_DIMENSION_NAMES = tuple(parameter.name for parameter in DIMENSIONS)
 
 
 @dataclass(frozen=True)
@@ -95,7 +118,8 @@ class LawChoice:
         data: dict[str, Any] = {'name': self.name}
         if self.table is not None:
             data['table'] = {key: getattr(self.table, key) if key == 'source'
-                             else getattr(self.table, key).tolist() for key in _TABLE_KEYS}
+                             else getattr(self.table, key).tolist()
+                             for key in names_of(TABLE_KEYS)}
             return data
         data['set'] = self.law.muscle
         if self.parameters:
@@ -204,7 +228,7 @@ def read_muscle(data: Located, name: str = 'muscle') -> Muscle:
         Unknown key or law, or a number out of bounds, with file and line.
 
     """
-    data.check_keys(_KEYS)
+    data.check_keys((*names_of(KEYS), *_DIMENSION_NAMES))
     base = Muscle(name)
     if 'like' in data:
         base = get_muscle(data.require('like', str, choices=muscle_names()))
@@ -238,7 +262,7 @@ def read_law(data: Located, base: LawChoice | None = None) -> LawChoice:
     stated, where = data['law'], data.where('law')
     given = table = None
     if isinstance(stated, Located):
-        stated.check_keys(_LAW_KEYS)
+        stated.check_keys(names_of(LAW_KEYS))
         name = stated.get('name', str, None if base is None else base.name)
         chosen = stated.get('set', str, base.set if base and name == base.name else None)
         given = stated.get('parameters', dict)
@@ -276,7 +300,7 @@ def _read_law_table(stated: Located) -> LookupTable:
         return read_table(path if path.is_absolute() or path.exists() else here / path)
     if not isinstance(given, Located):
         raise stated.error('`table` is the path of a CSV file or a mapping of '
-                           + ', '.join(_TABLE_KEYS), 'table')
-    given.check_keys(_TABLE_KEYS)
-    pressure, load, strain, air_mass_kg = (given.require(key, list) for key in _TABLE_KEYS[:4])
-    return LookupTable(pressure, load, strain, air_mass_kg, given.get('source', str, ''))
+                           + ', '.join(names_of(TABLE_KEYS)), 'table')
+    given.check_keys(names_of(TABLE_KEYS))
+    pressure, load, strain, air_mass_kg, source = (key.read(given) for key in TABLE_KEYS)
+    return LookupTable(pressure, load, strain, air_mass_kg, source)

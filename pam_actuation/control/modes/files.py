@@ -21,6 +21,7 @@ from pam_actuation.control.modes.joint import JointMode
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, TRACKED
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key
 from pam_sim.load import LOADS
 
 if TYPE_CHECKING:
@@ -28,7 +29,11 @@ if TYPE_CHECKING:
     from pam_sim.located_yaml import Located
     from pam_sim.rig import Rig
 
-KEYS = ('mode', 'force', 'joint')
+KEYS = (
+    Key('mode', str, 'What is tracked.', CONTRACTION.mode, choices=tuple(TRACKED)),
+    Key('force', dict, 'Numbers of mode `force`.', otherwise='from the rig'),
+    Key('joint', dict, 'Numbers of mode `joint`.', otherwise='from the joint'),
+)
 KINDS = ('sofc', 'pid')       # laws that can be wrapped
 _MODES: dict[str, type[ForceMode] | type[JointMode]] = {
     FORCE.mode: ForceMode, JOINT.mode: JointMode}
@@ -61,7 +66,7 @@ def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | Join
         Unknown mode, a mode the law does not have, or keys of another mode.
 
     """
-    name = tree.get('mode', str, default=CONTRACTION.mode, choices=tuple(TRACKED))
+    name = KEYS[0].read(tree)
     for key in _MODES:
         if key in tree and key != name:
             raise tree.error(f'`{key}` belongs to `mode: {key}`, the mode here is {name}', key)

@@ -37,6 +37,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.records import cells, part, record, values_of, zeros
 from pam_sim.rig import Rig
@@ -70,7 +71,15 @@ STATE = record(
 
 _FILTER_S = 0.05        # memory of the filter of the contraction
 _STALE_S = 0.1          # a longer gap between measurements restarts the rate
-KEYS = ('stiffness_n_per_m', 'contraction_m', 'surface')
+_STIFFNESS = Key(
+    'stiffness_n_per_m', float, 'So many newtons count as one metre in settings and rules.',
+    otherwise='slope of the nominal force', unit='N/m', lower=1.0, upper=1e7)
+_CONTRACTION = Key(
+    'contraction_m', float, 'Contraction until the first one is measured.',
+    otherwise='that of an isometric rig, else 0', unit='m', lower=0.0, upper=1.0)
+KEYS = (_STIFFNESS, _CONTRACTION,
+        Key('surface', dict, 'Pressure over force and contraction, as a recording keeps it.',
+            otherwise='from the rig'))
 
 
 @compiled
@@ -297,13 +306,11 @@ class ForceMode:
         block = tree.get('force', dict)
         own = None
         if block is not None:
-            block.check_keys(KEYS)
+            block.check_keys(names_of(KEYS))
             own = block.get('surface', dict)
         stiffness = contraction = None
         if block is not None:
-            stiffness = block.get(
-                'stiffness_n_per_m', float, None, lower=1.0, upper=1e7, unit='N/m')
-            contraction = block.get('contraction_m', float, None, lower=0.0, upper=1.0, unit='m')
+            stiffness, contraction = _STIFFNESS.read(block), _CONTRACTION.read(block)
         if rig is None:
             if own is None or stiffness is None:
                 raise tree.error(

@@ -25,6 +25,7 @@ from pam_actuation.control.static_inverse import grid_of, GRID_SIZE
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.records import fields, part, record, size_of, values_of
 from pam_sim.rig import Rig
@@ -37,6 +38,14 @@ SURFACE = record(
     'contractions',                   # how many
 )
 SURFACE_SIZE = size_of(SURFACE)
+KEYS = (
+    Key('force_step_n', float, 'Force between two columns.', required=True, unit='N',
+        lower=1e-6, upper=1e4),
+    Key('contraction_step_m', float, 'Contraction between two rows.', required=True, unit='m',
+        lower=1e-6, upper=0.1),
+    Key('pressure_pa', list, 'Rows of absolute pressures, each a text of numbers with spaces.',
+        required=True, unit='Pa', lower=0.0, upper=1e7),
+)
 _FORCES = 25
 _CONTRACTIONS = 51
 _HIGHEST_GAUGE_PA = 1.2e6      # instead of a pressure that no valve of this kind gives
@@ -170,11 +179,8 @@ def surface_from_tree(tree: Located) -> FloatArray:
         A step out of range, rows of unequal length, a pressure that is no number.
 
     """
-    tree.check_keys(('force_step_n', 'contraction_step_m', 'pressure_pa'))
-    force_step_n = tree.require('force_step_n', float, lower=1e-6, upper=1e4, unit='N')
-    contraction_step_m = tree.require(
-        'contraction_step_m', float, lower=1e-6, upper=0.1, unit='m')
-    located = tree.require('pressure_pa', list)
+    tree.check_keys(names_of(KEYS))
+    force_step_n, contraction_step_m, located = (key.read(tree) for key in KEYS)
     rows = [_row(located.require(i, str), located.where(i)) for i in range(len(located))]
     if len(rows) < 2 or len(rows[0]) < 2 or len({len(row) for row in rows}) != 1:
         raise tree.error(

@@ -36,6 +36,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.records import cells, part, record, size_of, values_of, zeros
 from pam_sim.units import P_ATM_PA
@@ -72,7 +73,15 @@ FLEXOR, EXTENSOR = 0, 1         # places in pairs
 
 CO_CONTRACTION_GAUGE_PA = 3e5
 _CO_CONTRACTION_SLEW_PA_PER_S = 5e5
-KEYS = ('flexor_radius_m', 'flexor_contraction_at_zero_m', 'co_contraction_gauge_pa')
+KEYS = (
+    Key('flexor_radius_m', float, "Pulley radius under the flexor's tendon.",
+        otherwise='from the joint', unit='m', lower=1e-3, upper=0.5),
+    Key('flexor_contraction_at_zero_m', float, 'Contraction of the flexor at angle 0.',
+        otherwise='from the joint', unit='m', lower=0.0, upper=1.0),
+    Key('co_contraction_gauge_pa', float, 'Mean pressure of both muscles; stiffness grows '
+        'with it.', CO_CONTRACTION_GAUGE_PA, unit='Pa', lower=0.0, upper=1e6),
+)
+_NAMES = names_of(KEYS)
 
 
 @compiled
@@ -323,7 +332,7 @@ class JointController(WrappedLaw):
 
     def file_entries(self) -> dict[str, object]:
         """Return what ``JointMode`` reads, and the static inverse."""
-        return {'mode': JOINT.mode, 'joint': {key: getattr(self, key) for key in KEYS},
+        return {'mode': JOINT.mode, 'joint': {key: getattr(self, key) for key in _NAMES},
                 'static_inverse': inverse_to_mapping(self.static_inverse)}
 
 
@@ -354,23 +363,17 @@ class JointMode:
                 f'`mode: joint` needs a joint; {rig.name} is a single muscle', tree.where('mode'))
         given = {}
         if block is not None:
-            block.check_keys(KEYS)
-            given = {
-                'flexor_radius_m': block.get(
-                    'flexor_radius_m', float, None, lower=1e-3, upper=0.5, unit='m'),
-                'flexor_contraction_at_zero_m': block.get(
-                    'flexor_contraction_at_zero_m', float, None, lower=0.0, upper=1.0, unit='m'),
-                'co_contraction_gauge_pa': block.get(
-                    'co_contraction_gauge_pa', float, None, lower=0.0, upper=1e6, unit='Pa')}
+            block.check_keys(_NAMES)
+            given = {key.name: key.read(block) for key in KEYS if key.name in block}
         self.values = {}
-        for key in KEYS:
-            value = given.get(key)
-            if value is None and key == 'co_contraction_gauge_pa':
+        for name in _NAMES:
+            value = given.get(name)
+            if value is None and name == 'co_contraction_gauge_pa':
                 value = CO_CONTRACTION_GAUGE_PA
-            value = numbers.get(key) if value is None else value
+            value = numbers.get(name) if value is None else value
             if value is None:
-                raise tree.error(f'without a joint the text must bring `{key}`', 'joint')
-            self.values[key] = value
+                raise tree.error(f'without a joint the text must bring `{name}`', 'joint')
+            self.values[name] = value
         self._where = tree.where('joint') if block is not None else tree.where('mode')
         self._joint = rig
         self._own_inverse = 'static_inverse' in tree
@@ -394,7 +397,7 @@ class JointMode:
 
     def wrap(self, law: CompiledController) -> JointController:
         """Return the law in this mode, with the static inverse of the joint if it had none."""
-        radius_m, contraction_m, gauge_pa = (self.values[key] for key in KEYS)
+        radius_m, contraction_m, gauge_pa = (self.values[key] for key in _NAMES)
         controller = JointController(law, radius_m, contraction_m, gauge_pa, self._where)
         if not self._own_inverse and self._joint is not None:
             lowest, highest = limits_gauge_pa(law.settings)

@@ -35,6 +35,7 @@ from pam_actuation.control.sofc.settings import SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
+from pam_sim.keys import Key, names_of
 
 VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
@@ -43,7 +44,18 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
     'feedback': (2, SET_COUNT, SET_COUNT),
     'feedforward': (2, 'reference_knots'),
     'motion': ('motion_position_knots', 'motion_rate_knots')}
-_KEYS = ('schema', 'shape', 'scaling', *ARRAYS, 'sha256')
+_MEANINGS = {'': 'rules', '_initial': 'rules it started from', '_fired': 'how long each fired, s'}
+FILE_KEYS = (
+    Key('schema', int, 'Version of the form of this file.', required=True, lower=SCHEMA,
+        upper=SCHEMA),
+    Key('shape', dict, 'Lengths of the axes of every table.', required=True),
+    Key('scaling', dict, 'Settings and rig that give the numbers their meaning.', required=True),
+    *(Key(name, list, f'Table `{name.partition("_")[0]}`: '
+          f'{_MEANINGS[name.removeprefix(name.partition("_")[0])]}.', required=True)
+      for name in ARRAYS),
+    Key('sha256', str, 'Checksum of all the rest.', required=True),
+)
+_KEYS = names_of(FILE_KEYS)
 
 
 def rules_from_mapping(mapping: dict[str, Any], where: str,

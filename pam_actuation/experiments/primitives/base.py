@@ -15,9 +15,14 @@
 """What every primitive of an experiment has in common."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, MISSING
 import math
-from typing import ClassVar, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Self, TYPE_CHECKING
+
+
+def key(meaning: str, default: Any = MISSING) -> Any:
+    """Declare a key of a primitive: a field with its meaning, required without a default."""
+    return field(default=default, metadata={'meaning': meaning})
 
 
 @dataclass
@@ -29,7 +34,8 @@ class Primitive:
     ``QUANTITIES`` carry the unit of the domain as a suffix there (``center_m``,
     ``center_pa``, ``center_v``, ``center_duty``, ``center_n``). ``start``, the value the
     previous primitive ended with, and ``rest_value``, the rest value of the domain, are
-    not keys: they are filled in. A field with a default may be left out of the file.
+    not keys: they are filled in. A field with a default may be left out of the file. ``key``
+    declares a field with its meaning, for the reference.
     """
 
     QUANTITIES: ClassVar[tuple[str, ...]] = ()

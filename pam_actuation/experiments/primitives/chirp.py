@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 import math
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,11 +26,11 @@ class Chirp(Primitive):
 
     QUANTITIES = ('center', 'amplitude')
     start: float
-    center: float
-    amplitude: float
-    from_hz: float
-    to_hz: float
-    duration_s: float
+    center: float = key('centre of the motion')
+    amplitude: float = key('half of the way from end to end')
+    from_hz: float = key('frequency at the start')
+    to_hz: float = key('frequency at the end')
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate of the chirp, starting at the lowest point."""

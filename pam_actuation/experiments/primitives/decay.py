@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,7 +26,7 @@ class Decay(Primitive):
     DOMAINS = ('pressure', 'ppr_voltage', 'hsv_duty')
     SHUTS_VALVE = True
     start: float
-    duration_s: float
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the value wanted last, which is sent where the valve cannot be shut."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Hold(Primitive):
     """Stay where the previous primitive ended."""
 
     start: float
-    duration_s: float
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the held value and rate 0."""

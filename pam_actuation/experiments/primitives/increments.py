@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import least_jerk, Primitive
+from pam_actuation.experiments.primitives.base import key, least_jerk, Primitive
 
 
 @dataclass
@@ -25,10 +25,10 @@ class Increments(Primitive):
 
     QUANTITIES = ('to',)
     start: float
-    to: float
-    steps: int
-    move_s: float
-    hold_s: float
+    to: float = key('value at the end')
+    steps: int = key('number of moves')
+    move_s: float = key('time of each move')
+    hold_s: float = key('time of each hold')
 
     @property
     def duration_s(self) -> float:

@@ -25,7 +25,7 @@ about 19 degrees while it is loaded. 6 degrees follow in mid-stance, about 61 de
 from dataclasses import dataclass
 import math
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 # Knee flexion in degrees: mean, then (cosine, sine) of each harmonic of the stride, which
 # begins with heel contact.
@@ -71,10 +71,10 @@ class KneeGait(Primitive):
 
     QUANTITIES = ('low', 'high')
     start: float
-    low: float
-    high: float
-    frequency_hz: float
-    cycles: int
+    low: float = key('value of the straightest knee')
+    high: float = key('value of the most flexed knee')
+    frequency_hz: float = key('strides per second, 0.5 to 1')
+    cycles: int = key('number of strides')
 
     def problem(self) -> str:
         """Refuse what is no walking."""

@@ -31,7 +31,7 @@ _FILLED_IN = ('start', 'rest_value')
 
 # Last part of a key: lowest and highest value. The reference is sent 100 times a second:
 # nothing shorter than a message, nothing faster than ten messages per period.
-_LIMITS = {'s': (0.01, 3600.0, ' s'), 'hz': (0.001, 10.0, ' Hz')}
+_LIMITS = {'s': (0.01, 3600.0, 's'), 'hz': (0.001, 10.0, 'Hz')}
 _LARGEST_COUNT = 1000
 _LARGEST_SEED = 2**32 - 1
 
@@ -50,6 +50,14 @@ def keys_of(cls: 'type[Primitive]', suffix: str) -> dict[str, Field[Any]]:
     """Return key in the file to dataclass field of a primitive, in the order of the class."""
     return {f'{f.name}_{suffix}' if f.name in cls.QUANTITIES else f.name: f for f in fields(cls)
             if f.init and f.name not in _FILLED_IN}
+
+
+def range_of(field: Field[Any]) -> tuple[float, float, str]:
+    """Return (lower, upper, unit) of a key that is no quantity of the domain."""
+    if field.name == 'seed':
+        return 0.0, float(_LARGEST_SEED), ''
+    return _LIMITS.get(
+        field.name.rsplit('_', 1)[-1], (1 if field.type is int else 1e-3, _LARGEST_COUNT, ''))
 
 
 def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_value: float,
@@ -112,14 +120,9 @@ def _check(what: str, field: Field[Any], value: object, is_quantity: bool, where
         raise InputError(f'{what} is {value!r}; a finite number is needed', where)
     if is_quantity:
         return
-    unit = ''
-    if field.name == 'seed':
-        lower, upper = 0.0, float(_LARGEST_SEED)
-    else:
-        lower, upper, unit = _LIMITS.get(
-            field.name.rsplit('_', 1)[-1], (1 if field.type is int else 1e-3, _LARGEST_COUNT, ''))
+    lower, upper, unit = range_of(field)
     if field.type is int and value != int(value):
         raise InputError(f'{what} is {value!r}; a whole number is needed', where)
     if not lower <= value <= upper:
         raise InputError(
-            f'{what} is {value!r}; allowed is {lower:g} to {upper:g}{unit}', where)
+            f'{what} is {value!r}; allowed is {lower:g} to {upper:g}{unit and " "}{unit}', where)

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,13 +26,13 @@ class Multisine(Primitive):
 
     QUANTITIES = ('center', 'amplitude')
     start: float
-    center: float
-    amplitude: float
-    min_hz: float
-    max_hz: float
-    lines: int
-    duration_s: float
-    seed: int = 1
+    center: float = key('centre of the motion')
+    amplitude: float = key('bound of the sum of all sines')
+    min_hz: float = key('lowest frequency')
+    max_hz: float = key('highest frequency')
+    lines: int = key('number of sines')
+    duration_s: float = key('how long it lasts')
+    seed: int = key('of the random numbers', default=1)
 
     def problem(self) -> str:
         """Refuse a band of frequencies in the wrong order."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,10 +26,10 @@ class Pulses(Primitive):
     JUMPS = True
     QUANTITIES = ('height',)
     start: float
-    height: float
-    width_s: float
-    every_s: float
-    count: int
+    height: float = key('height above the value before')
+    width_s: float = key('length of a pulse')
+    every_s: float = key('from one pulse to the next')
+    count: int = key('number of pulses')
 
     def problem(self) -> str:
         """Refuse pulses that would run into each other."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import least_jerk, Primitive
+from pam_actuation.experiments.primitives.base import key, least_jerk, Primitive
 
 
 @dataclass
@@ -25,8 +25,8 @@ class Ramp(Primitive):
 
     QUANTITIES = ('to',)
     start: float
-    to: float
-    duration_s: float
+    to: float = key('value at the end')
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate on the minimum-jerk path."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 from pam_actuation.random_levels import RandomLevels
 
 
@@ -27,12 +27,12 @@ class RandomSteps(Primitive):
     JUMPS = True
     QUANTITIES = ('low', 'high')
     start: float
-    low: float
-    high: float
-    min_hold_s: float
-    max_hold_s: float
-    duration_s: float
-    seed: int = 1
+    low: float = key('lowest value')
+    high: float = key('highest value')
+    min_hold_s: float = key('shortest hold')
+    max_hold_s: float = key('longest hold')
+    duration_s: float = key('how long it lasts')
+    seed: int = key('of the random numbers', default=1)
 
     def problem(self) -> str:
         """Refuse values and holds in the wrong order."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import along, Primitive
+from pam_actuation.experiments.primitives.base import along, key, Primitive
 
 
 @dataclass
@@ -25,12 +25,12 @@ class Rates(Primitive):
 
     QUANTITIES = ('low', 'high')
     start: float
-    low: float
-    high: float
-    slow_period_s: float
-    fast_period_s: float
-    rates: int
-    cycles: int = 1
+    low: float = key('lower end')
+    high: float = key('upper end')
+    slow_period_s: float = key('longest time to and fro')
+    fast_period_s: float = key('shortest time to and fro')
+    rates: int = key('number of rates')
+    cycles: int = key('how often each rate is repeated', default=1)
 
     def problem(self) -> str:
         """Refuse values and periods in the wrong order, and a single rate."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -25,7 +25,7 @@ class Rest(Primitive):
 
     start: float
     rest_value: float
-    duration_s: float
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the rest value and rate 0."""

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive, raised_cosine
+from pam_actuation.experiments.primitives.base import key, Primitive, raised_cosine
 
 
 @dataclass
@@ -25,10 +25,10 @@ class Sine(Primitive):
 
     QUANTITIES = ('center', 'amplitude')
     start: float
-    center: float
-    amplitude: float
-    frequency_hz: float
-    cycles: float
+    center: float = key('centre of the motion')
+    amplitude: float = key('half of the way from end to end')
+    frequency_hz: float = key('repetitions per second')
+    cycles: float = key('how often it is repeated')
 
     @property
     def duration_s(self) -> float:

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,10 +26,10 @@ class Staircase(Primitive):
     JUMPS = True
     QUANTITIES = ('low', 'high')
     start: float
-    low: float
-    high: float
-    steps: int
-    hold_s: float
+    low: float = key('value of the first stair')
+    high: float = key('value of the last stair')
+    steps: int = key('number of stairs')
+    hold_s: float = key('time of each hold')
 
     @property
     def duration_s(self) -> float:

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -26,8 +26,8 @@ class Step(Primitive):
     JUMPS = True
     QUANTITIES = ('to',)
     start: float
-    to: float
-    duration_s: float
+    to: float = key('value to jump to')
+    duration_s: float = key('how long it lasts')
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the new value and rate 0."""

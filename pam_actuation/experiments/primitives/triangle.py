@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import Primitive
+from pam_actuation.experiments.primitives.base import key, Primitive
 
 
 @dataclass
@@ -25,10 +25,10 @@ class Triangle(Primitive):
 
     QUANTITIES = ('low', 'high')
     start: float
-    low: float
-    high: float
-    period_s: float
-    cycles: float
+    low: float = key('lower end')
+    high: float = key('upper end')
+    period_s: float = key('time to and fro')
+    cycles: float = key('how often it is repeated')
 
     @property
     def duration_s(self) -> float:

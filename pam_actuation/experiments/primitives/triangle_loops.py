@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import along, Primitive
+from pam_actuation.experiments.primitives.base import along, key, Primitive
 
 
 @dataclass
@@ -25,12 +25,12 @@ class TriangleLoops(Primitive):
 
     QUANTITIES = ('low', 'high', 'depth')
     start: float
-    low: float
-    high: float
-    depth: float
-    loops: int
-    period_s: float
-    cycles: int = 1
+    low: float = key('lower end')
+    high: float = key('upper end')
+    depth: float = key('how far each inner loop turns back')
+    loops: int = key('inner loops on each branch')
+    period_s: float = key('time to and fro without the inner loops')
+    cycles: int = key('how often it is repeated', default=1)
 
     def problem(self) -> str:
         """Refuse loops that would not lie within the triangle."""

@@ -16,8 +16,7 @@
 
 from dataclasses import dataclass
 
-from pam_actuation.experiments.primitives.base import (
-    least_jerk, Primitive, raised_cosine)
+from pam_actuation.experiments.primitives.base import key, least_jerk, Primitive, raised_cosine
 
 
 @dataclass
@@ -26,12 +25,12 @@ class TwoBands(Primitive):
 
     QUANTITIES = ('low_center', 'high_center', 'amplitude')
     start: float
-    low_center: float
-    high_center: float
-    amplitude: float
-    frequency_hz: float
-    cycles: int
-    move_s: float
+    low_center: float = key('centre of the low band')
+    high_center: float = key('centre of the high band')
+    amplitude: float = key('half of the way from end to end')
+    frequency_hz: float = key('repetitions per second')
+    cycles: int = key('how often it is repeated in each band')
+    move_s: float = key('time of the move to each band')
 
     def problem(self) -> str:
         """Refuse bands in the wrong order."""
