@@ -26,6 +26,8 @@ LONGEST = 150       # ROS allows 255 characters for the name of a service below 
 # As the parser of ROS arguments has it: no two _ in a row.
 _PART = re.compile(r'(?!.*__)[A-Za-z_][A-Za-z0-9_]*')
 
+MUSCLE, JOINT = '/muscle', '/knee'      # where nothing else is said
+
 
 def namespace_of(text: str, where: str = 'namespace') -> str:
     """

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pam_actuation.messages import Status
+from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 
 PLANNED, REACHED, ENDED, BECAUSE = (
@@ -107,17 +108,18 @@ class EndWatch:
     Parameters
     ----------
     namespace : str
-        Namespace of the rig.
+        Namespace of the muscle or joint.
 
     """
 
     def __init__(self, namespace: str) -> None:
-        self._reference, self._driver = f'{namespace}/{REFERENCE}', f'{namespace}/{DRIVER}'
+        self._reference = f'{namespace}/{REFERENCE}'
+        self._drivers = {f'{namespace}/{place}{DRIVER}'
+                         for place in ('', *(f'{side}/' for side in SIDES))}
         # The newest word of the reference while it plays.
         self._heard_ns: int | None = None
         self._elapsed_s: float | None = None
-        self._vented = ''
-        self._vented_s: float | None = None
+        self._vented: dict[str, tuple[float, str]] = {}      # driver: when [s], and why
         self._failed = ''
         self._over = self._finished = False
 
@@ -128,7 +130,7 @@ class EndWatch:
                 return
             if status.name == self._reference:
                 self._hear_reference(status)
-            elif status.name == self._driver:
+            elif status.name in self._drivers:
                 self._hear_driver(status)
 
     def _hear_reference(self, status: Status) -> None:
@@ -143,11 +145,11 @@ class EndWatch:
 
     def _hear_driver(self, status: Status) -> None:
         if status.level < _LEVEL_ERROR:
-            self._vented, self._vented_s = '', None
-        elif self._heard_ns is not None and not self._vented:
-            self._vented = status.message
-            self._vented_s = max(
-                (self._elapsed_s or 0.0) + (status.stamp_ns - self._heard_ns) * 1e-9, 0.0)
+            self._vented.pop(status.name, None)
+        elif self._heard_ns is not None and status.name not in self._vented:
+            since_s = (status.stamp_ns - self._heard_ns) * 1e-9
+            self._vented[status.name] = (
+                max((self._elapsed_s or 0.0) + since_s, 0.0), status.message)
 
     def ending(self, planned_s: float | None, told: Ending | None = None) -> Ending:
         """
@@ -168,9 +170,9 @@ class EndWatch:
             return Ending(planned_s, reached_s or 0.0, told.ended, told.because)
         if self._heard_ns is None and told is None:
             return Ending(planned_s)                # nobody played an experiment
-        if self._vented and self._vented_s is not None:
-            return Ending(planned_s, min(self._vented_s, reached_s or self._vented_s), VENTED,
-                          self._vented)
+        if self._vented:
+            vented_s, why = min(self._vented.values())
+            return Ending(planned_s, min(vented_s, reached_s or vented_s), VENTED, why)
         if self._failed:
             return Ending(planned_s, reached_s, ERROR, self._failed)
         return Ending(planned_s, reached_s, COMPLETE if self._finished else INTERRUPTED)

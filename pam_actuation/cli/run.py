@@ -23,7 +23,8 @@ from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
 
-HELP = 'Run an experiment on live nodes (real ROS 2 processes) and record it.'
+HELP = ('Run an experiment on live nodes (real ROS 2 processes), of a muscle or a joint, and '
+        'record it.')
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 
 
@@ -34,7 +35,8 @@ def add_arguments(parser: Parser) -> None:
                         help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
     parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: a free one, this machine only)')
-    parser.add_argument('--namespace', default='/muscle', help='namespace of the rig')
+    parser.add_argument('--namespace', default=None,
+                        help='namespace of the rig (default: /muscle, of a joint /knee)')
 
 
 def run(args: argparse.Namespace) -> int:

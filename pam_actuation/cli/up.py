@@ -46,7 +46,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
                         help='rig only: sim, another name in config/hardware, or a file')
     parser.add_argument('--record', type=out_path, default=None, metavar='DIR',
-                        help='rig only: folder of a bag')
+                        help='folder of a bag; of exo, of a bag for each knee')
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
     parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
@@ -67,13 +67,16 @@ def run(args: argparse.Namespace) -> int:
     """
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.interrupts import undisturbed
+    from pam_actuation.rigging.plan import RECORDER
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     if args.policy is not None:
         check_file(args.policy, args.overwrite, ours='Made from the code, as docs/')
-    elif args.record:
-        check_bag_target(args.record)
     nodes = _nodes(args)
+    if args.policy is None:
+        for node in nodes:
+            if node.name == RECORDER:
+                check_bag_target(node.parameters['output'])
     _check_controller(args)
     _tell_remarks(args)
     if args.policy is not None:
@@ -143,14 +146,14 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller or '',
-               'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig}
+               'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig,
+               'record': args.record or ''}
     if args.namespace is not None:
         options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     if args.what == 'rig':
-        return layouts.rig(hardware=args.hardware, record=args.record or '', **options)
-    for name, given in (('--hardware', args.hardware != 'sim'), ('--record', args.record)):
-        if given:
-            raise InputError(f'is for a rig only, not for {args.what}', name)
+        return layouts.rig(hardware=args.hardware, **options)
+    if args.hardware != 'sim':
+        raise InputError(f'is for a rig only, not for {args.what}', '--hardware')
     return getattr(layouts, args.what)(**options)

@@ -39,6 +39,7 @@ from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
 from pam_actuation.messages import START_NS, Status
+from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
@@ -51,7 +52,6 @@ if TYPE_CHECKING:
 PUBLISH_RATE_HZ = 250.0                    # of the simulated sensors, as the plant node's default
 STATUS_EVERY_NS = 500_000_000
 LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live
-NAMESPACE, JOINT_NAMESPACE = '/muscle', '/knee'
 
 
 class _Recorder:
@@ -233,8 +233,8 @@ def simulate_experiment(
 def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:
     """Return the name of a muscle or joint within messages, and its namespace."""
     if '' in rig.muscles:
-        return NAMESPACE.removeprefix('/'), NAMESPACE if namespace is None else namespace
-    namespace = JOINT_NAMESPACE if namespace is None else namespace
+        return MUSCLE.removeprefix('/'), MUSCLE if namespace is None else namespace
+    namespace = JOINT if namespace is None else namespace
     return namespace.rpartition('/')[2], namespace
 
 

@@ -40,10 +40,11 @@ from pam_actuation.nodes.runner import run
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.definitions import schema_text, type_hash
 from pam_actuation.topics.quality import Quality, USUAL
-from pam_actuation.topics.table import RECORDED, ROOT
+from pam_actuation.topics.table import RECORDED, RECORDED_OF_JOINT, ROOT, Topic
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
+KNOWN: dict[str, Topic] = {**RECORDED, **RECORDED_OF_JOINT}
 UNKNOWN_VALVE, UNKNOWN_SEED = 'unknown', -1
 TAKE_PERIOD_S = 0.02        # messages carry their own times, so taking may be leisurely
 CHECK_EVERY = 10            # ticks between two looks at the counts
@@ -55,6 +56,9 @@ FAREWELL_S = 2.0            # stopped together with the others: wait for their l
 class ExperimentRecorder(ManagedNode):
     """
     Record while active; each activation writes one bag.
+
+    Its namespace is that of a muscle, or that of a joint: it then records the joint and both
+    muscles below it.
 
     It stores serialized messages with the times of sending and receiving. The sequence numbers
     of their publishers show losses. A write error ends the node with exit code 1; what was
@@ -71,8 +75,9 @@ class ExperimentRecorder(ManagedNode):
         NodeParameter(
             'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
         NodeParameter(
-            'topics', list(RECORDED), 'Topics to record, relative to the namespace '
-            '(diagnostics is /diagnostics).'),
+            'topics', [''], 'Topics to record, relative to the namespace (diagnostics is '
+            '/diagnostics). Empty: all of a muscle; where rig is a joint, all of the joint and '
+            'of both muscles.'),
         NodeParameter(
             'extra_topics', [''], 'Further topics, each as NAME=TYPE, for instance '
             '/bench/imu=sensor_msgs/msg/Imu.'),
@@ -92,7 +97,7 @@ class ExperimentRecorder(ManagedNode):
             'ended (ended.json) and in which the node says what it recorded (recorded.json). '
             'Empty: none.'),
         NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
-        NodeParameter('rig', '', 'Rig preset, or path of its file.'),
+        NodeParameter('rig', '', 'Rig or joint: preset, or path of its file.'),
         NodeParameter('controller', '', 'Controller preset, or path of its file.'),
         NodeParameter(
             'valve_type', UNKNOWN_VALVE, 'Valve of the rig; unknown: that of the rig, else the '
@@ -115,21 +120,22 @@ class ExperimentRecorder(ManagedNode):
         """Refuse topics that are not known."""
         for name in ('topics', 'await_topics'):
             for topic in self.value(name):
-                if topic and topic not in RECORDED:
+                if topic and topic not in KNOWN:
                     raise InputError(
                         f'{topic!r} is not a topic of the rig; known are '
-                        f'{", ".join(RECORDED)}', f'parameter {name}')
+                        f'{", ".join(KNOWN)}', f'parameter {name}')
         check_limits(
             self.value('max_bagfile_size_bytes'), self.value('max_bagfile_duration_s'))
         self.extra = dict(parse_extra_topic(text) for text in self.value('extra_topics') if text)
 
     def setup(self) -> None:
         """Read the metadata, subscribe."""
+        self.topics: tuple[str, ...] = tuple(RECORDED)      # unless told otherwise
         self.metadata = self._metadata()
         self.sources: dict[str, PolledSubscription] = {}
         self.types: dict[str, str] = {}
-        for topic in filter(None, self.value('topics')):
-            row = RECORDED[topic]
+        for topic in list(filter(None, self.value('topics'))) or self.topics:
+            row = KNOWN[topic]
             name = row.full_name('') if row.place == ROOT else topic
             self._record(topic, name, row.type_name, row.service.recorder)
         for name, type_name in self.extra.items():
@@ -157,8 +163,10 @@ class ExperimentRecorder(ManagedNode):
             from pam_actuation.experiments import load_experiment
             experiment = load_experiment(self.value('experiment'))
         if self.value('rig'):
-            from pam_sim import load_rig
-            rig = load_rig(self.value('rig'), valve=valve or None)
+            from pam_sim.joint import JointRig, load_rig_or_joint
+            rig = load_rig_or_joint(self.value('rig'), valve or None)
+            if isinstance(rig, JointRig):
+                self.topics = tuple(RECORDED_OF_JOINT)
         if self.value('controller'):
             from pam_actuation.control.config import load_controller
             # A recorder refuses none: it says which one ran.

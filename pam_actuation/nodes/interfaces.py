@@ -48,7 +48,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'reference_generator': (
         {'experiment': 'disturbance'}, {'experiment': 'pressure_identification'},
         {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'}),
-    'experiment_recorder': (),
+    'experiment_recorder': ({'rig': 'joint_dmsp_5_300'},),
     'joint_simulator': ({'valve_type': 'hsv'},),
     'joint_controller': ()}
 NEEDED: dict[str, dict[str, Any]] = {'hardware_sensors': {'backend': 'dummy'}}

@@ -95,14 +95,20 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
         nodes += [NodeSpec('hardware_sensors', namespace, {}, file),
                   NodeSpec('valve_driver', namespace, driver, file)]
     nodes += _reference(namespace, experiment, kind)
-    if record:
-        nodes = [replace(node, parameters={
-            **node.parameters, 'await_subscriber': f'{namespace}/experiment_recorder'})
-            for node in nodes]
-        nodes.append(NodeSpec('experiment_recorder', namespace, {
-            **described, **({'seed': 0} if hardware == 'sim' else {}),
-            'output': record, 'experiment': experiment, 'controller': name}))
-    return nodes
+    if not record:
+        return nodes
+    return _recorded(nodes, namespace, {
+        **described, **({'seed': 0} if hardware == 'sim' else {}),
+        'output': record, 'experiment': experiment, 'controller': name})
+
+
+def _recorded(nodes: list[NodeSpec], namespace: str,
+              parameters: Mapping[str, Any]) -> list[NodeSpec]:
+    """Return nodes that wait for a recorder, and the recorder."""
+    recorder = f'{namespace}/experiment_recorder'
+    waiting = [replace(node, parameters={**node.parameters, 'await_subscriber': recorder})
+               for node in nodes]
+    return [*waiting, NodeSpec('experiment_recorder', namespace, parameters)]
 
 
 def played(experiment: str, rig: str, valve: str, controller: str = '',
@@ -144,11 +150,12 @@ def played(experiment: str, rig: str, valve: str, controller: str = '',
 
 def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', valve: str = 'ppr',
          controller: str = '', experiment: str = '', seed: int = 0,
-         accept_other_rig: bool = False) -> list[NodeSpec]:
+         accept_other_rig: bool = False, record: str = '') -> list[NodeSpec]:
     """
     Return the nodes of one simulated joint; its name is the last part of the namespace.
 
     ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
+    ``record`` is the folder of the bag; '': no recorder.
     """
     namespace = namespace_of(namespace)
     common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
@@ -162,13 +169,27 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}),
                   NodeSpec('valve_watchdog', below, common)]
-    return nodes + _reference(namespace, experiment, common)
+    nodes += _reference(namespace, experiment, common)
+    if not record:
+        return nodes
+    if not controller:
+        from pam_actuation.control.modes.files import joint_preset_for
+        from pam_sim.joint import load_joint
+        controller = joint_preset_for(load_joint(joint, valve=valve), valve)
+    return _recorded(nodes, namespace, {
+        **common, 'rig': joint, 'seed': seed, 'output': record, 'experiment': experiment,
+        'controller': '' if controller == NO_CONTROLLER else controller})
 
 
-def exo(namespace: str = '', **options: Any) -> list[NodeSpec]:
-    """Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``."""
+def exo(namespace: str = '', record: str = '', **options: Any) -> list[NodeSpec]:
+    """
+    Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``.
+
+    ``record`` is a folder that gets a bag of each; '': no recorder.
+    """
     return [node for k, name in enumerate(KNEES)
-            for node in knee(f'{namespace_of(namespace)}/{name}', seed=2 * k, **options)]
+            for node in knee(f'{namespace_of(namespace)}/{name}', seed=2 * k,
+                             record=record and f'{record}/{name}', **options)]
 
 
 def _reference(namespace: str, experiment: str,

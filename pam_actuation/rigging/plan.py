@@ -25,8 +25,10 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
 from pam_actuation.namespaces import namespace_of, node_name_of
+from pam_actuation.topics.table import RECORDED_OF_JOINT
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
+from pam_sim.joint.rig import JointRig
 
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
@@ -37,31 +39,35 @@ Parameters = dict[str, Any]      # of a node: name to value
 
 RECORDER, PLANT, DRIVER, REFERENCE = (
     'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
+JOINT_PLANT, JOINT_CONTROLLER = 'joint_simulator', 'joint_controller'
 REALTIME_PRIORITY = 1        # the lowest; where it is not allowed the nodes run without
 
 
 @dataclass
 class RigPlan:
     """
-    The nodes of one session.
+    The nodes of one session, each by its place below the namespace of the rig.
 
-    ``parameters`` maps node name to ROS parameters, in the order in which the nodes
-    become active; ``controller_node`` is '' for an experiment without controller.
+    ``parameters`` maps the place of a node, such as ``valve_driver`` or ``flexor/valve_driver``,
+    to ROS parameters, in the order in which the nodes become active. ``controller_node`` is ''
+    for an experiment without controller. A muscle has one of the ``drivers``, a joint two.
     """
 
     experiment: 'Experiment'
-    rig: 'Rig'
+    rig: 'Rig | JointRig'
     controller: 'Controller | None'
     controller_node: str
     parameters: dict[str, Parameters]
     folder: Path
+    plant_node: str = PLANT
+    drivers: tuple[str, ...] = (DRIVER,)
 
     def remove(self) -> None:
         """Delete the files made for the nodes."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
+def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig',
               controller: 'StrPath | Controller | None' = None, valve: str | None = None,
               bag: StrPath | None = None, *, learning: bool = True, seed: int = 0,
               namespace: str = '/muscle', overwrite: bool = False, realtime: bool = True
@@ -75,8 +81,8 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
     Parameters
     ----------
     experiment, rig, controller : str, path or object
-        Name, path, or what ``load_experiment``, ``load_rig``, ``load_controller`` return.
-        Without controller: the preset of the valve for what the experiment asks for.
+        Name, path, or what ``load_experiment``, ``load_rig_or_joint``, ``load_controller``
+        return. Without controller: the preset of the valve for what the experiment asks for.
     valve : str, optional
         'ppr' or 'hsv'; default: that of the rig.
     bag : path, optional
@@ -102,15 +108,15 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
     from pam_actuation.control.modes.files import preset_for
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.limits import check_tracked
-    from pam_sim import load_rig
+    from pam_sim.joint import load_rig_or_joint
     asked: Experiment = load_experiment(os.fspath(experiment)) if isinstance(
         experiment, (str, os.PathLike)) else experiment
-    model: Rig = load_rig(rig, valve=valve) if isinstance(rig, (str, os.PathLike)) else rig
+    model = load_rig_or_joint(rig, valve) if isinstance(rig, (str, os.PathLike)) else rig
     if valve and valve != model.valve:
         model = model.with_(valve=valve)
     asked.check_reachable(model)
     law: Controller | None = None
-    if asked.tracked:
+    if asked.asks_for_motion:
         if controller is None or isinstance(controller, (str, os.PathLike)):
             law = load_controller(controller or preset_for(asked, model), model)
         else:
@@ -124,7 +130,10 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
     _compile(model, law)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(asked, model, law, '', {}, folder)
-    if law is not None:
+    if isinstance(model, JointRig):
+        plan.plant_node, plan.controller_node = JOINT_PLANT, JOINT_CONTROLLER
+        plan.drivers = tuple(f'{place}{DRIVER}' for place in model.muscles)
+    elif law is not None:
         # The node of fixed gains runs every controller without rules.
         plan.controller_node = 'sofc_controller' if law.kind == 'sofc' else 'pid_controller'
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
@@ -134,10 +143,14 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig',
     return plan
 
 
-def _compile(rig: 'Rig', controller: 'Controller | None') -> None:
+def _compile(rig: 'Rig | JointRig', controller: 'Controller | None') -> None:
     """Run every compiled function once, so that its machine code is in the cache."""
     from pam_actuation.drivers.loop import DriverLoop
-    rig.plant().step((0.0,) * len(rig.signal_names))
+    if isinstance(rig, JointRig):
+        flexor, extensor = ((0.0,) * len(one.signal_names) for one in rig.muscles.values())
+        rig.plant().step(flexor, extensor)
+    else:
+        rig.plant().step((0.0,) * len(rig.signal_names))
     DriverLoop(rig.valve)
     if controller is not None:
         from pam_actuation.control.config import load_controller
@@ -147,8 +160,7 @@ def _compile(rig: 'Rig', controller: 'Controller | None') -> None:
 
 def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, namespace: str,
                 overwrite: bool) -> dict[str, Parameters]:
-    """Return node name to parameters and write the files they name."""
-    from pam_actuation.experiments import ReferenceLoop
+    """Return the place of each node to its parameters and write the files they name."""
     rig, controller = plan.rig, plan.controller
     rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
     nodes: dict[str, Parameters] = {}
@@ -157,23 +169,23 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
             learning=str(bool(learning)).lower(),
             remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)))
-        wanted = ReferenceLoop(plan.experiment, valve=rig.valve).topics
-        topics = ['pressure', 'contraction', 'force', 'valve_signal', *wanted]
-        if rig.valve == 'hsv':
-            topics.append('supply_pressure')
-        if controller is not None:
-            topics += ['controller_state', 'pressure_command', 'followed_pressure']
         nodes[RECORDER] = {
-            'output': os.path.abspath(bag), 'overwrite': overwrite, 'await_topics': topics,
-            'notes_folder': str(plan.folder),
+            'output': os.path.abspath(bag), 'overwrite': overwrite,
+            'await_topics': _awaited(plan), 'notes_folder': str(plan.folder),
             'metadata_file': _write(plan.folder / 'metadata.json', json.dumps(metadata))}
-    nodes[PLANT] = {'rig': rig_file, 'valve_type': rig.valve, 'seed': seed}
-    nodes[DRIVER] = {
-        'valve_type': rig.valve, 'rig': rig_file,
-        'accept_valve_command': plan.experiment.sends_valve_command(rig.valve)}
+        if isinstance(rig, JointRig):
+            nodes[RECORDER]['topics'] = list(RECORDED_OF_JOINT)
+    model = {'joint' if isinstance(rig, JointRig) else 'rig': rig_file}
+    nodes[plan.plant_node] = {**model, 'valve_type': rig.valve, 'seed': seed}
+    for driver, muscle in zip(plan.drivers, rig.muscles.values()):
+        file = rig_file if muscle is rig else _write(
+            plan.folder / f'{driver.replace("/", "_")}.yaml', muscle.to_yaml())
+        nodes[driver] = {
+            'valve_type': muscle.valve, 'rig': file,
+            'accept_valve_command': plan.experiment.sends_valve_command(rig.valve)}
     if controller is not None:
         nodes[plan.controller_node] = {
-            'rig': rig_file, 'valve_type': rig.valve,
+            **model, 'valve_type': rig.valve,
             'accept_other_rig': bool(controller.other_rig),
             'controller': _write(plan.folder / 'controller.yaml', controller.to_yaml())}
         if controller.kind == 'sofc':
@@ -183,9 +195,29 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
         'experiment': _write(plan.folder / 'experiment.yaml', plan.experiment.to_yaml())}
     for parameters in nodes.values():
         parameters['autostart'] = False
+        if isinstance(rig, JointRig):
+            parameters['muscle'] = namespace_of(namespace).rpartition('/')[2]
         if bag is not None:
             parameters['await_subscriber'] = node_name_of(RECORDER, namespace_of(namespace))
     return nodes
+
+
+def _awaited(plan: RigPlan) -> list[str]:
+    """Return the topics without whose publishers the recorder does not begin."""
+    from pam_actuation.experiments import ReferenceLoop
+    valve = plan.rig.valve
+    of_muscle = ['pressure', 'contraction', 'force', 'valve_signal']
+    if valve == 'hsv':
+        of_muscle.append('supply_pressure')
+    if plan.controller is not None:
+        of_muscle += ['pressure_command', 'followed_pressure']
+    topics = [f'{place}{topic}' for place in plan.rig.muscles for topic in of_muscle]
+    topics += ReferenceLoop(plan.experiment, valve=valve).topics
+    if plan.controller is not None:
+        topics.append('controller_state')
+    if isinstance(plan.rig, JointRig):
+        topics.append('joint_state')
+    return topics
 
 
 def _write(path: Path, text: str) -> str:

@@ -33,9 +33,9 @@ from typing import Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
 from pam_actuation.interrupts import undisturbed
-from pam_actuation.namespaces import namespace_of
+from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.rigging.domain import DomainLock
-from pam_actuation.rigging.plan import DRIVER, make_plan, PLANT, RECORDER, REFERENCE, RigPlan
+from pam_actuation.rigging.plan import make_plan, RECORDER, REFERENCE, RigPlan
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
     from pam_actuation.experiments.experiment import Experiment
     from pam_actuation.rigging.client import RigClient
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 Progress = Callable[[float, float], object]     # takes seconds done, seconds in all
@@ -78,9 +79,10 @@ class Result:
     published, recorded : dict
         Full topic name to number of messages.
     exit_codes : dict
-        Node name to exit code (negative: ended by that signal).
+        Node to exit code (negative: ended by that signal), each by its place below the
+        namespace, such as ``flexor/valve_driver``.
     cpu_share : dict
-        Node name to processor time over run time [cores].
+        Node to processor time over run time [cores].
 
     """
 
@@ -166,9 +168,12 @@ class RigSession:
 
         """
         environment = node_environment(self.domain_id, self.plan.folder)
-        for name, parameters in self.plan.parameters.items():
-            self.processes[name] = NodeProcess(
-                name, self.namespace, parameters, environment, self.plan.folder)
+        for place, parameters in self.plan.parameters.items():
+            below, _, name = place.rpartition('/')
+            log_dir = self.plan.folder / below
+            log_dir.mkdir(exist_ok=True)
+            self.processes[place] = NodeProcess(
+                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, environment, log_dir)
         # Only now: a process with the threads of the middleware does not fork safely.
         self.client = self._new_client(self.domain_id)
         self.change(self.processes, 'configure', START_TIMEOUT_S)
@@ -219,13 +224,16 @@ class RigSession:
     def _describe_loss(self, process: NodeProcess, done_s: float) -> str:
         """Return a sentence on a node that ended, and on what the driver made of it."""
         sentence = f'{process.how_it_ended()} {done_s:.1f} s into the experiment'
-        driver = self.processes[DRIVER]
-        if process is driver:
+        drivers = [self.processes[name] for name in self.plan.drivers]
+        if drivers == [process]:
             return f'{sentence}; nobody drives the valve'
         client = self._started()
         client.spin(0.4)
-        level, message, _ = client.statuses.get(driver.full_name, (0, '', {}))
-        return f'{sentence}; valve_driver: {message}' if level else sentence
+        for driver in drivers:
+            level, message, _ = client.statuses.get(driver.full_name, (0, '', {}))
+            if level:
+                return f'{sentence}; {driver.name}: {message}'
+        return sentence
 
     def finish(self, ended: str = '', because: str = '') -> list[str]:
         """
@@ -247,10 +255,11 @@ class RigSession:
         problems: list[str] = []
         if self.client is None:
             return problems
-        problems += self._deactivate([REFERENCE, self.plan.controller_node, DRIVER])
-        if DRIVER in self._active:
+        drivers = self.plan.drivers
+        problems += self._deactivate([REFERENCE, self.plan.controller_node, *drivers])
+        if self._active.intersection(drivers):
             self.client.spin(VENT_S)
-        problems += self._deactivate([PLANT])
+        problems += self._deactivate([self.plan.plant_node])
         self._tell_recorder(ended, because)
         problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
         self.client.spin(0.1)
@@ -320,11 +329,11 @@ def recorded_counts(bag: StrPath) -> dict[str, int]:
 
 
 def run_experiment(experiment: 'StrPath | Experiment',
-                   rig: 'StrPath | Rig' = 'dmsp_5_300_realistic',
+                   rig: 'StrPath | Rig | JointRig' = 'dmsp_5_300_realistic',
                    controller: 'StrPath | Controller | None' = None, valve: str | None = None,
                    out_dir: StrPath | None = None, *, learning: bool = True, seed: int = 0,
                    domain_id: int | None = None, progress: Progress | None = None,
-                   with_recorder: bool = True, namespace: str = '/muscle',
+                   with_recorder: bool = True, namespace: str | None = None,
                    overwrite: bool = False, realtime: bool = True) -> Result:
     """
     Run one experiment on live nodes and record it.
@@ -347,8 +356,9 @@ def run_experiment(experiment: 'StrPath | Experiment',
         Called with (seconds done, seconds in all).
     with_recorder : bool
         False: run without recording.
-    namespace : str
-        Namespace of the rig.
+    namespace : str, optional
+        Namespace of the rig; by default ``/muscle``, of a joint ``/knee``. The last part of
+        it is the name of the joint.
     overwrite : bool
         Replace an existing bag.
     realtime : bool
@@ -366,6 +376,11 @@ def run_experiment(experiment: 'StrPath | Experiment',
         A mistake in experiment, rig or controller, an existing bag, or no ROS 2.
 
     """
+    if isinstance(rig, (str, os.PathLike)):
+        from pam_sim.joint import load_rig_or_joint
+        rig = load_rig_or_joint(rig, valve)
+    if namespace is None:
+        namespace = MUSCLE if '' in rig.muscles else JOINT
     namespace = namespace_of(namespace)
     if not namespace:
         raise InputError('is needed, such as /muscle', 'namespace')

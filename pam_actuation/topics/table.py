@@ -29,6 +29,7 @@ from pam_actuation.topics.contents import (
     AnyJoints, Content, JOINT_STATE, NamedNumbers, Numbers, Numeric, Statuses, Trajectory, Value)
 from pam_actuation.topics.quality import Service, USUAL
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 
 # Where a topic lies: in the namespace of a muscle, in that of a joint, or at the root.
 MUSCLE, JOINT, ROOT = 'muscle', 'joint', 'root'
@@ -174,6 +175,14 @@ BY_NAME = {topic.name: topic for topic in TOPICS}
 RECORDED = {topic.name: topic for topic in TOPICS if topic.place != JOINT}
 # What a loaded run can hold.
 OF_A_RUN = {name: topic for name, topic in RECORDED.items() if topic.place == MUSCLE}
+# What a recording of a joint holds, by name relative to the joint: its own topics, those of its
+# controller, and what the nodes of a joint send in the namespace of each muscle.
+_BELOW = tuple(name for name, topic in OF_A_RUN.items() if name != 'controller_state' and (
+    {'joint_simulator', 'joint_controller', *DRIVER} & {*topic.published_by}))
+RECORDED_OF_JOINT = {
+    **{topic.name: topic for topic in TOPICS if topic.place == JOINT},
+    'controller_state': BY_NAME['controller_state'], 'diagnostics': BY_NAME['diagnostics'],
+    **{f'{side}/{name}': BY_NAME[name] for side in SIDES for name in _BELOW}}
 
 
 def short_name(full_name: str) -> str:

@@ -181,6 +181,12 @@ VENTED = said('valve_driver', 'vented because the reading is above the limit', 1
     ((PLAYING, VENTED, said('valve_driver', 'following', 12.5),
       said('reference_generator', 'finished sine', 18.0, elapsed_s=8.0)),
      Ending(8.0, 8.0, 'complete')),
+    # Of a joint the driver of one muscle follows again, that of the other does not.
+    ((PLAYING, said('flexor/valve_driver', 'vented', 12.0, 2),
+      said('extensor/valve_driver', 'stopped', 11.0, 2),
+      said('extensor/valve_driver', 'following', 12.5),
+      said('reference_generator', 'finished sine', 18.0, elapsed_s=8.0)),
+     Ending(8.0, 2.5, 'vented', 'vented')),
     ((PLAYING, said('reference_generator', 'the loop of this node failed: x', 13.0, 2)),
      Ending(8.0, 0.5, 'error', 'the loop of this node failed: x'))])
 def test_a_live_run_is_judged_by_what_its_nodes_say(heard, ending):

@@ -22,11 +22,16 @@ import sys
 import time
 
 from live_rig import LiveRig, wait_for
+from pam_actuation.bags.ending import Ending, ending_of
+from pam_actuation.bags.load_joint import load_recording
+from pam_actuation.cli.main import main
 from pam_actuation.messages import NamedEfforts, Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.joint_controller import GIVING
 from pam_actuation.nodes.ros_messages import class_of
+from pam_actuation.replay.joint import replay_joint
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
+from pam_actuation.rigging.session import run_experiment
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_actuation.topics.codec import Writer
 from pam_sim.joint.parameters import SIDES
@@ -49,6 +54,44 @@ EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'gait_stack.py'
 TOPICS = ('joint_state', 'joint_reference', *(
     f'{side}/{topic}' for side in SIDES
     for topic in ('pressure', 'pressure_command', 'valve_signal')))
+
+
+SHORT = """
+name: bend
+domain: joint_angle
+segments:
+  - rest: {duration_s: 0.3}
+  - ramp: {to_rad: 0.3, duration_s: 0.7}
+  - hold: {duration_s: 0.5}
+"""
+
+
+def test_an_experiment_is_recorded_as_a_whole_and_replayed_to_the_bit(tmp_path, capsys):
+    result = run_experiment(
+        SHORT, 'joint_dmsp_5_300_realistic', valve='ppr', out_dir=tmp_path / 'bag', seed=3,
+        namespace='/left_knee')
+    assert result.complete and result.findings == [], result
+    assert set(result.exit_codes) == {
+        'experiment_recorder', 'joint_simulator', 'joint_controller', 'reference_generator',
+        *(f'{side}/valve_driver' for side in SIDES)}
+    assert set(result.exit_codes.values()) == {0}
+    run = load_recording(result.bag)
+    assert run.namespace == '/left_knee' and run.metadata['seed'] == '3'
+    assert ending_of(run.metadata) == Ending(1.5, 1.5, 'complete')
+    assert {'joint_state', 'joint_reference', 'controller_state', *(
+        f'{side}/{topic}' for side in SIDES for topic in (
+            'pressure', 'contraction', 'force', 'pressure_command', 'valve_signal',
+            'followed_pressure'))} <= set(run.topics)
+    assert abs(run['joint_state']['angle_rad']).max() > 0.03
+    for side in SIDES:
+        volts = run[f'{side}/valve_signal']['ppr_voltage']
+        assert volts.max() > 1.0 and volts[-1] == 0.0
+    replayed = replay_joint(run, only='controller')
+    controller = replayed.parts['controller']
+    assert controller.identical and not replayed.internals, replayed.text()
+    assert len(controller.recorded['flexor/pressure_command.pressure_pa']) > 250
+    assert main(['report', result.bag, '--out', str(tmp_path / 'page.html')]) == 0
+    assert 'left_knee' in (tmp_path / 'page.html').read_text(encoding='utf-8')
 
 
 @pytest.fixture

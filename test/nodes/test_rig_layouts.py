@@ -74,6 +74,21 @@ def test_both_knees_have_all_nodes_their_names_and_seeds():
     assert seeds == [0, 2]          # a joint takes two
 
 
+def test_a_joint_is_recorded_as_a_whole_and_each_knee_in_a_bag_of_its_own():
+    for valve in ('ppr', 'hsv'):
+        nodes = layouts.knee(valve=valve, record='bag')
+        *others, recorder = nodes
+        assert names(others) == names(layouts.knee())
+        assert {node.parameters['await_subscriber'] for node in others} == {
+            '/knee/experiment_recorder'}
+        assert recorder.parameters['rig'] == 'joint_dmsp_5_300_realistic'
+        assert recorder.parameters['controller'] == f'sofc_joint_{valve}'
+    alone = layouts.knee(record='bag', controller='none')[-1]
+    assert alone.name == 'experiment_recorder' and alone.parameters['controller'] == ''
+    assert [node.parameters['output'] for node in layouts.exo(record='bags')
+            if node.name == 'experiment_recorder'] == ['bags/left_knee', 'bags/right_knee']
+
+
 def test_every_node_has_its_place_in_the_order():
     nodes = [*layouts.rig(hardware='dummy', experiment='rest', record='bag'), *layouts.rig(),
              *layouts.exo(experiment='joint_sine')]
@@ -81,7 +96,7 @@ def test_every_node_has_its_place_in_the_order():
 
 
 @pytest.mark.parametrize('arguments, words', [
-    (['knee', '--record', 'bag'], '--record'), (['exo', '--hardware', 'dummy'], '--hardware'),
+    (['knee', '--hardware', 'dummy'], '--hardware'),
     (['rig', '--hardware', 'nothing'], 'nothing'),
     (['rig', '--experiment', 'nowhere'], 'nowhere'),
     (['rig', '--experiment', 'voltage_steps', '--valve', 'hsv'], 'voltage')])
