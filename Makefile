@@ -12,7 +12,6 @@
 VENV ?= .venv
 ARGS ?=
 BIN := $(VENV)/bin
-ALONE := ros and not shared
 STAMP := $(VENV)/installed
 
 # Nothing of a run leaves this machine, and one thread per process is fastest here.
@@ -37,20 +36,9 @@ help:
 demo: $(STAMP)
 	@$(BIN)/pam demo $(ARGS)
 
-# What needs no machine of its own goes through all cores, file by file in this order, so that
-# the long files do not come last. The live nodes then have the machine to themselves.
 test: $(STAMP)
 ifeq ($(strip $(ARGS)),)
-	@failed=0; \
-	$(BIN)/python -m pytest -m 'shared or not ros' --numprocesses auto --dist loadfile \
-	  --no-loadscope-reorder || failed=1; \
-	$(BIN)/python -m pytest -m '$(ALONE)'; live=$$?; \
-	if [ $$live -eq 75 ]; then \
-	  echo 'The machine stood still during the live tests that failed; these once more:'; \
-	  $(BIN)/python -m pytest -m '$(ALONE)' --last-failed; live=$$?; \
-	fi; \
-	[ $$live -eq 0 ] || failed=1; \
-	exit $$failed
+	@$(BIN)/python test/run_all.py
 else
 	@$(BIN)/python -m pytest $(ARGS)
 endif

@@ -21,7 +21,7 @@ import tempfile
 import time
 
 import pytest
-from stall_watch import STALL_S, StallWatch
+from stall_watch import EXIT_STOOD_STILL, STALL_S, StallWatch, TIMED
 
 # Set before anything imports rclpy; children inherit it. Ids above 101 collide
 # with the ports that Linux hands out. Values given from outside are respected.
@@ -39,10 +39,6 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.get_closest_marker('ros'):
             item.add_marker(pytest.mark.skip(reason='rclpy is not installed'))
-
-
-# Exit code of a run in which tests failed, but only while the machine stood still.
-EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
 
 
 class StallPlugin:
@@ -88,5 +84,5 @@ class StallPlugin:
 
 def pytest_configure(config):
     """Watch the machine where live tests run one after the other."""
-    if HAS_ROS and config.getoption('markexpr') in ('ros', 'ros and not shared'):
+    if HAS_ROS and config.getoption('markexpr') in ('ros', TIMED):
         config.pluginmanager.register(StallPlugin())

@@ -27,6 +27,10 @@ import sys
 import threading
 import time
 
+# What judges times, as an expression of markers: its priority stays.
+TIMED = 'timed or ros and not shared'
+# Exit code of a run in which tests failed, but only while the machine stood still.
+EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
 PERIOD_S = 0.01
 STALL_S = 0.025     # a quarter of the shortest time limit of the rig
 

@@ -30,6 +30,7 @@ def kills(monkeypatch):
     return importlib.import_module('kill_recorder')
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize('split_bytes', (0, 150_000))
 def test_a_killed_process_loses_less_than_a_second_and_alters_nothing(
         tmp_path, kills, split_bytes):
@@ -50,6 +51,7 @@ def test_a_killed_node_loses_less_than_a_second_and_alters_nothing(tmp_path, kil
     assert result['problems'] == [] and result['messages'] > 100
 
 
+@pytest.mark.timed
 def test_the_check_sees_an_altered_and_a_missing_message(tmp_path, kills, monkeypatch):
     case, = kills.kill_processes(tmp_path, 1, types.SimpleNamespace(uniform=lambda *_: 2.0))
     assert kills.examine(case)['problems'] == []

@@ -216,6 +216,7 @@ def test_given_publishers_are_counted_apart():
     assert (result.lost, result.missed_at_start, result.publishers) == (1, 4 + 899, 2)
 
 
+@pytest.mark.timed
 def test_killed_recorder_leaves_a_readable_beginning(tmp_path):
     writer = BagWriter(tmp_path / 'run', METADATA)
     core = recorder_on(writer)

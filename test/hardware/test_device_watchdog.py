@@ -27,6 +27,8 @@ from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
 import pytest
 
+pytestmark = pytest.mark.timed
+
 DRIVING = """
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware.back_ends import open_valve, parameters_of, VALVE_OUTPUTS

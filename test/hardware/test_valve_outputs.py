@@ -97,6 +97,7 @@ def test_a_venting_valve_that_is_open_without_current(tmp_path):
     assert duties(chip) == (PERIOD_NS // 4, PERIOD_NS)
 
 
+@pytest.mark.timed
 def test_a_channel_is_exported_and_waited_for(tmp_path):
     chip = make_pwm(tmp_path, exported=(0,))
 

@@ -61,6 +61,7 @@ def answers(calls):
     return json.loads(done.stdout)
 
 
+@pytest.mark.timed
 def test_help_is_printed_by_every_executable_without_ros():
     assert len(NAMES) == 10
     calls = [(name, [*before, word]) for name in NAMES for word in ('-h', '--help')

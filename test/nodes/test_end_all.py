@@ -38,6 +38,7 @@ class DeafNode(NodeProcess):
         self._process.stdout.readline()
 
 
+@pytest.mark.timed
 def test_nodes_that_do_not_end_share_the_time_they_are_given():
     nodes = [DeafNode() for _ in range(4)]
     begin = time.monotonic()
