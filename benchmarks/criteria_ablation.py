@@ -15,21 +15,25 @@
 """
 What each decision threshold of `pam gap` decides: halved and doubled, in groups and one by one.
 
-    python benchmarks/criteria_ablation.py --work ablation                # a night on two cores
+    python benchmarks/criteria_ablation.py --work ablation               # an hour, two cores
     python benchmarks/criteria_ablation.py --work ablation --minutes 40   # a piece; again to go on
     python benchmarks/criteria_ablation.py --work ablation --write       # table to docs/results
+    python benchmarks/criteria_ablation.py --work ablation --check 5     # does memory change bits?
 
 First hidden cases are answered as usual, and every comparison with a threshold is logged: how
 near the compared value came to it. The cases with most thresholds within 20 % of a decision are
-kept. On these all thresholds of a group are halved, then doubled. Where that changes an answer,
-each threshold of the group is changed by itself. A case in which a threshold never came within
-a factor of two of a decision cannot change, and is not asked again.
+kept. On these all thresholds of a group are halved, then doubled. Where that changes the answer
+of a case, each threshold of the group is changed there by itself, in the same direction. A case
+in which a threshold never came within a factor of two of a decision cannot change, and is not
+asked again.
 
-A share above one half is varied by its distance to one. Answers are kept one by one, so an
-interrupted run goes on where it stopped.
+All questions to a case are asked in a row, in one process. They repeat most fits of each other,
+which :mod:`gap_memory` remembers. A share above one half is varied by its distance to one.
+Answers are kept one by one, so an interrupted run goes on where it stopped.
 """
 
 import argparse
+from contextlib import contextmanager, ExitStack
 import dataclasses
 import json
 import math
@@ -38,7 +42,9 @@ import platform
 import subprocess
 import sys
 import time
+from unittest import mock
 
+from gap_memory import Memory, remembered
 from joblib import delayed, Parallel
 import numpy as np
 
@@ -48,15 +54,16 @@ sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT)]
 
 from pam_actuation.bags.load import load_run  # noqa: E402, I100
 from pam_sim import load_rig  # noqa: E402
-from pam_sim.gap import find_gap  # noqa: E402
+from pam_sim.gap import find_gap, workflow  # noqa: E402
 from pam_sim.gap.criteria import CRITERIA, Criteria, GROUPS, table  # noqa: E402
+from pam_sim.gap.fit.solver import Solver  # noqa: E402
 from scoring_judge import is_right, read_answer  # noqa: E402
 import truth_cases  # noqa: E402
 
 RESULTS = ROOT / 'docs' / 'results' / 'criteria_ablation.md'
 CRITERION = {c.name: c for c in table()}
 NEAR, FACTOR = 1.2, 2.0
-NOTHING, NOT_ASKED = '–', 'not asked'
+NOTHING = '–'
 UNFINISHED = 3               # exit code
 SECONDS = 3600.0             # of one search: time must never decide
 # Their comparisons cannot be logged: a square root takes the number itself.
@@ -155,27 +162,116 @@ def variant(names, up):
     return dataclasses.replace(CRITERIA, **{name: varied(name, up) for name in names})
 
 
-def answer(folder, criteria):
-    """Return the verdict and names of a case."""
-    rig = load_rig(str(folder / 'model.yaml'))
-    result = find_gap(load_run(folder / 'fit'), rig, load_run(folder / 'certify'),
-                      seconds=SECONDS, criteria=criteria)
-    data = result.to_dict()
-    return {'verdict': result.verdict, 'ambiguity_set': data['ambiguity_set'],
-            'names': sorted([e['name'] for e in result.effects]
-                            + [p.name for p in result.parameters]),
-            'right': bool(is_right(read_answer(data), read(folder / 'key.json')))}
+class HiddenCase:
+    """
+    A recorded case, ready to be searched.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Where its recordings, key and answers are.
+    memory : Memory
+        What its searches remember.
+
+    """
+
+    def __init__(self, folder, memory):
+        self.folder, self.memory = folder, memory
+        self.runs, self.rig = {}, load_rig(str(folder / 'model.yaml'))
+
+    def _run(self, name):
+        if name not in self.runs:
+            self.runs[name] = load_run(self.folder / name)
+        return self.runs[name]
+
+    def search(self, criteria):
+        """Return everything that a search finds, as a dictionary."""
+        return find_gap(self._run('fit'), self.rig, self._run('certify'), seconds=SECONDS,
+                        criteria=criteria).to_dict()
+
+    def answer(self, criteria):
+        """Return the verdict and names of a case, and whether they are right."""
+        with remembered(self.memory), verdict_alone():
+            data = self.search(criteria)
+        return {'verdict': data['verdict'], 'ambiguity_set': data['ambiguity_set'],
+                'names': sorted([e['name'] for e in data['effects']]
+                                + [p['name'] for p in data['parameters']]),
+                'right': bool(is_right(read_answer(data), read(self.folder / 'key.json')))}
+
+    def ask(self, label, names, up):
+        """Answer with thresholds changed, unless nothing can change or that was done."""
+        usual = read(self.folder / 'usual.json')
+        target = answered(self.folder, label, up)
+        if not target.exists():
+            near = [name for name in names if is_within_reach(name, usual['log'])]
+            write(target, self.answer(variant(near, up)) if near else usual['answer'])
+        return read(target) != usual['answer']
+
+
+@contextmanager
+def verdict_alone():
+    """Leave out what the workflow only reports once it has its verdict."""
+    with ExitStack() as stack:
+        for name, nothing in (('locate', []), ('fingerprint', {}), ('least_sizes', {}),
+                              ('explain', '')):
+            stack.enter_context(mock.patch.object(
+                workflow, name, lambda *_, nothing=nothing: nothing))
+        yield
+
+
+def compares_bounds(settle):
+    """Return ``Solver.settle`` that compares every number it fits with the bounds of its box."""
+    def settled(solver, *arguments):
+        x, errors = settle(solver, *arguments)
+        for problem, (_, known_z) in zip(solver.problems, solver.split(x)[1]):
+            abs(np.array([z for k, z in zip(problem.known, known_z) if k.of_rig
+                          and k.name not in solver.hypothesis.numbers])) < solver.estimator.box
+        return x, errors
+    return settled
 
 
 def record(case, work):
     """Make a case, answer it as usual with every comparison logged, and keep that."""
     folder = work / 'cases' / case.name
+    if (folder / 'usual.json').exists():
+        return
     if not (folder / 'key.json').exists():
         write(folder.with_suffix('.key'), truth_cases.build(case, folder, with_gap=False))
         folder.with_suffix('.key').replace(folder / 'key.json')
     log = {}
     watched = Criteria(**{name: Watched(c.value, name, log) for name, c in CRITERION.items()})
-    write(folder / 'usual.json', {'answer': answer(folder, watched), 'log': log})
+    with mock.patch.object(Solver, 'settle', compares_bounds(Solver.settle)):
+        usual = HiddenCase(folder, Memory()).answer(watched)
+    write(folder / 'usual.json', {'answer': usual, 'log': log})
+
+
+def ask_groups(folder):
+    """Ask a case with every group of thresholds changed."""
+    case = HiddenCase(folder, Memory())
+    for group, names in members().items():
+        for up in (False, True):
+            case.ask(f'group_{group}', names, up)
+
+
+def ask_single(folder):
+    """Ask a case with single thresholds changed, of the groups that changed its answer."""
+    case, usual = HiddenCase(folder, Memory()), read(folder / 'usual.json')
+    for group, names in members().items():
+        for up in (False, True):
+            if case.ask(f'group_{group}', names, up):
+                for name in names:
+                    if is_within_reach(name, usual['log']):
+                        case.ask(name, [name], up)
+
+
+def members():
+    """Return the names of the thresholds of every group."""
+    return {group: [c.name for c in CRITERION.values() if c.group == group] for group in GROUPS}
+
+
+def answered(folder, label, up):
+    """Return the file that holds an answer."""
+    return folder / f'{label}_{"up" if up else "down"}.json'
 
 
 def is_within_reach(name, log):
@@ -185,23 +281,32 @@ def is_within_reach(name, log):
         between <= FACTOR or is_near_one(name))
 
 
-def ask(folder, label, names, up):
-    """Answer a case with thresholds changed, unless nothing can change or that was done."""
-    usual = read(folder / 'usual.json')
-    target = folder / f'{label}_{"up" if up else "down"}.json'
-    if not target.exists():
-        reachable = any(is_within_reach(name, usual['log']) for name in names)
-        write(target, answer(folder, variant(names, up)) if reachable else usual['answer'])
-    return read(target)
+def check(folders):
+    """Print whether searches that remember find the same as those that do not."""
+    for folder in folders:
+        case, plain = HiddenCase(folder, Memory()), HiddenCase(folder, Memory())
+        for group, names in members().items():
+            for up in (False, True):
+                criteria = variant(names, up)
+                with remembered(case.memory):
+                    found = case.search(criteria)
+                wanted = plain.search(criteria)
+                for data in (found, wanted):        # how long it took and how much was simulated
+                    data.pop('runtime_s'), data.pop('simulations')
+                same = json.dumps(found, default=str) == json.dumps(wanted, default=str)
+                print(folder.name, group, 'up' if up else 'down', 'same' if same else 'OTHER',
+                      flush=True)
 
 
 def each(until, function, arguments, jobs):
-    """Return function(*a) of all arguments, None where some were not begun in time."""
+    """Call function(*a) for all arguments; return whether all were begun in time."""
     def begun(one):
-        return (True, function(*one)) if time.time() < until else (False, None)
+        if time.time() >= until:
+            return False
+        function(*one)
+        return True
 
-    found = Parallel(n_jobs=jobs)(delayed(begun)(one) for one in arguments)
-    return [one for _, one in found] if all(done for done, _ in found) else None
+    return all(Parallel(n_jobs=jobs)(delayed(begun)(one) for one in arguments))
 
 
 def main():
@@ -213,63 +318,78 @@ def main():
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--minutes', type=float, default=math.inf)
     parser.add_argument('--write', action='store_true', help=f'write {RESULTS.name}')
+    parser.add_argument('--check', type=int, default=0, metavar='CASES',
+                        help='compare so many of them with and without memory, no more')
     args = parser.parse_args()
     until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.recorded, args.seed)
-    if each(until, record, [(c, args.work) for c in cases if not (
-            args.work / 'cases' / c.name / 'usual.json').exists()], args.jobs) is None:
-        print('the minutes are over; start again to go on')
-        return UNFINISHED
-    folders = {c.name: args.work / 'cases' / c.name for c in cases}
-    logs = {name: read(folder / 'usual.json')['log'] for name, folder in folders.items()}
-    ranked = sorted(logs, key=lambda name: (-sum(
-        between < NEAR for _, between in logs[name].values()), name))
-    chosen = [folders[name] for name in ranked[:args.number]]
-    rows = [('group or threshold', 'value', 'compared in', 'within 2 times in',
-             'halved: changed', 'right', 'doubled: changed', 'right')]
-    for group in GROUPS:
-        names = [c.name for c in CRITERION.values() if c.group == group]
-        moved = compared(until, chosen, f'group_{group}', names, args.jobs)
-        rows.append((f'**{group}**', '', '', '', *moved))
-        for name in names:
-            seen = [log[name] for log in logs.values() if log.get(name)]
-            near = sum(is_within_reach(name, log) for log in logs.values())
-            one = compared(until, chosen, name, [name], args.jobs) if (
-                near and (moved[0] or moved[2])) else (NOTHING,) * 4
-            rows.append((f'`{name}`', f'{CRITERION[name].value:g}', len(seen), near, *one))
-    text = report(rows, args, len(chosen), chosen)
+    done = each(until, record, [(c, args.work) for c in cases], args.jobs)
+    folders = [args.work / 'cases' / c.name for c in cases]
+    logs = {folder: read(folder / 'usual.json')['log'] for folder in folders
+            if (folder / 'usual.json').exists()}
+    chosen = sorted(logs, key=lambda folder: (-sum(
+        between < NEAR for _, between in logs[folder].values()), folder.name))[:args.number]
+    if args.check:
+        check(chosen[:args.check])
+        return 0
+    for ask in (ask_groups, ask_single):
+        done = done and each(until, ask, [(folder,) for folder in chosen], args.jobs)
+    text = report(args, logs, chosen)
     print(text)
     if args.write:
         RESULTS.write_text(text, encoding='utf-8')
-    return UNFINISHED if any(NOT_ASKED in row for row in rows) else 0
+    return 0 if done else UNFINISHED
 
 
-def compared(until, folders, label, names, jobs):
-    """Return (changed, right) for the thresholds halved, then the same doubled."""
-    usual = [read(folder / 'usual.json')['answer'] for folder in folders]
-    found = []
-    for up in (False, True):
-        answers = each(until, ask, [(folder, label, names, up) for folder in folders], jobs)
-        if answers is None:
-            return (NOT_ASKED,) * 4
-        found += [sum(a != u for a, u in zip(answers, usual)), sum(a['right'] for a in answers)]
-    return tuple(found)
+def counted(folders, label, up):
+    """Return (cases asked, answers that changed, of them right before, right now) of a label."""
+    asked = [(read(f / 'usual.json')['answer'], read(answered(f, label, up)))
+             for f in folders if answered(f, label, up).exists()]
+    moved = [(usual, now) for usual, now in asked if usual != now]
+    return (len(asked), len(moved), sum(u['right'] for u, _ in moved),
+            sum(n['right'] for _, n in moved))
 
 
-def report(rows, args, number, folders):
+def rows_of(logs, chosen):
+    """Return the rows of the table, group by group."""
+    rows = [('group or threshold', 'value', 'compared in', 'within 2 times in',
+             'halved: changed', 'right', 'doubled: changed', 'right')]
+    for group, names in members().items():
+        moved = [counted(chosen, f'group_{group}', up) for up in (False, True)]
+        rows.append((f'**{group}**', '', '', '', *sum((cells(*m) for m in moved), ())))
+        for name in names:
+            seen = sum(bool(log.get(name)) for log in logs.values())
+            near = sum(is_within_reach(name, log) for log in logs.values())
+            own = [counted(chosen, name, up) for up in (False, True)]
+            rows.append((f'`{name}`', f'{CRITERION[name].value:g}', seen, near,
+                         *sum((cells(*o) for o in own), ())))
+    return rows
+
+
+def cells(asked, moved, before, now):
+    """Return what two columns say."""
+    return (NOTHING,) * 2 if not asked else (
+        f'{moved} of {asked}', f'{before} → {now}' if moved else NOTHING)
+
+
+def report(args, logs, chosen):
     """Return the table as a page."""
     commit = subprocess.run(['git', 'rev-parse', '--short', 'HEAD'], cwd=ROOT, text=True,
                             capture_output=True, check=False).stdout.strip()
-    right = sum(read(folder / 'usual.json')['answer']['right'] for folder in folders)
+    right = sum(read(folder / 'usual.json')['answer']['right'] for folder in chosen)
+    rows = rows_of(logs, chosen)
     lines = [
         '# Ablation of the decision thresholds', '',
-        f'`python benchmarks/criteria_ablation.py --recorded {args.recorded} --number {number} '
-        f'--seed {args.seed}` on {time.strftime("%Y-%m-%d")}, {platform.machine()}, commit '
-        f'{commit}. {len(CRITERION)} thresholds; {args.recorded} cases recorded, the {number} '
-        f'nearest to a decision asked again, {right} of them right as they are.', '',
+        f'`python benchmarks/criteria_ablation.py --recorded {args.recorded} --number '
+        f'{args.number} --seed {args.seed}` on {time.strftime("%Y-%m-%d")}, '
+        f'{platform.machine()}, commit {commit}. {len(CRITERION)} thresholds; {len(logs)} cases '
+        f'recorded, the {len(chosen)} nearest to a decision asked again, {right} of them right '
+        'as they are.', '',
         'Compared and within two times: cases out of all recorded. Changed: answers that differ '
-        'in verdict, names or set. A dash: nothing in the group changed, or nothing could. Not '
-        'asked: the minutes were over.', '']
+        'in verdict, names or set, out of the cases asked. Right: of the changed answers, how '
+        'many were right before and are right now. A threshold is asked by itself only where '
+        'its group changed the answer in that direction, and where it came within two times of '
+        'a decision. A dash: nothing to ask, or nothing changed.', '']
     lines += ['| ' + ' | '.join(map(str, row)) + ' |' for row in rows]
     lines.insert(-len(rows) + 1, '|' + '---|' * len(rows[0]))
     return '\n'.join([*lines, ''])
