@@ -22,6 +22,10 @@ draws) and *effort* (how many effects are fitted). They are also *assumptions* a
 measurement, such as priors of latency and skew, the widths of intervals, and the wording of
 sentences.
 
+What follows from others is a property of the criteria, or uses one of the ``common`` ones. How
+near each comes to a decision, and what changes when it is halved or doubled, is measured by
+``benchmarks/criteria_ablation.py``.
+
 A workflow is given its criteria as an argument. ``replace(CRITERIA, seen_gap=0.1)`` makes others,
 such as an ablation needs.
 """
@@ -29,8 +33,8 @@ such as an ablation needs.
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-GROUPS = ('health', 'detection', 'screening', 'comparison', 'ranking', 'elimination',
-          'plausibility', 'materiality', 'refutation', 'planning')
+GROUPS = ('common', 'health', 'detection', 'screening', 'comparison', 'ranking', 'elimination',
+          'plausibility', 'materiality', 'planning')
 
 
 def _criterion(value: Any, unit: str, group: str, meaning: str, source: str) -> Any:
@@ -54,6 +58,26 @@ class Criterion:
 class Criteria:
     """Values of all decision thresholds; :func:`table` tells what each means."""
 
+    certain_sd: float = _criterion(
+        3.0, 'deviations', 'common',
+        'What differs by so much, differs for certain: an effect from none.',
+        'One-sided 0.1 % of a normal distribution.')
+    likely_sd: float = _criterion(
+        2.0, 'deviations', 'common',
+        'What differs by so much, probably differs: a formulation from a simpler one.',
+        'One-sided 2.5 % of a normal distribution.')
+    hint_sd: float = _criterion(
+        1.0, 'deviations', 'common',
+        'What differs by so much is worth a look: a test on all data, a number tried as wrong.',
+        'One deviation.')
+    greater_part: float = _criterion(
+        0.5, '-', 'common',
+        'Half: of a share, a rest or a fall, from which on one thing outweighs the other.',
+        'Half.')
+    close_share: float = _criterion(
+        0.05, 'of the gap', 'common',
+        'Shares this near count as equal, and less of a gap as none.',
+        'Simulated records.')
     min_duration_s: float = _criterion(
         5.0, 's', 'health',
         'Time that all signals must cover.',
@@ -66,17 +90,9 @@ class Criteria:
         0.05, 's', 'health',
         'Time without a message from which on it is a dropout.',
         'Design choice.')
-    max_dropout_share: float = _criterion(
+    max_lost_share: float = _criterion(
         0.05, '-', 'health',
-        'Share of the time in dropouts that is accepted.',
-        'Design choice.')
-    max_saturation_share: float = _criterion(
-        0.5, '-', 'health',
-        'Share of valve messages at their limit that is accepted.',
-        'Design choice.')
-    noted_saturation_share: float = _criterion(
-        0.1, '-', 'health',
-        'Share of valve messages at their limit that is remarked on.',
+        'Share of the time that dropouts may take, and the limit of the valve without a remark.',
         'Design choice.')
     min_pressure_move_pa: float = _criterion(
         5000.0, 'Pa', 'health',
@@ -85,10 +101,6 @@ class Criteria:
     min_contraction_move_m: float = _criterion(
         0.0005, 'm', 'health',
         'Range of the contraction below which the rig is at rest.',
-        'Design choice.')
-    max_overlap_share: float = _criterion(
-        0.5, '-', 'health',
-        'Share of equal messages from which on two recordings are one.',
         'Design choice.')
     seen_gap: float = _criterion(
         0.05, 'floors squared', 'detection',
@@ -102,14 +114,6 @@ class Criteria:
         3.5, 'prior deviations', 'detection',
         'How far a number may move before it is wrong, not inexact.',
         'Two-sided 0.05 % of a normal prior.')
-    unnamed_factor: float = _criterion(
-        2.0, 'materiality', 'detection',
-        'Gap without a name that is worth a verdict.',
-        'Simulated records.')
-    least_unnamed_sd: float = _criterion(
-        1.5, 'sensor deviations', 'detection',
-        'The same, however small the materiality.',
-        'Simulated records.')
     floor_error: float = _criterion(
         1.2, '-', 'detection',
         'Factor by which a noise floor may be too low.',
@@ -126,10 +130,6 @@ class Criteria:
         3.0, 'of the least rest', 'screening',
         'Rest up to which a refinement may still win.',
         'What refinements gained on simulated records.')
-    tried_as_wrong_sd: float = _criterion(
-        1.0, 'prior deviations', 'screening',
-        'How far a number is off when it is tried as wrong.',
-        'One deviation.')
     promised_share: float = _criterion(
         0.8, 'of the gap', 'screening',
         'What a pair must promise to be fitted.',
@@ -138,14 +138,6 @@ class Criteria:
         0.3, 'floors squared', 'comparison',
         'Gap of a block from which on it judges.',
         'Prototype; see docs/gap.md.')
-    active_share: float = _criterion(
-        0.05, 'of the mean gap', 'comparison',
-        'The same, relative to the mean over blocks.',
-        'Prototype.')
-    active_difference: float = _criterion(
-        0.5, 'of the mean difference', 'comparison',
-        'Difference of two rivals from which on a block judges.',
-        'Simulated records with two recordings.')
     min_blocks: int = _criterion(
         4, 'blocks', 'comparison',
         'Blocks below which there is no test.',
@@ -154,14 +146,6 @@ class Criteria:
         12, 'blocks', 'comparison',
         'Active blocks below which quiet ones judge, too.',
         'Simulated records.')
-    certain_t: float = _criterion(
-        3.0, 'normal deviations', 'comparison',
-        'By how much an effect must be better than none.',
-        'One-sided 0.1 %.')
-    half_sure_t: float = _criterion(
-        1.0, 'normal deviations', 'comparison',
-        'From where on all of the data are asked.',
-        'One deviation.')
     first_gain: float = _criterion(
         0.25, 'of the gap', 'ranking',
         'Least that a first effect explains.',
@@ -170,14 +154,6 @@ class Criteria:
         0.7, 'of the rest', 'ranking',
         'Least that a further effect explains of what is left.',
         'Simulated records.')
-    rival_share: float = _criterion(
-        0.5, 'of the best share', 'ranking',
-        'Less is no rival; a relative that leaves less is likelier.',
-        'Half.')
-    better_t: float = _criterion(
-        2.0, 'normal deviations', 'ranking',
-        'By how much a formulation beats the simpler one it contains.',
-        'One-sided 2.5 %.')
     ahead_t: float = _criterion(
         2.5, 'normal deviations', 'ranking',
         'By how much a name leaves one that explains as much behind.',
@@ -190,14 +166,6 @@ class Criteria:
         0.002, 'of what the best adds', 'ranking',
         'Shares this near are equal: no formulation is that true.',
         'Formulations of one name on simulated records.')
-    close_share: float = _criterion(
-        0.05, 'of the gap', 'ranking',
-        'Shares this near count as equal for a common cause.',
-        'Simulated records.')
-    unpolished_rest: float = _criterion(
-        0.5, 'of the rest', 'ranking',
-        'How much better a first fit may still be than it seems.',
-        'What polishing gained on simulated records.')
     done_share: float = _criterion(
         0.0035, 'of the gap', 'elimination',
         'Rest that formulations may leave.',
@@ -206,10 +174,6 @@ class Criteria:
         0.02, 'of the gap', 'elimination',
         'Rest they may leave for another effect of their family.',
         'Two kinds of friction on simulated records.')
-    certain_size: float = _criterion(
-        5.0, 'deviations', 'elimination',
-        'By how much a size must differ from none.',
-        'Noise floors that were too careful on simulated records.')
     equal_edges: float = _criterion(
         0.02, 'of the later edge', 'elimination',
         'As near, both edges are one delay.',
@@ -218,30 +182,10 @@ class Criteria:
         0.9, 'of the gap', 'plausibility',
         'Least to explain for a name, and for a simpler one to stand for its limit.',
         'No formulation is the muscle itself; simulated records.')
-    named_clearly_share: float = _criterion(
-        0.95, 'of the gap', 'plausibility',
-        'The same where several formulations leave a clear rest.',
-        'Simulated records with effects of no library.')
-    clear_rest: float = _criterion(
-        25.0, 'floors squared', 'plausibility',
-        'Rest that is clear.',
-        'Five floors.')
     near_floor: float = _criterion(
         0.25, 'floors squared', 'plausibility',
         'Rest so small that it may be the error of the floor.',
         'Half a floor.')
-    implausible_sd: float = _criterion(
-        3.0, 'prior deviations', 'plausibility',
-        'A fit that needs a number so far off explains nothing.',
-        'Two-sided 0.3 %.')
-    plausible_sd: float = _criterion(
-        2.0, 'prior deviations', 'plausibility',
-        'Within which a number is not wrong.',
-        'Two-sided 5 %.')
-    unbent_share: float = _criterion(
-        0.98, 'of the gap', 'plausibility',
-        'What plausible numbers must explain to be preferred.',
-        'Simulated records.')
     visible_sd: float = _criterion(
         0.3, 'sensor deviations', 'materiality',
         'Less cannot be told from none.',
@@ -250,10 +194,6 @@ class Criteria:
         0.1, 'sensor deviations', 'materiality',
         'The same where the certify data confirm the effect.',
         'Simulated records.')
-    refuted_fall: float = _criterion(
-        0.5, 'of the squared difference', 'refutation',
-        'Fall by which another name refutes it.',
-        'Half of that of a true effect.')
     inseparable_factor: float = _criterion(
         10.0, 'visible sizes', 'planning',
         'Rivals that need more are called inseparable.',
@@ -262,10 +202,21 @@ class Criteria:
         0.9, '-', 'planning',
         'Cosine of two signatures from which on they look alike.',
         'Prototype.')
-    simpler_condition_share: float = _criterion(
-        0.1, '-', 'planning',
-        'A simpler condition as near as this is named instead.',
-        'Design choice.')
+
+    @property
+    def certain_size(self) -> float:
+        """Return by how many deviations a size differs from none: its likely least does so."""
+        return self.certain_sd + self.likely_sd
+
+    @property
+    def clear_rest(self) -> float:
+        """Return the rest, in floors squared, that is as clear as a certain size."""
+        return self.certain_size ** 2
+
+    @property
+    def named_clearly_share(self) -> float:
+        """Return the least share for a name where more is expected: half the rest left."""
+        return 1.0 - self.greater_part * (1.0 - self.named_share)
 
 
 CRITERIA = Criteria()

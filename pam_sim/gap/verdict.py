@@ -65,7 +65,7 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
     named, criteria = outcome.named, estimator.criteria
     result.moved = validation.moved(base, whole) if named else {}
     own = validation.moved(held_without(final), whole) if named else {}
-    again = validation.fall(validation.refit, validation.after)[0] > criteria.refuted_fall
+    again = validation.fall(validation.refit, validation.after)[0] > criteria.greater_part
 
     def is_worth_a_name(least: float) -> bool:
         return is_material(own, result.moved, least, again, criteria)
@@ -83,7 +83,8 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.prior_deviation) > criteria.max_prior_sd]
-    least = max(criteria.unnamed_factor * materiality, criteria.least_unnamed_sd)
+    # A gap without a name must be likely, however small an effect matters.
+    least = criteria.likely_sd * max(materiality, 1.0)
     if not outcome.share or (not material and not wrong and (
             named or not _is_left(result, estimator, validation, base, least, whole))):
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
@@ -155,6 +156,6 @@ def _confidence(named: NamedEffect, outcome: Outcome, criteria: Criteria) -> flo
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
     rivals = [_tested(r, s) for r in named.rivals if r.name not in named.names
-              and r.share.get(s, 0.0) > criteria.rival_share * best]
+              and r.share.get(s, 0.0) > criteria.greater_part * best]
     sure = float(norm.cdf(min([t for t in rivals if t is not None], default=6.0) - 1.0))
     return round(sure / len(named.names) * math.sqrt(max(outcome.share.get(s, 1.0), 0.0)), 3)

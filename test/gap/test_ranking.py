@@ -44,7 +44,7 @@ def test_blocks_in_which_rivals_say_the_same_do_not_drown_the_others(telling, sa
     # Where there are few blocks, they must agree the more: in these some say little.
     worse = errors(problem, 0, np.where(rare, np.where(np.arange(80) % 4, 3.0, 0.8), 0.01))
     found = preference(problem, base, better, worse)
-    assert (found > CRITERIA.certain_t) == says
+    assert (found > CRITERIA.certain_sd) == says
     assert preference(problem, base, worse, better) == pytest.approx(-found, nan_ok=True)
     assert math.isnan(found) == (telling < CRITERIA.min_blocks)
 
@@ -58,7 +58,7 @@ def test_many_quiet_blocks_that_agree_count_where_loud_ones_are_few(agree, says)
                      np.where(place % 10 < 10 * agree, 0.0, 0.65))
     base, better = errors(problem, 0, before), errors(problem, 0, after)
     assert math.isnan(preference(problem, base, better, base))      # three blocks are no test
-    assert (preference(problem, base, better, base, quiet=True) > CRITERIA.certain_t) == says
+    assert (preference(problem, base, better, base, quiet=True) > CRITERIA.certain_sd) == says
 
 
 def test_what_was_fitted_judges_as_well_where_each_part_is_judged_by_a_fit_to_the_other():
@@ -68,7 +68,7 @@ def test_what_was_fitted_judges_as_well_where_each_part_is_judged_by_a_fit_to_th
     better, worse = (errors(problem, 0, rng.uniform(low, low + 2.0, 40)) for low in (0.0, 0.3))
     once = preference(problem, base, better, worse)
     twice = preference(problem, base, better, worse, other_part=(FIT, better, worse))
-    assert 1.0 < once < CRITERIA.certain_t < twice
+    assert 1.0 < once < CRITERIA.certain_sd < twice
     against = preference(problem, base, better, worse, other_part=(FIT, worse, better))
     assert abs(against) < 1.0
 
@@ -82,7 +82,7 @@ def test_no_rival_goes_for_less_than_a_formulation_may_be_off(names, off, tied):
     case = Tied(Blocks(60), 5.0, dict(zip(names, (0.0, off))))
     left = case.names()
     # Both differ in every block alike, beyond doubt.
-    assert case.rivals[1].t['muscle'] > CRITERIA.certain_t
+    assert case.rivals[1].t['muscle'] > CRITERIA.certain_sd
     assert left == list(names[:1 + tied])
 
 

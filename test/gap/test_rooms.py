@@ -62,5 +62,5 @@ def test_criteria_given_to_the_workflow_decide():
     run = recorded(rig, voltages(12.0))
     usual = find_gap(run, nominal(), effects=['valve_hysteresis'])
     strict = find_gap(run, nominal(), effects=['valve_hysteresis'],
-                      criteria=replace(CRITERIA, certain_size=1e9))
+                      criteria=replace(CRITERIA, certain_sd=1e9))
     assert [e['name'] for e in usual.effects] == ['valve_hysteresis'] and not strict.effects

@@ -87,7 +87,7 @@ def test_half_sure_is_asked_of_all_of_the_data(elsewhere, sure):
     rival = case.rivals[0]
     alone = preference(problem, case.base.errors['muscle'], rival.found.errors['muscle'],
                        case.base.errors['muscle'], quiet=True)
-    assert 1.0 < alone < CRITERIA.certain_t
+    assert 1.0 < alone < CRITERIA.certain_sd
     if not elsewhere:                     # fitted to one half it does nothing for the other
         rival.cross_fit = case._found('bladder_stiffness', before)
     assert case.ranking._is_sure(rival, case.base, problem) == sure

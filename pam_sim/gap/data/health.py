@@ -123,7 +123,7 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
             f'{topic} comes at {health.rate_hz[topic]:.0f} Hz; at least 100 Hz are needed')
     holes = periods[periods > criteria.max_hole_s]
     lost = float(holes.sum() / periods.sum())
-    if lost > criteria.max_dropout_share:
+    if lost > criteria.max_lost_share:
         health.problems.append(
             f'{topic} is missing for {100 * lost:.0f} % of the time')
     elif holes.size:
@@ -148,9 +148,9 @@ def _check_saturation(run: Run, health: Health, criteria: Criteria) -> None:
         ('ppr_voltage', 6.0 - 1e-6), ('fill_duty', 0.999), ('vent_duty', 0.999))
         if name in values]
     share = max(full)
-    if share > criteria.max_saturation_share:
+    if share > criteria.greater_part:
         health.problems.append(
             f'the valve signal is at its limit for {100 * share:.0f} % of the messages')
-    elif share > criteria.noted_saturation_share:
+    elif share > criteria.max_lost_share:
         health.remarks.append(
             f'the valve signal is at its limit for {100 * share:.0f} % of the messages')

@@ -42,7 +42,7 @@ def check_apart(runs: Iterable[Run], certify: Run, criteria: Criteria = CRITERIA
     """
     for run in runs:
         share = shared_part(run, certify)
-        if share > criteria.max_overlap_share:
+        if share > criteria.greater_part:
             raise InputError(
                 f'is the same recording as {run.path or "one that is searched"} '
                 f'({100 * share:.0f} % of its messages have the same stamp and value); the proof '

@@ -228,7 +228,7 @@ def _strongest(shares: Mapping[str, float], criteria: Criteria) -> str:
     """Return the condition that alone explains most; rates tell directions too."""
     alone = {n: shares[n] for n in CONDITIONS}
     most = max(alone, key=lambda name: alone[name])
-    near = alone[most] - criteria.simpler_condition_share
+    near = alone[most] - criteria.close_share
     return 'direction' if most == 'rate' and alone['direction'] > near else most
 
 

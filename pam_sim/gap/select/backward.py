@@ -113,9 +113,9 @@ def is_missed(context: SearchContext, problem: SubsystemProblem, current: Fit, w
     gained = rest - (1.0 - share(problem, base, current.errors[s]))
     # By itself in its subsystem it needs no more than one that is alone altogether.
     alone = not without.hypothesis.touches(problem)
-    least = criteria.rival_share if alone else criteria.later_gain
+    least = criteria.greater_part if alone else criteria.later_gain
     return (gained > 0.0 and gained >= least * rest and preference(
-        problem, base, current.errors[s], without.errors[s]) >= criteria.certain_t)
+        problem, base, current.errors[s], without.errors[s]) >= criteria.certain_sd)
 
 
 def _simpler(context: SearchContext, current: Fit, w: NamedEffect, without: Fit,

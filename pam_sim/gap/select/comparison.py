@@ -98,7 +98,7 @@ def preference(problem: SubsystemProblem, base: FloatArray, better: FloatArray, 
     before = np.concatenate([block_chi2(problem, base, p)[1] for p, _, _ in judged])
     apart = np.concatenate([block_chi2(problem, b - w, p)[1] for p, b, w in judged])
     active = _active(before - problem.level, 1.0, criteria) & _active(
-        apart, criteria.active_difference, criteria)
+        apart, criteria.greater_part, criteria)
     ratio = np.concatenate([np.log((block_chi2(problem, w, p)[1] + SOFTEN) / (
         block_chi2(problem, b, p)[1] + SOFTEN)) for p, b, w in judged])
     found = _deviations(ratio[active], criteria)
@@ -124,4 +124,4 @@ def _deviations(ratio: FloatArray, criteria: Criteria) -> float:
 def _active(values: FloatArray, of_mean: float, criteria: Criteria) -> BoolArray:
     """Return in which blocks there is enough of something [floors squared] to count."""
     mean = max(float(np.mean(values)), 0.0)
-    return values > max(min(criteria.active_gap, of_mean * mean), criteria.active_share * mean)
+    return values > max(min(criteria.active_gap, of_mean * mean), criteria.close_share * mean)

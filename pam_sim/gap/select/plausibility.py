@@ -34,7 +34,7 @@ def is_poor(context: SearchContext, problem: SubsystemProblem, current: Fit,
     """Return whether a fit explains too little for a name, or by implausible numbers."""
     s, criteria = problem.subsystem, context.criteria
     left = gap(problem, current.errors[s])
-    least = criteria.rival_share if left < criteria.near_floor else criteria.named_share
+    least = criteria.greater_part if left < criteria.near_floor else criteria.named_share
     # What was tried in one formulation alone may be far from the muscle's own.
     forms = [sum(o.name == c.name for o in context.pool) for c in current.hypothesis.effects
              if acts_on(c.effect, s)]
@@ -48,7 +48,7 @@ def is_poor(context: SearchContext, problem: SubsystemProblem, current: Fit,
 
 def has_implausible_numbers(problem: SubsystemProblem, current: Fit, criteria: Criteria) -> bool:
     """Return whether a fit takes a number of the model far from its prior."""
-    return any(abs(z) > criteria.implausible_sd
+    return any(abs(z) > criteria.certain_sd
                for z in current.prior_deviations(problem).values())
 
 
@@ -63,9 +63,9 @@ def with_plausible_numbers(context: SearchContext, current: Fit) -> Fit:
            and has_implausible_numbers(p, current, criteria)]
     if not far:
         return current
-    held = context.estimator.within_box(current, criteria.plausible_sd)
+    held = context.estimator.within_box(current, criteria.likely_sd)
     shares = context.ranking.shares(held)
-    return held if all(shares[s] > criteria.unbent_share for s in far) else current
+    return held if all(shares[s] > criteria.named_clearly_share for s in far) else current
 
 
 def likelier_relative(context: SearchContext, current: Fit, w: NamedEffect) -> str | None:
@@ -85,9 +85,9 @@ def likelier_relative(context: SearchContext, current: Fit, w: NamedEffect) -> s
         found = context.estimator.polish(fit_without(
             context.estimator, current, w.name, Rival(c.name, alone)))
         less = gap(problem, found.errors[s]) < (
-            criteria.rival_share * gap(problem, current.errors[s]))
+            criteria.greater_part * gap(problem, current.errors[s]))
         if less and preference(problem, context.base.errors[s], found.errors[s],
-                               current.errors[s]) >= criteria.certain_t:
+                               current.errors[s]) >= criteria.certain_sd:
             return c.effect
     return None
 
@@ -101,7 +101,7 @@ def with_wrong_numbers(context: SearchContext, current: Fit, named: list[NamedEf
     A subsystem without a gap has none to explain; where that takes a number far from its
     prior, the number is what is wrong.
     """
-    limit = context.criteria.implausible_sd
+    limit = context.criteria.certain_sd
     for problem in context.problems:
         s = problem.subsystem
         if (any(w.subsystem == s for w in named)

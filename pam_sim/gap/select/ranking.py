@@ -91,11 +91,11 @@ class Ranking:
         ranked = sorted(self._admissible(rivals, current, problem), key=lambda r: -r.share[s])
         top = max((r.share[s] for r in ranked), default=0.0)
         # The worse the best explains, the further a fit may be from where it will end.
-        near = top - max(criteria.close_share, criteria.unpolished_rest * (1.0 - top))
+        near = top - max(criteria.close_share, criteria.greater_part * (1.0 - top))
         before = share(problem, self.base.errors[s], current.errors[s])
         least = before + least_gain(before, criteria)
         # The others will not win.
-        near = max(near, 1.0 - (1.0 - least) / criteria.unpolished_rest)
+        near = max(near, 1.0 - (1.0 - least) / criteria.greater_part)
         self._polish([r for r in ranked if r.share[s] > near and gap(
             problem, r.found.errors[s]) > self.seen_gap])
         ranked, is_tied, is_same = self._judged(ranked, current, problem, before)
@@ -110,12 +110,12 @@ class Ranking:
             self._cross_validate(tied, current, problem)
             tied = self._elsewhere([r for r in tied if is_tied(r)], current, problem)
         cost = min(self._prior_cost(r.found) for r in tied)
-        tied = [r for r in tied if self._prior_cost(r.found) < cost + criteria.implausible_sd ** 2]
+        tied = [r for r in tied if self._prior_cost(r.found) < cost + criteria.certain_sd ** 2]
         names = {r.name for r in tied}
         # A simpler one stands for the other only where it was tested and explains as much.
         close = top - criteria.close_share * max(top - before, 0.0)
         as_good = {r.name for r in tied if is_same(r) or (
-                   r.t[s] < criteria.better_t and r.share[s] > close)}
+                   r.t[s] < criteria.likely_sd and r.share[s] > close)}
         return [r for r in tied
                 if not any(is_limit(simple, r.name) for simple in as_good)
                 and same_as(r.name) not in names]
@@ -144,7 +144,7 @@ class Ranking:
                 r.is_exact and ranked[0].is_exact and self._is_behind(r, ranked[0], s))
 
         def is_tied(r: Rival) -> bool:
-            return is_same(r) or (r.share[s] > criteria.rival_share * top and not r.t[s] >= (
+            return is_same(r) or (r.share[s] > criteria.greater_part * top and not r.t[s] >= (
                 criteria.ahead_t if r.share[s] > top - criteria.close_share
                 else criteria.behind_t))
 
@@ -187,7 +187,7 @@ class Ranking:
             tied = [r for r in tied if r is best or not preference(
                 other, self.base.errors[s], best.found.errors[s], r.found.errors[s], quiet=True,
                 other_part=(FIT, best.cross_errors(s), r.cross_errors(s))
-            ) >= self.criteria.certain_t]
+            ) >= self.criteria.certain_sd]
         return tied
 
     def _prior_cost(self, found: Fit) -> float:
@@ -213,16 +213,16 @@ class Ranking:
 
     def _is_sure(self, rival: Rival, current: Fit, problem: SubsystemProblem) -> bool:
         """Return whether a rival is certainly better than the present fit in a subsystem."""
-        s, certain_t = problem.subsystem, self.criteria.certain_t
+        s, certain_sd = problem.subsystem, self.criteria.certain_sd
         judged = (problem, current.errors[s], rival.found.errors[s], current.errors[s])
         sure = preference(*judged, quiet=True)
-        if not self.criteria.half_sure_t <= sure < certain_t:
-            return sure >= certain_t
+        if not self.criteria.hint_sd <= sure < certain_sd:
+            return sure >= certain_sd
         if rival.cross_fit is None:
             rival.cross_fit = self.estimator.cross_fit(rival.found)
         without = self.estimator.cross_fit(current)
         return preference(*judged, quiet=True, other_part=(
-            FIT, rival.cross_errors(s), without.errors[s])) >= certain_t
+            FIT, rival.cross_errors(s), without.errors[s])) >= certain_sd
 
     def joint_winner(self, rivals: Sequence[Rival], current: Fit,
                      problems: Sequence[SubsystemProblem], fitted: Sequence[Rival]
@@ -237,7 +237,7 @@ class Ranking:
                 r in tied[s] or (tied[s] and r.share[s] > (
                     tied[s][0].share[s] - self.criteria.close_share)) for s in tied)
             if everywhere and all(_acts(r, current, p) for p in problems) \
-                    and min(r.share[s] for s in tied) > self.criteria.rival_share:
+                    and min(r.share[s] for s in tied) > self.criteria.greater_part:
                 same = [o.name for o in tied[first] if o in tied[problems[1].subsystem]]
                 names = tuple(dict.fromkeys([r.name, *same]))
                 return NamedEffect(r.name, first, list(rivals), names,

@@ -57,7 +57,7 @@ def _rivals_beside(context: SearchContext, current: Fit, w: NamedEffect,
     # What the effect added later replaced may have been ranked before it.
     beside = [r for r in rivals if r.share.get(w.subsystem, 0.0) > 0.0][:RANKED_AGAIN] if any(
         o is not w and o.subsystem == w.subsystem for o in named) else []
-    return beside or _across(rivals, w, named, context.criteria.rival_share)
+    return beside or _across(rivals, w, named, context.criteria.greater_part)
 
 
 def _in_its_place(context: SearchContext, current: Fit, name: str, rivals: Sequence[Rival]
@@ -67,7 +67,7 @@ def _in_its_place(context: SearchContext, current: Fit, name: str, rivals: Seque
 
 
 def _across(rivals: Sequence[Rival], w: NamedEffect, named: Sequence[NamedEffect],
-            rival_share: float) -> list[Rival]:
+            greater_part: float) -> list[Rival]:
     """
     Return the rivals that had to explain alone what two effects of two subsystems do.
 
@@ -75,7 +75,7 @@ def _across(rivals: Sequence[Rival], w: NamedEffect, named: Sequence[NamedEffect
     """
     elsewhere = {o.subsystem for o in named if o.subsystem != w.subsystem}
     return [r for r in rivals if any(
-        r.share.get(s, 0.0) > rival_share for s in elsewhere) and any(
+        r.share.get(s, 0.0) > greater_part for s in elsewhere) and any(
             c.name == r.name and acts_on(c.effect, w.subsystem)
             and any(acts_on(c.effect, s) for s in elsewhere)
             for c in r.found.hypothesis.effects)]

@@ -83,7 +83,7 @@ def _free_numbers(context: SearchContext, current: Fit,
                   problems: Sequence[SubsystemProblem]) -> list[Rival]:
     """Return a fit for every number that is far from its prior, without that prior."""
     far = [name for problem in problems for name, z in current.prior_deviations(problem).items()
-           if abs(z) > context.criteria.tried_as_wrong_sd]
+           if abs(z) > context.criteria.hint_sd]
     h = current.hypothesis
     return parallel_map(lambda name: _rival(context, context.estimator.fit(
         Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False), name),
@@ -115,7 +115,7 @@ def refined(rivals: Sequence[Rival], refinements: Iterable[Candidate],
     chosen: list[Rival] = []
     for s, had in before.items():
         # What turns into another effect there is no rival of what that one's forms explain.
-        least = max([criteria.named_share, had + criteria.rival_share * (1.0 - had)] + [
+        least = max([criteria.named_share, had + criteria.greater_part * (1.0 - had)] + [
             1.0 - criteria.refinable_rest * (1.0 - r.share[s]) for r in rivals if not r.at_edge])
         chosen += [r for r in rivals if r.share[s] >= least and r not in chosen]
     found = []

@@ -52,7 +52,7 @@ def with_certain_sizes(context: SearchContext, current: Fit, named: list[NamedEf
     """
     for w in list(named):
         z = free_deviations(context, current).get(w.name)
-        if z is not None and abs(z) < context.criteria.plausible_sd:
+        if z is not None and abs(z) < context.criteria.likely_sd:
             current = fit_without(context.estimator, current, w.name)
             named = [o for o in named if o is not w]
         if (w.name in [c.name for c in current.hypothesis.effects]

@@ -114,7 +114,7 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
     # Were it true, the fall would be 1, but for what stamps and start move.
     against = {name: fell for name, (fell, apart) in told.items()
                if fell < 0.0 and apart > least
-               and 1.0 - fell > criteria.certain_t * validation.doubt(
+               and 1.0 - fell > criteria.certain_sd * validation.doubt(
                    runs[name], validation.after)}
     if not against:
         return None, final
@@ -132,8 +132,8 @@ def _contradicted(validation: Validation, run: Mapping[str, FloatArray],
     fell, apart = validation.fall(run, best)
     form = math.sqrt(1.0 - criteria.named_share) * moved
     # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
-    return (fell > criteria.refuted_fall and apart > max(criteria.visible_sd, form)
-            and fell + 1.0 > criteria.certain_t * validation.doubt(run, best))
+    return (fell > criteria.greater_part and apart > max(criteria.visible_sd, form)
+            and fell + 1.0 > criteria.certain_sd * validation.doubt(run, best))
 
 
 def _comparable(w: NamedEffect, estimator: Estimator, final: Fit) -> dict[str, Fit]:
