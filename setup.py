@@ -59,6 +59,7 @@ DOCS_REQUIRES = [
     'docutils>=0.21',    # formulas as MathML, with the arguments used
     'myst-parser>=2.0',
     'furo>=2024.1',
+    'myst-nb>=1.1',      # tutorials that are notebooks; brings nbclient and ipykernel
 ]
 
 TEST_REQUIRES = [
@@ -67,6 +68,8 @@ TEST_REQUIRES = [
     'pytest-timeout>=2.1',
     'pytest-xdist>=3.7',
     'hypothesis>=6.98',
+    'jsonschema>=4.10',
+    'sybil>=6.0',
     'catkin_pkg>=1.0',
     'colcon-common-extensions>=0.3',
     # What ament_flake8 and ament_pep257 bring on a ROS 2 machine.
@@ -124,7 +127,7 @@ setup(
     packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
     package_data={'pam_actuation': ['py.typed'], 'pam_sim': [
         'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
-        'muscle/lookup_tables/*', 'joint/presets/*.yaml']},
+        'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'gap/*.schema.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),

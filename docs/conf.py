@@ -37,12 +37,14 @@ author = 'pam_actuation developers'
 copyright = '2026 pam_actuation developers'  # noqa: A001
 version = release = __version__
 
-extensions = ['myst_parser']
+extensions = ['myst_nb']
 root_doc = 'index'
 exclude_patterns = ['static']
 
 myst_enable_extensions = ['dollarmath', 'colon_fence', 'deflist']
 myst_heading_anchors = 4
+# A test runs the notebooks; the pages show the outputs they hold.
+nb_execution_mode = 'off'
 myst_dmath_double_inline = True
 # Two classes of one name in different modules: a type in a signature may lead to either.
 suppress_warnings = ['ref.python']

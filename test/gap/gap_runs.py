@@ -14,8 +14,12 @@
 
 """Recordings made by simulation, with noise, for the tests of the gap look."""
 
+import json
+
+from jsonschema import Draft202012Validator
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.gap.report.schema import report_schema
 from pam_sim.run import Run, Series
 
 NOMINAL = 'dmsp_5_300_hanging_mass'
@@ -52,6 +56,12 @@ def recorded(rig, valve_signal, rate_hz=200, seed=0, noise=1.0, topics=tuple(NOI
     columns = held[::every].reshape(stamp.size, -1).T
     found['valve_signal'] = Series(stamp, dict(zip(rig.signal_names, columns)))
     return Run(found, {}, '/muscle', 'simulated')
+
+
+def assert_form(result):
+    """Hold what gap.json says of a result against its schema."""
+    told = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    Draft202012Validator(report_schema()).validate(told)
 
 
 def nominal():

@@ -14,7 +14,7 @@
 
 """What looks like an effect and is none of the names: the name is held against it."""
 
-from gap_runs import nominal, recorded, voltages
+from gap_runs import assert_form, nominal, recorded, voltages
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
 from pam_sim.gap.select.candidates import candidates, relatives
@@ -36,6 +36,7 @@ def smooth():
 def test_friction_that_does_not_stick_is_not_called_dry(smooth):
     result = find_gap(smooth, nominal(), effects=NAMES)
     assert result.verdict == 'unknown' and not result.effects
+    assert_form(result)
     assert 'coulomb_friction' in result.reason and 'smooth_friction' in result.reason
 
 

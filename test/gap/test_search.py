@@ -16,7 +16,7 @@
 
 import types
 
-from gap_runs import nominal, recorded, voltages
+from gap_runs import assert_form, nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
@@ -79,6 +79,7 @@ def test_a_cause_that_no_effect_explains_stays_unknown():
     run.topics['contraction'].values['contraction_m'] += 4e-4 * (np.sin(7.3 * at) > 0.8)
     result = find_gap(run, nominal())
     assert result.verdict == 'unknown' and result.effects == []
+    assert_form(result)
     assert result.unexplained_fraction == 1.0
     assert load_rig(result.model_yaml).effects == []
 

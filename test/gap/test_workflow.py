@@ -16,7 +16,7 @@
 
 import json
 
-from gap_runs import NOMINAL, nominal, recorded, voltages
+from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
@@ -46,6 +46,7 @@ def shares(result, signal, condition='all'):
 def test_noise_alone_is_no_gap():
     result = find_gap(recorded(nominal(), voltages(16.0)), nominal())
     assert result.verdict == 'no_gap'
+    assert_form(result)
     assert result.parameters == [] and result.unexplained_fraction == 0.0
     for signal in result.signals.values():
         assert signal.rmse_before < 1.1 * signal.noise_floor
@@ -54,6 +55,7 @@ def test_noise_alone_is_no_gap():
 def test_two_effects_are_named_with_their_sizes(two_effects):
     _, result = two_effects
     assert result.verdict == 'effects'
+    assert_form(result)
     found = {e['name']: e for e in result.effects}
     assert set(found) == {'valve_dead_time', 'coulomb_friction'}
     for name, quantity, truth in (('valve_dead_time', 'delay_s', 0.03),
@@ -87,6 +89,7 @@ def test_a_wrong_mass_is_a_parameter():
     run = recorded(nominal().with_(parameters={'mass_kg': 5.75}), voltages(16.0))
     result = find_gap(run, nominal())
     assert result.verdict == 'parameter'
+    assert_form(result)
     assert [p.name for p in result.parameters] == ['mass_kg']
     assert result.parameters[0].value == pytest.approx(5.75, rel=2e-3)
     low, high = result.parameters[0].ci95
@@ -143,6 +146,7 @@ def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     spoil(run)
     result = find_gap(run, nominal())
     assert result.verdict == 'refused' and word in result.reason
+    assert_form(result)
     json.dumps(result.to_dict(), allow_nan=False)
 
 
@@ -251,6 +255,7 @@ def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypa
     run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
     result = write_gap([run], NOMINAL, tmp_path, effects=['coulomb_friction', 'guide_friction'])
     assert result.verdict == 'ambiguous'
+    assert_form(result)
     assert set(result.ambiguity_set) == {'coulomb_friction', 'guide_friction'}
     # Inside the muscle or at the rail: only a load cell between them can tell.
     assert 'force' in result.next_experiment['needs']
