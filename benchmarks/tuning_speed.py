@@ -22,7 +22,8 @@ builds a controller with other settings, tracks 0.5 Hz at 200 Hz on the realisti
 
 Beside it the same loop as one would write it with SciPy: a PID, the nominal rig's three
 differential equations, ``scipy.integrate.solve_ivp`` from one change of the valve signal to
-the next. The force law it calls is the compiled one, everything else is Python.
+the next. The force law it calls is the compiled one, everything else is Python. Both comparisons
+are made of a joint as well, its peer with both muscles and the limb.
 """
 
 import os
@@ -32,16 +33,18 @@ import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.joint_loop import JointLoop
 from pam_actuation.tuning.problem import cost_of, Problem
 from pam_actuation.tuning.space import default_axes, from_unit
 from pam_actuation.tuning.workers import Workers
 from pam_sim import load_rig
+from pam_sim.joint import load_joint
 from pam_sim.muscle.laws.sarosi import tension_n
 from pam_sim.records import fields, values_of
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from scipy.integrate import solve_ivp
 
-EXPERIMENT = 'tuning_half_hz'
+EXPERIMENT, JOINT_EXPERIMENT = 'tuning_half_hz', 'joint_tuning'
 ROLLOUTS = 200
 REPEATS = 3
 LATENCY_S = 0.003
@@ -69,11 +72,15 @@ def per_minute(problem, jobs):
     return rate, busy_ms
 
 
+def _law(rig):
+    law = rig.muscle.law.law
+    return fields(values_of(law.PACKED, law.pack()), law.PACKED)
+
+
 def with_solve_ivp(rig, controller, experiment, rtol=1e-6):
     """Track with ``solve_ivp`` between changes of the signal; return (contraction [m], s)."""
     number = rig.parameters
-    law = rig.muscle.law.law
-    law = fields(values_of(law.PACKED, law.pack()), law.PACKED)
+    law = _law(rig)
     gain, lag, mass = number['K_m'], number['T_m'], number['mass_kg']
     damping, length_m = number['damping_n_s_per_m'], rig.muscle.length_m
 
@@ -99,6 +106,80 @@ def with_solve_ivp(rig, controller, experiment, rtol=1e-6):
             state = solve_ivp(slopes, (0.0, span_s), state, args=(signal,), rtol=rtol,
                               atol=(1e-1, 1e-9, 1e-7)).y[:, -1]
     return contraction, time.perf_counter() - began
+
+
+def joint_with_solve_ivp(joint, controller, experiment, rtol=1e-6):
+    """Track an angle as ``with_solve_ivp`` does; return (angle [rad], s of processor time)."""
+    number, sides = joint.parameters, (joint.flexor, joint.extensor)
+    laws = [_law(rig) for rig in sides]
+    gain, lag, damping = ([rig.parameters[name] for rig in sides]
+                          for name in ('K_m', 'T_m', 'damping_n_s_per_m'))
+    arms = number['flexor_radius_m'], -number['extensor_radius_m']
+    weight_n_m = (number['limb_mass_kg'] * number['centre_of_mass_m']
+                  * number['gravity_m_per_s2'])
+
+    def tensions(state):
+        contractions_m = joint.contractions_m(state[2])
+        return [max(tension_n(state[k], contractions_m[k] / rig.muscle.length_m, laws[k])
+                    - damping[k] * arms[k] * state[3], 0.0) for k, rig in enumerate(sides)]
+
+    def slopes(_, state, volts):
+        flexor_n, extensor_n = tensions(state)
+        torque = (arms[0] * flexor_n + arms[1] * extensor_n
+                  - weight_n_m * np.sin(state[2] - number['hanging_angle_rad'])
+                  - number['damping_n_m_s'] * state[3])
+        return ((gain[0] * volts[0] - state[0]) / lag[0], (gain[1] * volts[1] - state[1]) / lag[1],
+                state[3], torque / number['inertia_kg_m2'])
+
+    period_s = 1.0 / controller.rate_hz
+    ticks = int(round(experiment.duration_s * controller.rate_hz))
+    state, volts, angle = np.zeros(4), (0.0, 0.0), np.empty(ticks)
+    controller.pause()
+    began = time.process_time()
+    for k in range(ticks):
+        angle[k] = state[2]
+        commands = controller.step(
+            state[2], *experiment.at(k * period_s),
+            *experiment.at(k * period_s + controller.lead_s),
+            pressures_pa=state[:2] + P_ATM_PA, forces_n=tensions(state))
+        for span_s in (LATENCY_S, period_s - LATENCY_S):
+            state = solve_ivp(slopes, (0.0, span_s), state, args=(volts,), rtol=rtol,
+                              atol=(1e-1, 1e-1, 1e-8, 1e-6)).y[:, -1]
+            volts = [min(max((command - P_ATM_PA) / one, 0.0), 6.0)
+                     for command, one in zip(commands, gain)]
+    return angle, time.process_time() - began
+
+
+def of_a_joint(cores):
+    """Print both tables of a joint."""
+    experiment = load_experiment(JOINT_EXPERIMENT)
+    print(f'\n### Rollouts of {experiment.duration_s:g} s a minute, realistic joint\n')
+    print(f'| controller | valve | 1 thread | {cores} threads | ms of processor time each |')
+    print('|---|---|---|---|---|')
+    for valve in ('ppr', 'hsv'):
+        joint = load_joint('joint_dmsp_5_300_realistic', valve=valve)
+        problem = Problem([JointLoop(joint, experiment, seed=1)],
+                          load_controller(f'sofc_joint_{valve}', joint))
+        (one, busy_ms), (all_cores, _) = per_minute(problem, 1), per_minute(problem, cores)
+        print(f'| sofc | {valve} | {one:,.0f} | {all_cores:,.0f} | {busy_ms:.2f} |', flush=True)
+    silent = dict.fromkeys(('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n'), 0.0)
+    joint = load_joint('joint_dmsp_5_300')
+    joint = joint.with_(flexor=joint.flexor.with_(sensors=silent),
+                        extensor=joint.extensor.with_(sensors=silent))
+    loop = JointLoop(joint, experiment, latency_s=LATENCY_S, angle_noise_rad=0.0,
+                     angle_step_rad=0.0)
+    _, busy_ms = per_minute(Problem([loop], load_controller('sofc_joint_ppr', joint)), 1)
+    compiled = loop.run(load_controller('sofc_joint_ppr', joint)).value
+    angle, seconds = joint_with_solve_ivp(
+        joint, load_controller('sofc_joint_ppr', joint), experiment)
+    away = float(np.max(np.abs(angle - compiled)))
+    print('\n### The same joint, nominal and without noise, one thread\n')
+    print('| who | ms of processor time each | largest difference of the angle |')
+    print('|---|---|---|')
+    print(f'| pam_actuation | {busy_ms:.2f} | – |')
+    print(f'| scipy.integrate.solve_ivp in a Python loop | {1e3 * seconds:,.0f} '
+          f'| {away:.2g} rad |')
+    print(f'\nRatio {1e3 * seconds / busy_ms:,.0f}.')
 
 
 def main():
@@ -134,6 +215,7 @@ def main():
     print(f'| scipy.integrate.solve_ivp in a Python loop | {60.0 / seconds:,.1f} '
           f'| {away:.2f} um |')
     print(f'\nRatio {own * seconds / 60.0:,.0f}.')
+    of_a_joint(cores)
 
 
 if __name__ == '__main__':

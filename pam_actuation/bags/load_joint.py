@@ -48,7 +48,7 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     Raises
     ------
     InputError
-        As of ``load_run``.
+        As of ``load_run``; the bag has both muscles of a joint but not its angle.
 
     """
     bag = read_bag(path, recover=recover, wanted=_is_of_rig)
@@ -57,6 +57,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     if namespace is not None:
         joints = [joint for joint in joints if joint.strip('/') == namespace.strip('/')]
     if not joints:
+        if namespace is None:
+            _check_no_half_joint(bag, path)
         return run_of(bag, path, namespace)
     if len(joints) > 1:
         raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
@@ -69,6 +71,18 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
                 topics[relative] = series
     return RecordedRun(topics=topics, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(remarks))
+
+
+def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:
+    """Raise InputError for a bag with both muscles of a joint, but without the joint."""
+    places = {name.rpartition('/')[0] for name, topic in bag.topics.items()
+              if is_joint_topic(topic)}
+    for place in sorted(places):
+        joint, _, side = place.rpartition('/')
+        if side == SIDES[0] and all(f'{joint}/{other}' in places for other in SIDES):
+            raise InputError(
+                f'has both muscles of the joint {joint} but no {MEASURED}: the recording of '
+                'the joint is not complete; choose one muscle with namespace', str(path))
 
 
 def topics_of_joint(bag: Bag, namespace: str) -> dict[str, TopicData]:

@@ -26,12 +26,18 @@ from pam_actuation.cli.options import count, out_path, Parser, source
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
     from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
-HELP = ('Tune a controller offline on a model; checks the model and the result against the bags; '
-        'writes controller YAML, initial rules and report.')
+HELP = ('Tune the controller of a muscle or joint offline on a model; checks the model and the '
+        'result against the bags; writes controller YAML, initial rules and report.')
 EXAMPLE = 'pam tune runs/first --randomise 4 --out tuned.yaml'
 EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 CHECK = 'tuning_check'
+# Of a joint, by its size; see ``control/modes/files.joint_size``.
+OF_A_JOINT: dict[str, tuple[tuple[str, ...], str]] = {
+    'joint': (('joint_tuning',), 'joint_tuning_check'),
+    'knee': (('knee_tuning',), 'knee_tuning_check')}
 
 
 def add_arguments(parser: Parser) -> None:
@@ -45,14 +51,14 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         '--experiment', type=source, action='append', default=None, metavar='NAME|FILE',
         help='experiment to tune for, may be repeated (default: those of the bags; without '
-        f'bags {", ".join(EXPERIMENTS)})')
+        f'bags {", ".join(EXPERIMENTS)}; of a joint joint_tuning or knee_tuning, by its size)')
     parser.add_argument(
         '--check', type=source, action='append', default=None, metavar='NAME|FILE',
-        help=f'experiment of the held-out check, may be repeated (default: {CHECK} and those of '
-        'the search, with other noise)')
+        help=f'experiment of the held-out check, may be repeated (default: {CHECK}, of a joint '
+        'joint_tuning_check or knee_tuning_check, and those of the search, with other noise)')
     add_controller_options(
-        parser, 'that of the first bag, else sofc_ppr or sofc_hsv, after the valve; it tracks '
-        'contraction')
+        parser, 'that of the first bag, else sofc_ppr or sofc_hsv, after the valve; of a joint '
+        'sofc_joint_… or sofc_knee_…; it tracks contraction, or the angle of a joint')
     parser.add_argument('--rollouts', type=count(10), default=3000, metavar='N',
                         help='budget of simulated runs of the search (default: %(default)s)')
     parser.add_argument('--randomise', type=count(0, 1000), default=0, metavar='N',
@@ -75,28 +81,33 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
-    from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.control.config import load_controller
-    from pam_actuation.control.modes.tracked import CONTRACTION, tracked_by
+    from pam_actuation.control.modes.tracked import CONTRACTION, JOINT, tracked_by
     from pam_actuation.report.tuning_page import tuning_report
     from pam_actuation.tuning.random_rigs import random_rigs
     from pam_actuation.tuning.recording import check_recordings
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
-    from pam_sim import load_rig
     from pam_sim.errors import InputError
     from pam_sim.files import whole_files
+    from pam_sim.joint import JointRig, load_rig_or_joint
     written = _targets(args)
-    runs = [load_run(bag) for bag in args.bag]
+    runs = [load_recording(bag) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
-    rig = load_rig(_rig_source(args, runs), valve=args.valve)
+    rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
+    _check_kind(runs, rig)
     controller = load_controller(
-        args.controller or _first(runs, 'controller') or default_controller(args, rig.valve),
+        args.controller or _first(runs, 'controller') or _preset(args, rig),
         rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
-    if tracked_by(controller) != CONTRACTION:
+    wanted = JOINT if isinstance(rig, JointRig) else CONTRACTION
+    if tracked_by(controller) != wanted:
         raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
-                         'contraction can be tuned', 'controller')
+                         f'{wanted.topic} can be tuned on {rig.name}', 'controller')
+    if wanted == JOINT and controller.kind != 'sofc':
+        raise InputError(f'is a {controller.kind} controller; of a joint only sofc controllers '
+                         'can be tuned', 'controller')
     controller.freeze_learning = args.freeze
-    experiments, check = _experiments(args, runs)
+    experiments, check = _experiments(args, runs, rig)
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
     others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]
     with progress(args, args.rollouts, ' rollouts', 'tuning') as bar:
@@ -145,18 +156,48 @@ def _rig_source(args: argparse.Namespace, runs: 'list[RecordedRun]') -> str:
     return source
 
 
-def _experiments(
-        args: argparse.Namespace,
-        runs: 'list[RecordedRun]') -> 'tuple[list[Experiment], list[Experiment]]':
+def _check_kind(runs: 'list[RecordedRun]', rig: 'Rig | JointRig') -> None:
+    """Raise InputError for a bag of a muscle where a joint is tuned, or the other way round."""
+    from pam_actuation.replay.joint import is_joint
+    from pam_sim.errors import InputError
+    wanted = '' not in rig.muscles
+    for run in runs:
+        if is_joint(run) == wanted:
+            continue
+        if wanted:
+            raise InputError(f'has no joint_state; it is no recording of a joint such as '
+                             f'{rig.name}', str(run.path))
+        raise InputError(f'is the recording of a joint; {rig.name} is a single muscle',
+                         str(run.path))
+
+
+def _preset(args: argparse.Namespace, rig: 'Rig | JointRig') -> str:
+    """Return the name of the controller where neither option nor bag names one."""
+    from pam_actuation.control.modes.files import joint_preset_for
+    from pam_sim.joint import JointRig
+    if isinstance(rig, JointRig):
+        return joint_preset_for(rig, rig.valve)
+    return str(default_controller(args, rig.valve))
+
+
+def _experiments(args: argparse.Namespace, runs: 'list[RecordedRun]', rig: 'Rig | JointRig'
+                 ) -> 'tuple[list[Experiment], list[Experiment]]':
     """Return the experiments of the search and those of the held-out check."""
+    from pam_actuation.control.modes.files import joint_size
     from pam_actuation.experiments import load_experiment
+    from pam_sim.joint import JointRig
+    domain = 'contraction'
+    presets: tuple[str, ...] = EXPERIMENTS
+    checked = CHECK
+    if isinstance(rig, JointRig):
+        domain, (presets, checked) = 'joint_angle', OF_A_JOINT[joint_size(rig)]
     if args.experiment:
         search = [load_experiment(one) for one in args.experiment]
     else:
         texts = dict.fromkeys(run.metadata.get('experiment') or '' for run in runs)
         recorded = [load_experiment(text) for text in texts if text]
-        search = [one for one in recorded if one.domain == 'contraction'] or [
-            load_experiment(one) for one in EXPERIMENTS]
+        search = [one for one in recorded if one.domain == domain] or [
+            load_experiment(one) for one in presets]
     if args.check:
         return search, [load_experiment(one) for one in args.check]
-    return search, [load_experiment(CHECK), *search]
+    return search, [load_experiment(checked), *search]

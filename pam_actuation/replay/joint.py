@@ -172,7 +172,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
             notes[name] = 'the bag has no recorded controller'
             continue
         if name == 'controller' and isinstance(law, JointController) and states_suffice(run):
-            parts[name], internals = replay_joint_controller(run, law, joint)
+            alone = replay_joint_controller(run, law, joint)
+            parts[name], internals = alone.commands, alone.differing
             continue
         loops = RepeatedLoops(joint, law, recorded_seed(run), run.namespace.rpartition('/')[2],
                               (name,))

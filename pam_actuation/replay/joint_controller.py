@@ -19,6 +19,7 @@ As ``controller`` for a single muscle. ``controller_state`` of a joint holds the
 inputs of a tick, the angle with its stamp; so a live recording is reproduced to the bit as well.
 """
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +29,7 @@ from pam_actuation.control.joint_tick import (
 from pam_actuation.control.tick import HELD_BACK, join_stamp
 from pam_actuation.replay.chain import ChainReplay, same_bits
 from pam_actuation.replay.controller import check_complete
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 
@@ -40,6 +41,30 @@ if TYPE_CHECKING:
 COMMANDS = tuple(f'{side}/pressure_command' for side in SIDES)
 
 
+@dataclass(frozen=True)
+class JointControllerReplay:
+    """
+    Outcome of a replay of a joint's controller.
+
+    Parameters
+    ----------
+    commands : ChainReplay
+        Both commands, recorded and replayed, of every tick whose command was recorded.
+    differing : dict of str to int
+        Numbers of ``controller_state`` that differ, with the number of ticks.
+    stamp_ns : numpy.ndarray
+        All ticks, int64.
+    states : dict of str to numpy.ndarray
+        The replayed numbers of ``controller_state`` by name, of all ticks.
+
+    """
+
+    commands: ChainReplay
+    differing: dict[str, int]
+    stamp_ns: IntArray = field(repr=False)
+    states: dict[str, FloatArray] = field(repr=False)
+
+
 def states_suffice(run: 'Run') -> bool:
     """Return whether ``controller_state`` of a recording holds all inputs of its ticks."""
     states = run.topics.get('controller_state')
@@ -47,7 +72,7 @@ def states_suffice(run: 'Run') -> bool:
 
 
 def replay_joint_controller(run: 'Run', controller: 'JointController',
-                            joint: 'JointRig') -> tuple[ChainReplay, dict[str, int]]:
+                            joint: 'JointRig') -> JointControllerReplay:
     """
     Replay the controller of a joint's recording.
 
@@ -62,10 +87,7 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
 
     Returns
     -------
-    ChainReplay
-        Both commands, recorded and replayed, of every tick whose command was recorded.
-    dict of str to int
-        Numbers of ``controller_state`` that differ, with the number of ticks.
+    JointControllerReplay
 
     Raises
     ------
@@ -88,9 +110,10 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
                 for name in core.names if name in columns]
     differing: dict[str, int] = {}
     replayed = np.empty((len(order), len(COMMANDS)))
+    kept = np.empty((len(order), len(core.names)))
     for place, row in enumerate(order.tolist()):
         commands_pa, values = core.run(_inputs(columns, row, angle_at, path))
-        replayed[place] = commands_pa
+        replayed[place], kept[place] = commands_pa, values
         for name, column, index in compared:
             if not same_bits(column[row], values[index]):
                 differing[name] = differing.get(name, 0) + 1
@@ -101,7 +124,9 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
         known = np.array([stamp in at for stamp in stamp_ns.tolist()])      # else it was lost
         stamps[name], computed[name] = stamp_ns[known], column[known]
         recorded[name] = np.array([at[stamp] for stamp in stamp_ns[known].tolist()])
-    return ChainReplay(joint.name, stamps, recorded, computed, run.start_ns), differing
+    return JointControllerReplay(
+        ChainReplay(joint.name, stamps, recorded, computed, run.start_ns), differing, stamp_ns,
+        dict(zip(core.names, kept.T)))
 
 
 def _inputs(columns: dict[str, FloatArray], row: int, angle_at: dict[int, float],

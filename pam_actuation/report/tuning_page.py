@@ -17,6 +17,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
@@ -24,24 +25,27 @@ from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.tuning import tuning_section
 from pam_actuation.tuning.problem import rebuild
+from pam_actuation.tuning.tune import SHOWN_UNIT
 from pam_sim.files import StrPath, write_text
+from pam_sim.joint.parameters import SIDES
 from pam_sim.rig_text import rig_title
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
     from pam_actuation.tuning.recording import RecordingCheck
     from pam_actuation.tuning.tune import TuneResult
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
     from pam_sim.run import Run
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '
         'its last 30 %, plus a quarter of that of the whole run and a tenth of the worst late '
-        'error, in mm.')
+        'error, in {unit}.')
 
 
 def tuning_report(out_path: StrPath, result: 'TuneResult',
-                  recordings: 'Sequence[RecordingCheck]', rig: 'Rig',
+                  recordings: 'Sequence[RecordingCheck]', rig: 'Rig | JointRig',
                   experiments: 'Sequence[Experiment]', runs: 'Sequence[Run]') -> None:
     """
     Write the page of a tuning.
@@ -54,7 +58,7 @@ def tuning_report(out_path: StrPath, result: 'TuneResult',
         What ``tune`` returned.
     recordings : list of RecordingCheck
         What the bags say, may be empty.
-    rig : pam_sim.rig.Rig
+    rig : Rig or JointRig
         The model tuned on.
     experiments : list of Experiment
         Those of the search.
@@ -78,12 +82,14 @@ def tuning_report(out_path: StrPath, result: 'TuneResult',
         ['closed loops of the search', len(problem.loops)]], 'facts')))
     if runs:
         sections.append(provenance([(str(run.path), run) for run in runs]))
+    shown = SHOWN_UNIT[result.unit]
     numbers = [
-        (f'{result.held_out_before:.3f} mm', 'held-out cost before', '', ''),
-        (f'{result.held_out_after:.3f} mm', 'held-out cost after', '',
+        (f'{result.held_out_before:.3f}{shown}', 'held-out cost before', '', ''),
+        (f'{result.held_out_after:.3f}{shown}', 'held-out cost after', '',
          'good' if result.improved else 'bad'),
         (f'{result.rollouts:,}', 'rollouts', result.ended, '')]
-    write_text(out_path, render('pam_actuation: offline tuning', LEAD, sections, numbers, FOOTER))
+    lead = LEAD.format(unit='mm' if result.unit == 'mm' else 'degrees')
+    write_text(out_path, render('pam_actuation: offline tuning', lead, sections, numbers, FOOTER))
 
 
 def _tracking(result: 'TuneResult') -> Section:
@@ -91,15 +97,16 @@ def _tracking(result: 'TuneResult') -> Section:
     check, start = result.check, result.start
     assert check is not None and start is not None        # a result of ``tune`` has both
     loop = check.loops[0]
-    lines = []
+    lines, unit = [], SHOWN_UNIT[result.unit].strip()
     for name, controller, role in (('before', start, 'before'),
                                    ('after', result.controller, 'after')):
-        run = loop.run(rebuild(controller, {}))
-        lines.append(figures.line(run.time_s, run.error_m * 1e3, name, role))
-    wanted = figures.line(run.time_s, run.reference_m * 1e3, 'wanted', 'second')
+        time_s, reference, error = loop.tracked(rebuild(controller, {}))
+        lines.append(figures.line(time_s, error, name, role))
+    wanted = figures.line(time_s, reference, 'wanted', 'second')
     return Section('tracking', 'A run that was not searched', paragraph(
         f'Experiment {loop.experiment.name} on the model, with sensor noise of its own.') + plot(
-            figures.stack([('reference [mm]', [wanted]), ('error [mm]', lines)], 'time [s]')))
+            figures.stack([(f'reference [{unit}]', [wanted]), (f'error [{unit}]', lines)],
+                          'time [s]')))
 
 
 def _recordings(recordings: 'Sequence[RecordingCheck]') -> Section:
@@ -108,8 +115,12 @@ def _recordings(recordings: 'Sequence[RecordingCheck]') -> Section:
         body += ''.join(paragraph(text) for text in one.lines())
         check = one.counterfactual
         if check is not None:
-            body += plot(figures.stack([('command [kPa]', [
-                figures.line(check.time_s, check.recorded_pa * 1e-3, 'recorded', 'before'),
-                figures.line(check.time_s, check.tuned_pa * 1e-3, 'tuned', 'after')])],
+            recorded, tuned = (np.atleast_2d(pa) * 1e-3 for pa in (
+                check.recorded_pa, check.tuned_pa))
+            names = [''] if len(recorded) == 1 else [f'{side} ' for side in SIDES]
+            body += plot(figures.stack([(f'{name}command [kPa]', [
+                figures.line(check.time_s, before, 'recorded', 'before'),
+                figures.line(check.time_s, after, 'tuned', 'after')])
+                for name, before, after in zip(names, recorded, tuned)],
                 'time [s]', row_px=240), f'Absolute pressure commands, {one.bag}')
     return Section('recordings', 'What the recordings say', body)

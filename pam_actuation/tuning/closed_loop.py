@@ -28,9 +28,11 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S, sampled_reference,
+    sensor_noise, steps_per_tick)
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -158,8 +160,7 @@ class MuscleLoop:
     @property
     def start_tick(self) -> int:
         """First tick of the periodic part, of the whole where there is none."""
-        cycles = self.experiment.cycles
-        return 0 if cycles is None else int(cycles[0] * self.rate_hz)
+        return first_periodic_tick(self.experiment, self.rate_hz)
 
     def _fresh_plant(
             self,
@@ -214,6 +215,17 @@ class ClosedLoop(MuscleLoop):
             log['pressure_pa'], log['command_pa'], log['force_n'],
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)
+
+    def tracked(self, controller: 'CompiledController'
+                ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return time [s], reference and error [mm] of tracking the experiment."""
+        run = self.run(controller)
+        return run.time_s, run.reference_m * 1e3, run.error_m * 1e3
+
+    def cost(self, controller: 'CompiledController') -> float:
+        """Return the cost [mm] of tracking the experiment; the rules change in place."""
+        contraction_m = self.run_raw(controller)['contraction_m']
+        return tracking_cost((self.reference_m - contraction_m) * 1e3, self.start_tick)
 
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:

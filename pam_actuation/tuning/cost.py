@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What tuning minimises: tracking error in mm, late errors more than early ones."""
+"""What tuning minimises: tracking error, in mm or degrees, late ones more than early ones."""
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -20,28 +20,28 @@ from pam_sim.annotations import FloatArray
 LATE_SHARE = 0.3          # of the experiment, counted from its end
 _EARLY_WEIGHT = 0.25
 _WORST_WEIGHT = 0.1
-LOST_MM = 1e3             # cost of a run that is not finite
+LOST = 1e3                # cost of a run that is not finite, mm or degrees
 
 
-def tracking_cost_mm(error_m: FloatArray, start_tick: int = 0) -> float:
+def tracking_cost(error: FloatArray, start_tick: int = 0) -> float:
     """
-    Return the cost [mm] of one run.
+    Return the cost of one run, in the unit of the error.
 
     It is the root mean square error of the last part of the run. A quarter of that of the whole
     run and a tenth of the worst late error are added. The quarter rewards fast learning.
 
     Parameters
     ----------
-    error_m : numpy.ndarray
-        Reference minus contraction [m] at every tick.
+    error : numpy.ndarray
+        Reference minus contraction [mm] or angle [degrees] at every tick.
     start_tick : int
         First tick that counts: the start from rest is the same for all controllers.
 
     """
-    error_mm = np.asarray(error_m)[start_tick:] * 1e3
-    if not np.all(np.isfinite(error_mm)):
-        return LOST_MM
-    late = error_mm[-max(1, int(len(error_mm) * LATE_SHARE)):]
+    counted = np.asarray(error)[start_tick:]
+    if not np.all(np.isfinite(counted)):
+        return LOST
+    late = counted[-max(1, int(len(counted) * LATE_SHARE)):]
     return float(
-        np.sqrt(np.mean(late ** 2)) + _EARLY_WEIGHT * np.sqrt(np.mean(error_mm ** 2))
+        np.sqrt(np.mean(late ** 2)) + _EARLY_WEIGHT * np.sqrt(np.mean(counted ** 2))
         + _WORST_WEIGHT * np.max(np.abs(late)))

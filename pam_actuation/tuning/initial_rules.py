@@ -36,7 +36,7 @@ _PASSES = 3                     # times a rig's experiments are tracked
 def initial_rules(workers: 'Workers', problem: Problem,
                   settings: dict[str, float]) -> 'tuple[tuple[str, RuleBase, float], int]':
     """
-    Return (name, rules, cost [mm]) of the best table for a start, and the rollouts it took.
+    Return (name, rules, cost) of the best table for a start, and the rollouts it took.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _learn(problem: Problem, task: tuple[list[int], dict[str, float]]) -> 'RuleB
 
 
 def _cost_from(problem: Problem, task: 'tuple[RuleBase, dict[str, float], int]') -> float:
-    """Return the cost [mm] on one loop of settings that start from given rules."""
+    """Return the cost on one loop of settings that start from given rules."""
     rules, settings, i = task
     controller = rebuild(problem.controller, settings, rules)
-    return Problem([problem.loops[i]], controller).cost_mm({})
+    return Problem([problem.loops[i]], controller).cost({})

@@ -19,7 +19,7 @@ The same compiled steps as in the controller, drivers and joint, as in ``closed_
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -27,11 +27,14 @@ from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.joint_plant_loop import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
 from pam_actuation.tuning.closed_loop import Course
+from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, learning_mask, Learns, PHYSICS_S, sampled_reference, sensor_noise, steps_per_tick)
+    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S, sampled_reference,
+    sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 
@@ -101,6 +104,8 @@ class JointLoop:
         self._torque = np.zeros(self.ticks)
         if external_torque_n_m is not None:
             self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
+        self._arguments = (joint, experiment, seed, rate_hz, latency_s, external_torque_n_m,
+                           angle_noise_rad, angle_step_rad, drivers)
         configs = drivers or [driver_config(rig) for rig in sides.values()]
         self._drivers = [DriverLaw(rig, config, rate_hz)
                          for rig, config in zip(sides.values(), configs)]
@@ -111,6 +116,32 @@ class JointLoop:
         self._plant = joint.plant(dt_s=PHYSICS_S)
         latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
         self._timing = (steps, every, latency)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
+        return JointLoop, self._arguments
+
+    @property
+    def rig(self) -> 'JointRig':
+        """The joint."""
+        return self.joint
+
+    @property
+    def start_tick(self) -> int:
+        """First tick of the periodic part, of the whole where there is none."""
+        return first_periodic_tick(self.experiment, self.rate_hz)
+
+    def tracked(self, controller: 'JointController'
+                ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return time [s], reference and error [degrees] of tracking the experiment."""
+        run = self.run(controller)
+        return run.time_s, np.degrees(run.reference), np.degrees(run.error)
+
+    def cost(self, controller: 'JointController') -> float:
+        """Return the cost [degrees] of tracking the experiment; the rules change in place."""
+        angle_rad = self.run_raw(controller)['angle_rad']
+        return tracking_cost(
+            np.degrees(self._position[:self.ticks] - angle_rad), self.start_tick)
 
     def run(self, controller: 'JointController', learn: Learns = True) -> ModeResult:
         """
@@ -147,11 +178,12 @@ class JointLoop:
         check_controller(controller, JOINT, self.rate_hz)
         from pam_actuation.tuning import mode_rollouts      # brings the compiler with it
         controller.pause()
-        self._plant.reset()
+        # Copies: several threads may track the experiment at the same time.
+        plant = tuple(tuple(array.copy() for array in part) for part in self._plant.arrays)
         log = np.empty(self.ticks * size_of(mode_rollouts.JOINT_LOG))
         mode, law = controller.compiled_arguments()
         mode_rollouts.joint_rollout(
-            self._plant.arrays, tuple(driver.hsv for driver in self._drivers),
+            plant, tuple(driver.hsv for driver in self._drivers),
             tuple(driver.fresh() for driver in self._drivers), self._timing,
             controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
             self._quantum, self._torque,

@@ -71,6 +71,12 @@ def sampled_reference(experiment: 'Experiment',
             np.array([rate for _, rate in wanted], dtype=float))
 
 
+def first_periodic_tick(experiment: 'Experiment', rate_hz: float) -> int:
+    """Return the first tick of the periodic part, of the whole where there is none."""
+    cycles = experiment.cycles
+    return 0 if cycles is None else int(cycles[0] * rate_hz)
+
+
 def sensor_noise(rig: 'Rig', ticks: int,
                  seed: int | tuple[int, int]) -> tuple[FloatArray, FloatArray]:
     """

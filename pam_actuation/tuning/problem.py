@@ -14,21 +14,29 @@
 
 """What a set of controller settings costs on a set of closed loops."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.lqi import LqiController
+from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.settings import SCALING
-from pam_actuation.tuning.cost import LOST_MM, tracking_cost_mm
+from pam_actuation.tuning.cost import LOST
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
     from pam_actuation.control.sofc.rule_table import RuleBase
     from pam_actuation.tuning.closed_loop import ClosedLoop
+    from pam_actuation.tuning.joint_loop import JointLoop
+
+    Loop = ClosedLoop | JointLoop
+
+Law = CompiledController | JointController
+OF_THE_MODE = 'tracked_'    # what of the scaling of rules turns metres of the law into radians
 
 
 class Problem:
@@ -37,23 +45,23 @@ class Problem:
 
     Parameters
     ----------
-    loops : list of ClosedLoop
-    controller : SelfOrganizingFuzzyController, PidController or LqiController
+    loops : list of ClosedLoop or of JointLoop
+    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
         Every rollout starts from its rules.
 
     """
 
-    def __init__(self, loops: 'list[ClosedLoop]', controller: 'CompiledController') -> None:
+    def __init__(self, loops: 'Sequence[Loop]', controller: Law) -> None:
         self.loops = list(loops)
         self.controller = controller
 
-    def costs_mm(self, settings: dict[str, float]) -> FloatArray:
+    def costs(self, settings: dict[str, float]) -> FloatArray:
         """
-        Return the cost [mm] of settings on every loop, shape (loops,).
+        Return the cost [mm, of a joint degrees] of settings on every loop, shape (loops,).
 
         Settings without a controller (no solution of the Riccati equation) count as lost.
         """
-        costs = np.full(len(self.loops), LOST_MM)
+        costs = np.full(len(self.loops), LOST)
         try:
             controller = rebuild(self.controller, settings)
         except InputError:
@@ -61,22 +69,21 @@ class Problem:
         for i, loop in enumerate(self.loops):
             if i and controller.rules is not None:
                 controller = rebuild(self.controller, settings)      # none of what it learned
-            log = loop.run_raw(controller)
-            costs[i] = tracking_cost_mm(loop.reference_m - log['contraction_m'], loop.start_tick)
+            costs[i] = loop.cost(controller)
         return costs
 
-    def cost_mm(self, settings: dict[str, float]) -> float:
-        """Return the mean cost [mm] of settings over the loops."""
-        return float(np.mean(self.costs_mm(settings)))
+    def cost(self, settings: dict[str, float]) -> float:
+        """Return the mean cost [mm, of a joint degrees] of settings over the loops."""
+        return float(np.mean(self.costs(settings)))
 
 
 def cost_of(problem: Problem, settings: dict[str, float]) -> float:
-    """Return ``problem.cost_mm(settings)``: the function workers are given."""
-    return problem.cost_mm(settings)
+    """Return ``problem.cost(settings)``: the function workers are given."""
+    return problem.cost(settings)
 
 
-def rebuild(controller: 'CompiledController', settings: dict[str, float],
-            rules: 'RuleBase | None' = None) -> 'CompiledController':
+def rebuild(controller: Law, settings: dict[str, float],
+            rules: 'RuleBase | None' = None) -> Any:
     """
     Return a fresh controller of the same kind and rig with other settings.
 
@@ -88,15 +95,24 @@ def rebuild(controller: 'CompiledController', settings: dict[str, float],
     return fresh
 
 
-def _rebuilt(controller: 'CompiledController', merged: dict[str, float],
-             rules: 'RuleBase | None') -> 'CompiledController':
+def _rebuilt(controller: Law, merged: dict[str, float], rules: 'RuleBase | None') -> Any:
+    if isinstance(controller, JointController):
+        return controller.with_law(_rebuilt(controller.law, merged, rules))
     if isinstance(controller, PidController):
         return PidController(controller.static_inverse, merged, controller.rig_name)
     if isinstance(controller, LqiController):
         return LqiController(controller.model, merged, controller.rig_name)
     if rules is None and all(merged[name] == controller.settings[name] for name in SCALING):
         rules = controller.rules
+    assert controller.rules is not None         # of all that is neither PID nor LQI
+    mode = {name: value for name, value in controller.rules.scaling.items()
+            if name.startswith(OF_THE_MODE)}
+    if rules is not None and mode:
+        rules = rules.copy()
+        for name in mode:
+            rules.scaling.pop(name, None)
     fresh = SelfOrganizingFuzzyController(
         controller.static_inverse, merged, rules, controller.rig_name)
+    fresh.rules.scaling.update(mode)
     fresh.freeze_learning = controller.freeze_learning
     return fresh

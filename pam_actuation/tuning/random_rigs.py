@@ -24,21 +24,26 @@ dead time         20 to 45 ms                                 both
 supply            0 to 10 % less gauge pressure               HSV (a PPR's model
                                                               has no supply)
 load              4 to 5.5 kg                                 both
+limb of a joint   mass and inertia times 0.8 to 1.1           both
 force map         gain times 0.85 to 1.15                     both
 ================  ==========================================  ==================
+
+Both muscles of a joint are drawn each by itself.
 
 The ranges are design values. Each is drawn evenly, independently of the others.
 """
 
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, TypeVar
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
+from pam_sim.joint.rig import JointRig
+from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_sim.rig import EffectSetting, Rig
+    from pam_sim.rig import EffectSetting
 
 FRICTION_FACTOR = (0.5, 2.0)
 VALVE_FACTOR = (0.7, 1.3)
@@ -46,15 +51,19 @@ DEAD_TIME_S = (0.020, 0.045)
 SUPPLY_FACTOR = (0.9, 1.0)          # of the gauge pressure
 MASS_KG = (4.0, 5.5)
 FORCE_MAP_FACTOR = (0.85, 1.15)
+LIMB_FACTOR = (0.8, 1.1)
+_DRAWS = 6                          # numbers for one muscle
+
+AnyRig = TypeVar('AnyRig', Rig, JointRig, 'Rig | JointRig')
 
 
-def random_rigs(rig: 'Rig', count: int, seed: int = 0) -> 'list[Rig]':
+def random_rigs(rig: AnyRig, count: int, seed: int = 0) -> list[AnyRig]:
     """
     Return rigs drawn about a given one.
 
     Parameters
     ----------
-    rig : pam_sim.rig.Rig
+    rig : Rig or JointRig
         The nominal one; its valve, effects and sensors stay. Names stay as well, so that
         rules learned on one rig may run on the others.
     count : int
@@ -64,14 +73,26 @@ def random_rigs(rig: 'Rig', count: int, seed: int = 0) -> 'list[Rig]':
 
     Returns
     -------
-    list of Rig
+    list of Rig or of JointRig
 
     """
     random = np.random.default_rng(seed)
-    return [_drawn(rig, random.uniform(size=6)) for _ in range(count)]
+    if isinstance(rig, JointRig):
+        return [_drawn_joint(rig, random.uniform(size=2 * _DRAWS + 1)) for _ in range(count)]
+    return [_drawn(rig, random.uniform(size=_DRAWS)) for _ in range(count)]
 
 
-def _drawn(rig: 'Rig', part: FloatArray) -> 'Rig':
+def _drawn_joint(joint: JointRig, part: FloatArray) -> JointRig:
+    """Return the joint at a point of the unit cube."""
+    limb = _between(LIMB_FACTOR, part[-1])
+    return joint.with_(
+        parameters={name: joint.parameters[name] * limb
+                    for name in ('limb_mass_kg', 'inertia_kg_m2')},
+        flexor=_drawn(joint.flexor, part[:_DRAWS]),
+        extensor=_drawn(joint.extensor, part[_DRAWS:2 * _DRAWS]))
+
+
+def _drawn(rig: Rig, part: FloatArray) -> Rig:
     """Return the rig at a point of the unit cube."""
     friction = FRICTION_FACTOR[0] * (FRICTION_FACTOR[1] / FRICTION_FACTOR[0]) ** part[0]
     valve = _between(VALVE_FACTOR, part[1])

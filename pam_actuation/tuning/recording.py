@@ -28,22 +28,36 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.replay.controller import replay_controller
+from pam_actuation.replay.joint import replay_joint
+from pam_actuation.replay.joint_controller import (
+    COMMANDS, replay_joint_controller, states_suffice)
 from pam_actuation.replay.plant import replay_plant
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
+from pam_sim.joint.parameters import SIDES
+from pam_sim.joint.rig import JointRig
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
     from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.replay.difference import Difference
+    from pam_actuation.tuning.problem import Law
     from pam_sim.rig import Rig
     from pam_sim.run import Run
 
 # Error of the free run as a share of the recorded range; design values.
 TRUSTED_SHARE = 0.03
 DOUBTFUL_SHARE = 0.10
+# What of a replayed plant is judged, and the words for it: signal to name.
+_OF_MUSCLE = {'pressure': 'pressure', 'contraction': 'contraction'}
+_OF_JOINT = {'joint_state.angle_rad': 'angle', **{
+    f'{side}/pressure.pressure_pa': f'pressure of the {side}' for side in SIDES}}
+_SHOWN = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'angle': (180.0 / np.pi, '°')}
 
 
 @dataclass(frozen=True)
@@ -51,8 +65,8 @@ class ModelCheck:
     """
     How a model's free run compares with a recording.
 
-    ``share`` is the larger of pressure and contraction error (rms over recorded range),
-    ``signal`` the one it belongs to, ``rms`` its size in SI.
+    ``share`` is the largest of pressure and contraction (of a joint: angle) errors, rms over
+    recorded range. ``signal`` is the one it belongs to, ``rms`` its size in SI.
     """
 
     signal: str
@@ -68,8 +82,8 @@ class ModelCheck:
 
     def sentence(self) -> str:
         """Return the outcome as one sentence."""
-        size = f'{self.rms * 1e-3:.3g} kPa' if self.signal == 'pressure' \
-            else f'{self.rms * 1e3:.3g} mm'
+        factor, unit = _SHOWN[self.signal.split()[0]]
+        size = f'{self.rms * factor:.3g} {unit}'
         says = {
             'trusted': 'trustworthy for tuning',
             'doubtful': 'doubtful for tuning: tune on randomised rigs too, or correct the model '
@@ -90,7 +104,8 @@ class Counterfactual:
     Commands of the tuned controller on recorded inputs against the recorded commands.
 
     Differences [Pa] over the ticks with usable inputs; ``saturated`` and
-    ``recorded_saturated`` are shares of ticks at a pressure limit. The arrays hold every tick.
+    ``recorded_saturated`` are shares of ticks at a pressure limit. The arrays hold every tick,
+    one row; of a joint two rows, flexor and extensor.
     """
 
     ticks: int
@@ -139,8 +154,8 @@ class RecordingCheck:
                 ('model', self.model), ('counterfactual', self.counterfactual))}}
 
 
-def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig',
-                     controller: 'CompiledController') -> list[RecordingCheck]:
+def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig | JointRig',
+                     controller: 'Law') -> list[RecordingCheck]:
     """Return a RecordingCheck of every run for a model and a tuned controller."""
     checks = []
     for run in runs:
@@ -151,14 +166,15 @@ def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig',
         except InputError as error:
             notes.append(f'No model check: {error.problem}.')
         try:
-            tuned = counterfactual(run, controller)
+            tuned = counterfactual_of_joint(run, controller) if isinstance(
+                controller, JointController) else counterfactual(run, controller)
         except InputError as error:
             notes.append(f'No counterfactual check: {error.problem}.')
         checks.append(RecordingCheck(str(run.path), model, tuned, tuple(notes)))
     return checks
 
 
-def check_model(run: 'Run', rig: 'Rig') -> ModelCheck:
+def check_model(run: 'Run', rig: 'Rig | JointRig') -> ModelCheck:
     """
     Compare a model with a recording.
 
@@ -168,15 +184,32 @@ def check_model(run: 'Run', rig: 'Rig') -> ModelCheck:
         The recording cannot be simulated with this rig (other valve, signals missing).
 
     """
-    again = replay_plant(replace(run, metadata={**run.metadata, 'rig': rig.to_yaml()}))
+    modelled = replace(run, metadata={**run.metadata, 'rig': rig.to_yaml()})
+    differences: list[Difference]
+    if isinstance(rig, JointRig):
+        _check_valves(run, rig)
+        names = _OF_JOINT
+        differences = replay_joint(modelled, only='plant').parts['plant'].differences
+    else:
+        names, differences = _OF_MUSCLE, replay_plant(modelled).differences
     worst = None
-    for one in again.differences:
-        if one.signal in ('pressure', 'contraction') and one.span > 0.0:
+    for one in differences:
+        if one.signal in names and one.span > 0.0:
             if worst is None or one.rms / one.span > worst.share:
-                worst = ModelCheck(one.signal, one.rms / one.span, one.rms)
+                worst = ModelCheck(names[one.signal], one.rms / one.span, one.rms)
     if worst is None:
         raise InputError('neither pressure nor contraction moves', str(run.path))
     return worst
+
+
+def _check_valves(run: 'Run', joint: JointRig) -> None:
+    """Raise InputError unless the recorded signals are those of the joint's valves."""
+    for place, muscle in joint.muscles.items():
+        signals = run.require(f'{place}valve_signal').values
+        if set(signals) != set(muscle.signal_names):
+            raise InputError(f'{place}valve_signal has {", ".join(signals)}; the valve of '
+                             f'{joint.name} takes {", ".join(muscle.signal_names)}',
+                             str(run.path))
 
 
 def counterfactual(run: 'Run', controller: 'CompiledController') -> Counterfactual:
@@ -199,17 +232,54 @@ def counterfactual(run: 'Run', controller: 'CompiledController') -> Counterfactu
     fresh = load_controller(controller.to_yaml())
     fresh.freeze_learning = True
     again = replay_controller(run, fresh, keep_states=True)
-    used = np.isin(again.states['input_reason'], RUNNING)
+    return _compared(run, again.states, again.stamp_ns, again.recorded_pa, again.replayed_pa)
+
+
+def counterfactual_of_joint(run: 'Run', controller: JointController) -> Counterfactual:
+    """
+    Step the controller of a joint over the inputs of a recording, its rules frozen.
+
+    Raises
+    ------
+    InputError
+        The recording has no complete controller ticks, or is of a version whose ticks do not
+        hold all inputs.
+
+    """
+    run.require('controller_state')
+    if not states_suffice(run):
+        raise InputError('its controller_state does not hold all inputs of a tick',
+                         str(run.path))
+    if not run.metadata.get('rig'):
+        raise InputError('the recording does not say which joint it is', str(run.path))
+    joint = load_joint(run.metadata['rig'])
+    fresh = load_controller(controller.to_yaml(), joint, accept_other_rig=True)
+    fresh.freeze_learning = True
+    again = replay_joint_controller(run, fresh, joint)
+    commands, names = again.commands, [f'{topic}.pressure_pa' for topic in COMMANDS]
+    for name in names:
+        if len(commands.stamp_ns[name]) != len(again.stamp_ns):
+            raise InputError(f'{len(again.stamp_ns) - len(commands.stamp_ns[name])} commands of '
+                             f'{name.partition("/")[0]} are not in it', str(run.path))
+    recorded, replayed = (np.array([which[name] for name in names])
+                          for which in (commands.recorded, commands.replayed))
+    return _compared(run, again.states, again.stamp_ns, recorded, replayed)
+
+
+def _compared(run: 'Run', states: dict[str, FloatArray], stamp_ns: IntArray,
+              recorded_pa: FloatArray, replayed_pa: FloatArray) -> Counterfactual:
+    """Compare commands of all ticks, one row or that of each muscle."""
+    used = np.isin(states['input_reason'], RUNNING)
     if not used.any():
         raise InputError('no controller tick had usable inputs', str(run.path))
-    away = np.where(used, np.abs(again.replayed_pa - again.recorded_pa), 0.0)
-    worst = int(np.argmax(away))
-    limited = (again.states['saturated_low'] > 0.5) | (again.states['saturated_high'] > 0.5)
+    away = np.where(used, np.abs(replayed_pa - recorded_pa), 0.0)
+    worst = int(np.argmax(away)) % len(stamp_ns)
+    limited = (states['saturated_low'] > 0.5) | (states['saturated_high'] > 0.5)
     before = run.require('controller_state').values
     recorded = sum(np.asarray(before[name]) > 0.5 for name in (
         'saturated_low', 'saturated_high') if name in before)
     return Counterfactual(
-        int(used.sum()), float(np.sqrt(np.mean(away[used] ** 2))),
-        float(away[worst]), (int(again.stamp_ns[worst]) - run.start_ns) * 1e-9,
+        int(used.sum()), float(np.sqrt(np.mean(away[..., used] ** 2))),
+        float(away.max()), (int(stamp_ns[worst]) - run.start_ns) * 1e-9,
         float(np.mean(limited[used])), float(np.mean(np.asarray(recorded) > 0)),
-        (again.stamp_ns - run.start_ns) * 1e-9, again.recorded_pa, again.replayed_pa)
+        (stamp_ns - run.start_ns) * 1e-9, recorded_pa, replayed_pa)

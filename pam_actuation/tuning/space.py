@@ -19,11 +19,12 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.tuning.problem import Law
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,14 @@ SOFC_AXES = (
     Axis('index_tau_s', 0.001, 0.3),
     Axis('reference_knots', 13, 61, log=False, whole=True),
 )
+# Of a joint: a limb swings slowly, so its rules are credited later. Damping and proportional gain
+# may come down to next to nothing, and the limb has an inertia of any size.
+_OF_A_JOINT = {axis.name: axis for axis in (
+    Axis('acceleration_feedforward_pa_s2_per_m', 0.0, 3e5, log=False),
+    Axis('credit_delay_s', 0.02, 0.5, log=False),
+    Axis('proportional_pa_per_m', 1e3, 3e6),
+    Axis('derivative_pa_s_per_m', 1e2, 5e5))}
+JOINT_AXES = tuple(_OF_A_JOINT.get(axis.name, axis) for axis in SOFC_AXES)
 PID_AXES = (
     Axis('proportional_pa_per_m', 1e5, 3e7),
     Axis('integral_pa_per_m_s', 1e6, 6e8),
@@ -75,7 +84,7 @@ LQI_AXES = (
 )
 
 
-def default_axes(controller: 'CompiledController') -> tuple[Axis, ...]:
+def default_axes(controller: 'Law') -> tuple[Axis, ...]:
     """
     Return the axes for a controller.
 
@@ -89,7 +98,8 @@ def default_axes(controller: 'CompiledController') -> tuple[Axis, ...]:
     rules = controller.rules
     learned = rules is not None and (
         rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any())
-    return tuple(axis for axis in SOFC_AXES if axis.name in controller.settings
+    axes = JOINT_AXES if tracked_by(controller) == JOINT else SOFC_AXES
+    return tuple(axis for axis in axes if axis.name in controller.settings
                  and not (learned and axis.name in SCALING))
 
 

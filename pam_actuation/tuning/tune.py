@@ -20,17 +20,17 @@ its initial rules (``initial_rules``). Both are judged on runs that were not par
 The same seed gives the same result with any number of ``workers``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 import time
-from typing import Any, TYPE_CHECKING, TypeVar
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.made_for import facts_of
-from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.tuning.initial_rules import initial_rules
+from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_actuation.tuning.problem import cost_of, Problem, rebuild
 from pam_actuation.tuning.search import default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
@@ -38,16 +38,15 @@ from pam_actuation.tuning.workers import Workers
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
-from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
-    from pam_actuation.drivers.config import DriverConfig
     from pam_actuation.experiments.experiment import Experiment
+    from pam_actuation.tuning.problem import Law
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
-_MARGIN_PA = 30e3         # of pressure above the static one: dry friction and acceleration
+SHOWN_UNIT = {'mm': ' mm', 'deg': '°'}      # of costs, as people read it
 
 
 @dataclass
@@ -57,16 +56,16 @@ class TuneResult:
 
     Attributes
     ----------
-    controller : SelfOrganizingFuzzyController, PidController or LqiController
+    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
         With the tuned settings and initial rules, ready to run.
     changed : dict of str -> (float, float)
         Settings before and after.
     history : list of (int, float)
-        Rollouts done and best training cost [mm] so far.
+        Rollouts done and best training cost so far.
     cost_before, cost_after : float
-        Training cost [mm].
+        Training cost, in ``unit``.
     held_out_before, held_out_after : float
-        Cost [mm] on runs the search did not see.
+        Cost on runs the search did not see.
     improved : bool
         The held-out cost fell; otherwise ``controller`` has the settings from before.
     rollouts : int
@@ -87,10 +86,12 @@ class TuneResult:
         The controller from before.
     problem, check : Problem
         The closed loops of the search and of the held-out check.
+    unit : str
+        Of all costs: 'mm', of a joint 'deg'.
 
     """
 
-    controller: 'CompiledController'
+    controller: 'Law'
     changed: dict[str, tuple[float, float]]
     history: list[tuple[int, float]]
     cost_before: float
@@ -105,9 +106,10 @@ class TuneResult:
     rules: str = ''
     left_out: int = 0
     axes: tuple[Axis, ...] = field(default=(), repr=False)
-    start: 'CompiledController | None' = field(default=None, repr=False)
+    start: 'Law | None' = field(default=None, repr=False)
     problem: Problem | None = field(default=None, repr=False)
     check: Problem | None = field(default=None, repr=False)
+    unit: str = 'mm'
 
     def to_yaml(self) -> str:
         """Return the tuned controller as YAML text for ``load_controller``."""
@@ -137,8 +139,10 @@ class TuneResult:
         """Return the outcome as plain data."""
         return {
             'improved': self.improved,
-            'cost_before_mm': self.cost_before, 'cost_after_mm': self.cost_after,
-            'held_out_before_mm': self.held_out_before, 'held_out_after_mm': self.held_out_after,
+            f'cost_before_{self.unit}': self.cost_before,
+            f'cost_after_{self.unit}': self.cost_after,
+            f'held_out_before_{self.unit}': self.held_out_before,
+            f'held_out_after_{self.unit}': self.held_out_after,
             'rollouts': self.rollouts, 'simulated_s': self.simulated_s, 'seconds': self.seconds,
             'ended': self.ended, 'initial_rules': self.rules, 'left_out': self.left_out,
             'changed': {name: {'before': before, 'after': after}
@@ -150,8 +154,8 @@ class TuneResult:
         lines = [
             f'{self.rollouts} rollouts in {self.seconds:.1f} s '
             f'({self.simulated_s / max(self.seconds, 1e-9):,.0f} times real time), {self.ended}; '
-            f'cost on held-out runs {self.held_out_before:.3f} -> {self.held_out_after:.3f} mm, '
-            f'{verdict}']
+            f'cost on held-out runs {self.held_out_before:.3f} -> {self.held_out_after:.3f}'
+            f'{SHOWN_UNIT[self.unit]}, {verdict}']
         if self.rules:
             lines.append(f'  initial rules: {self.rules}')
         if self.left_out:
@@ -162,59 +166,30 @@ class TuneResult:
         return '\n'.join(lines)
 
 
-def reachable(rig: 'Rig', experiment: 'Experiment', controller: 'CompiledController') -> bool:
-    """Return whether a rig can hold an experiment's largest contraction with some to spare."""
-    highest_m = experiment.chain.extremes()[1]
-    limit_pa = P_ATM_PA + controller.settings['max_pressure_gauge_pa']
-    if rig.valve == 'hsv':
-        limit_pa = min(limit_pa, rig.parameters['supply_pa'])
-    return float(rig.static_pressure_pa(highest_m)) + _MARGIN_PA <= limit_pa
-
-
-Thing = TypeVar('Thing')
-
-
-def _as_list(thing: Thing | list[Thing]) -> list[Thing]:
+def _as_list(thing: Any) -> list[Any]:
     return list(thing) if isinstance(thing, (list, tuple)) else [thing]
 
 
-def _loops(rigs: 'list[Rig]', experiments: 'list[Experiment]', seed: int,
-           controller: 'CompiledController',
-           driver: 'DriverConfig') -> tuple[list[ClosedLoop], int]:
-    """Return the closed loops of all pairs that can be reached, and how many cannot."""
-    for experiment in experiments:
-        if experiment.domain != 'contraction':
-            raise InputError(
-                f'experiment {experiment.name} is in {experiment.domain}; only contraction can '
-                'be tracked')
-    pairs = [(rig, experiment) for rig in rigs for experiment in experiments]
-    kept = [(rig, experiment) for rig, experiment in pairs
-            if reachable(rig, experiment, controller)]
-    if not kept:
-        raise InputError('no rig can reach any of the experiments', experiments[0].name)
-    return [ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=driver)
-            for rig, experiment in kept], len(pairs) - len(kept)
-
-
-def tune(rig: 'Rig | list[Rig]', controller: 'CompiledController',
+def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
          experiment: 'Experiment | list[Experiment]', budget: int = 400, seed: int = 0,
          jobs: int = 1, progress: Callable[[int], object] | None = None,
          axes: tuple[Axis, ...] | None = None,
          held_out: 'Experiment | list[Experiment] | None' = None,
          population: int | None = None, patience: int = 0, cluster: str | None = None,
-         held_out_rigs: 'list[Rig] | None' = None, learn_rules: bool = True) -> TuneResult:
+         held_out_rigs: 'Sequence[Rig | JointRig] | None' = None,
+         learn_rules: bool = True) -> TuneResult:
     """
     Tune settings and initial rules of a controller on a model.
 
     Parameters
     ----------
-    rig : Rig or list of Rig
+    rig : Rig or JointRig, or list of either
         Cost is the mean over all (nominal and randomised ones, for instance). The valve driver
         knows the data sheet of the first one only.
-    controller : SelfOrganizingFuzzyController, PidController or LqiController
+    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
         Start of the search; not changed. Its rules are where every rollout starts.
     experiment : Experiment or list of Experiment
-        Domain ``contraction``; cost is the mean over all.
+        Domain ``contraction``, of a joint ``joint_angle``; cost is the mean over all.
     budget : int
         Largest number of training rollouts of the search.
     seed : int
@@ -245,18 +220,18 @@ def tune(rig: 'Rig | list[Rig]', controller: 'CompiledController',
     Raises
     ------
     InputError
-        Budget too small, unknown axis, experiment not in contraction or beyond all rigs,
-        cluster not to be had.
+        Budget too small, unknown axis, experiment not in what the controller tracks or beyond
+        all rigs, cluster not to be had.
 
     """
     began = time.perf_counter()
     axes = tuple(axes) if axes is not None else default_axes(controller)
     check_axes(axes, controller.settings)
-    rigs, experiments = _as_list(rig), _as_list(experiment)
-    driver = driver_config(rigs[0])
-    train, left_out = _loops(rigs, experiments, seed, controller, driver)
-    test, _ = _loops(held_out_rigs or rigs, _as_list(held_out or experiments),
-                     seed + HELD_OUT_SEED, controller, driver)
+    rigs: list[Rig | JointRig] = _as_list(rig)
+    experiments: list[Experiment] = _as_list(experiment)
+    train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0])
+    test, _ = loops_of(held_out_rigs or rigs, _as_list(held_out or experiments),
+                       seed + HELD_OUT_SEED, controller, rigs[0])
     members = population or default_members(budget // len(train))
     generations = budget // (members * len(train))
     if members < SMALLEST or generations < 2:
@@ -300,4 +275,4 @@ def tune(rig: 'Rig | list[Rig]', controller: 'CompiledController',
     return TuneResult(
         tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
         rollouts, rollouts * mean_s, time.perf_counter() - began, found.reason, rules, left_out,
-        axes, controller, problem, check)
+        axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm')

@@ -19,9 +19,10 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.initial_rules import as_initial, initial_rules, mean_rules
+from pam_actuation.tuning.loops_of_rigs import reachable
 from pam_actuation.tuning.problem import Problem, rebuild
 from pam_actuation.tuning.random_rigs import random_rigs
-from pam_actuation.tuning.tune import reachable, tune
+from pam_actuation.tuning.tune import tune
 from pam_actuation.tuning.workers import Workers
 from pam_sim import load_rig
 from pam_sim.errors import InputError
@@ -42,7 +43,7 @@ def problem(rig):
 
 
 def test_a_learned_table_is_chosen_and_starts_fresh(problem):
-    before = problem.cost_mm({})
+    before = problem.cost({})
     with Workers() as workers:
         (name, rules, cost), rollouts = initial_rules(workers, problem, {})
     assert cost < 0.9 * before and name != 'as before'
@@ -50,7 +51,7 @@ def test_a_learned_table_is_chosen_and_starts_fresh(problem):
     assert not rules.feedforward_fired.any()
     assert np.array_equal(rules.feedforward_initial, rules.feedforward)
     taught = rebuild(problem.controller, {}, rules)
-    assert Problem(problem.loops, taught).cost_mm({}) == cost
+    assert Problem(problem.loops, taught).cost({}) == cost
 
 
 def test_other_knots_start_untaught_and_equal_ones_keep_the_rules(problem):
@@ -82,4 +83,4 @@ def test_what_a_rig_cannot_reach_is_left_out_and_said(rig):
 
 def test_settings_without_a_controller_count_as_lost(rig, problem):
     lqi = load_controller('lqi', rig)
-    assert Problem(problem.loops, lqi).cost_mm({'integral_weight': -1.0}) == 1e3
+    assert Problem(problem.loops, lqi).cost({'integral_weight': -1.0}) == 1e3

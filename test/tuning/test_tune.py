@@ -17,7 +17,7 @@
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
-from pam_actuation.tuning.cost import tracking_cost_mm
+from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.space import (
     Axis, default_axes, from_unit, PID_INVERSE_AXES, SOFC_AXES, to_unit)
 from pam_actuation.tuning.tune import tune
@@ -92,7 +92,7 @@ def test_scaling_stays_once_rules_are_learned(rig):
 
 
 def test_cost_weighs_late_errors_and_refuses_runaways():
-    early = np.r_[np.full(70, 1e-3), np.zeros(30)]
+    early = np.r_[np.full(70, 1.0), np.zeros(30)]
     late = early[::-1]
-    assert tracking_cost_mm(late) > 2.0 * tracking_cost_mm(early)
-    assert tracking_cost_mm(np.r_[early, np.nan]) == 1e3
+    assert tracking_cost(late) > 2.0 * tracking_cost(early)
+    assert tracking_cost(np.r_[early, np.nan]) == 1e3

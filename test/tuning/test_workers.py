@@ -76,7 +76,7 @@ def test_a_missing_library_is_named(monkeypatch, address, library, says):
 def test_results_keep_the_order_of_the_items():
     class Square:
 
-        def cost_mm(self, item):
+        def cost(self, item):
             return item * item
 
     with Workers(jobs=2) as workers:

@@ -50,10 +50,14 @@ def preset_for(experiment: 'Experiment', rig: 'Rig | JointRig') -> str:
     return f'sofc_{mode}{rig.valve}'
 
 
+def joint_size(joint: 'JointRig') -> str:
+    """Return ``knee`` for a joint of the size of a leg, ``joint`` for one of a bench."""
+    return 'knee' if joint.parameters['inertia_kg_m2'] > LARGE_JOINT_KG_M2 else 'joint'
+
+
 def joint_preset_for(joint: 'JointRig', valve: str) -> str:
     """Return the name of the self-organizing controller for a joint of this size."""
-    size = 'knee' if joint.parameters['inertia_kg_m2'] > LARGE_JOINT_KG_M2 else 'joint'
-    return f'sofc_{size}_{valve}'
+    return f'sofc_{joint_size(joint)}_{valve}'
 
 
 def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | JointMode | None:

@@ -234,6 +234,11 @@ class JointController(WrappedLaw):
         _joint_outputs(self._par, self._st, P_ATM_PA, self._raw, self._commands)
         self.pause()
 
+    def with_law(self, law: CompiledController) -> 'JointController':
+        """Return a controller of the same joint and co-contraction round another law."""
+        return JointController(law, self.flexor_radius_m, self.flexor_contraction_at_zero_m,
+                               self.co_contraction_gauge_pa)
+
     def step(self, angle_rad: float, ref_rad: float, ref_rate_rad_per_s: float,
              ref_lead_rad: float, ref_lead_rate_rad_per_s: float, learn: bool = True,
              elapsed_s: float = math.nan, pressures_pa: Sequence[float] = (math.nan, math.nan),

@@ -22,6 +22,8 @@ from pam_actuation.report.page import paragraph, plot, Section, table
 if TYPE_CHECKING:
     from pam_actuation.tuning.tune import TuneResult
 
+_UNITS = {'mm': 'mm', 'deg': '°'}      # as names end with them, and as they are shown
+
 
 def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
                    title: str = 'Offline tuning') -> Section:
@@ -51,17 +53,20 @@ def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
     if changed:
         body += table(['setting', 'before', 'after'], [
             [name, _shown(c['before']), _shown(c['after'])] for name, c in changed.items()])
+    unit = 'deg' if any(name.endswith('_deg') for name in data) else 'mm'
     history = data.get('history') or getattr(result, 'history', None) or []
     if len(history) > 1:
         done, cost = zip(*history)
         line = figures.line(done, cost, 'best cost', 'after', held=True)
-        body += plot(figures.stack([('best cost [mm]', [line])], 'simulated runs', row_px=220))
+        body += plot(figures.stack(
+            [(f'best cost [{_UNITS[unit]}]', [line])], 'simulated runs', row_px=220))
     return Section(key, title, body)
 
 
 def _words(name: str) -> str:
     words = str(name).replace('_', ' ')
-    return f'{words[:-3]} [mm]' if words.endswith(' mm') else words
+    what, _, unit = words.rpartition(' ')
+    return f'{what} [{_UNITS[unit]}]' if unit in _UNITS else words
 
 
 def _shown(value: bool | float | str) -> int | str:

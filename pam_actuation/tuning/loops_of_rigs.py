@@ -1,0 +1,85 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Closed loops of pairs of rig and experiment, of muscles or of joints, within their reach."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pam_actuation.control.modes.tracked import tracked_by
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.joint_loop import JointLoop
+from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
+from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_actuation.tuning.problem import Law, Loop
+    from pam_sim.rig import Rig
+
+_MARGIN_PA = 30e3         # of pressure above the static one: dry friction and acceleration
+
+
+def reachable(rig: 'Rig | JointRig', experiment: 'Experiment', controller: 'Law') -> bool:
+    """
+    Return whether a rig can hold what an experiment asks for with some pressure to spare.
+
+    A muscle is to hold the largest contraction, a joint both outermost angles.
+    """
+    lowest, highest = experiment.chain.extremes()
+    limit_pa = P_ATM_PA + controller.settings['max_pressure_gauge_pa']
+    if rig.valve == 'hsv':
+        limit_pa = min(limit_pa, *(one.parameters['supply_pa'] for one in rig.muscles.values()))
+    if isinstance(rig, JointRig):
+        pulling_pa = limit_pa - _MARGIN_PA
+        return (rig.static_torque_n_m(highest, pulling_pa, P_ATM_PA) >= 0.0
+                and rig.static_torque_n_m(lowest, P_ATM_PA, pulling_pa) <= 0.0)
+    return float(rig.static_pressure_pa(highest)) + _MARGIN_PA <= limit_pa
+
+
+def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment]', seed: int,
+             controller: 'Law', nominal: 'Rig | JointRig') -> 'tuple[list[Loop], int]':
+    """
+    Return the closed loops of all pairs that can be reached, and how many cannot.
+
+    The valve drivers know the data sheet of the ``nominal`` rig.
+
+    Raises
+    ------
+    InputError
+        An experiment is not in what the controller tracks; no pair can be reached.
+
+    """
+    tracked = tracked_by(controller)
+    for experiment in experiments:
+        if experiment.domain != tracked.topic:
+            raise InputError(f'experiment {experiment.name} is in {experiment.domain}; only '
+                             f'{tracked.topic} can be tracked')
+    pairs = [(rig, experiment) for rig in rigs for experiment in experiments]
+    for rig, experiment in pairs:
+        if isinstance(rig, JointRig):
+            experiment.check_reachable(rig)
+    kept = [(rig, experiment) for rig, experiment in pairs
+            if reachable(rig, experiment, controller)]
+    if not kept:
+        raise InputError('no rig can reach any of the experiments', experiments[0].name)
+    drivers = [driver_config(muscle) for muscle in nominal.muscles.values()]
+    loops: 'list[Loop]' = [
+        JointLoop(rig, experiment, seed, controller.rate_hz, drivers=drivers)
+        if isinstance(rig, JointRig) else
+        ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=drivers[0])
+        for rig, experiment in kept]
+    return loops, len(pairs) - len(kept)
