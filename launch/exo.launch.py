@@ -20,6 +20,7 @@ Both knees of an exoskeleton, each in a namespace of its own, waiting for their 
 A larger stack sends ``/left_knee/joint_trajectory`` and ``/right_knee/joint_trajectory``.
 """
 
+from datetime import datetime
 from pathlib import Path
 
 from launch import LaunchDescription
@@ -38,6 +39,7 @@ HANDED_ON = {
     'accept_other_rig': ('false', 'Whether to take a controller file made for another rig.'),
     'learning': ('true', 'Whether the rules of the controllers may change.'),
     'experiment': ('none', 'Experiment both knees play; none: they wait for references.'),
+    'record': ('false', 'Whether to record a bag of each knee: true or false.'),
     'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 96; 0: none.'),
 }
 
@@ -46,12 +48,16 @@ def generate_launch_description():
     """Return the arguments and two knees."""
     arguments = [DeclareLaunchArgument(name, default_value=default, description=text)
                  for name, (default, text) in HANDED_ON.items()]
+    arguments.append(DeclareLaunchArgument(
+        'output', default_value='bags/' + datetime.now().strftime('%Y%m%d_%H%M%S'),
+        description='Folder of the bags, one for each knee.'))
     file = str(Path(__file__).with_name('knee.launch.py'))
     # A source of its own for each: a source describes its nodes once, and they start once.
     knees = [
         GroupAction([IncludeLaunchDescription(
             PythonLaunchDescriptionSource(file), launch_arguments={
                 **{name: LaunchConfiguration(name) for name in HANDED_ON},
+                'output': [LaunchConfiguration('output'), f'/{namespace}'],
                 'namespace': namespace, 'seed': str(2 * k)}.items())])
         for k, namespace in enumerate(KNEES)]
     return LaunchDescription([*arguments, *knees])

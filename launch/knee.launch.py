@@ -16,10 +16,13 @@
 A joint: simulated limb with two muscles, driver and watchdog for each, a controller, a reference.
 
     ros2 launch pam_actuation knee.launch.py valve:=ppr experiment:=joint_sine
+    ros2 launch pam_actuation knee.launch.py record:=true output:=runs/knee
 
 Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
 Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory.
 """
+
+from datetime import datetime
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -35,11 +38,16 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.namespaces import launch_namespace
+from pam_sim.joint import load_joint
 
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
-NAME = 'joint_name'         # noted from the namespace
+RECORDER = 'experiment_recorder'
+# Noted from the arguments: the joint's name, and what the recorder is, '' for none, and tells.
+NAME, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT = (
+    'joint_name', 'recorder_name', 'recorded_controller', 'recorded_experiment')
 
 
 def _arguments():
@@ -69,6 +77,12 @@ def _arguments():
         DeclareLaunchArgument(
             'seed', default_value='0', description='Seed of the simulated sensors.'),
         DeclareLaunchArgument(
+            'record', default_value='false', choices=['true', 'false'],
+            description='Whether to record a bag of the joint with both muscles.'),
+        DeclareLaunchArgument(
+            'output', default_value='bags/' + datetime.now().strftime('%Y%m%d_%H%M%S'),
+            description='Folder of the bag.'),
+        DeclareLaunchArgument(
             'realtime_priority', default_value='0',
             description='Real-time priority of the nodes, 1 to 96; 0: none.'),
         DeclareLaunchArgument(
@@ -94,7 +108,8 @@ def _node(executable, *parameters, side='', condition=None):
 
 def generate_launch_description():
     """Return nodes, arguments and the ways to end."""
-    valve = {'valve_type': _text(LaunchConfiguration('valve'))}
+    kind = {'valve_type': _text(LaunchConfiguration('valve'))}
+    valve = {**kind, 'await_subscriber': _text(LaunchConfiguration(RECORDER_NAME))}
     joint = {'joint': _text(LaunchConfiguration('joint'))}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
     control = {
@@ -111,28 +126,48 @@ def generate_launch_description():
         'joint_controller', valve, joint, control, condition=IfCondition(
             NotEqualsSubstitution(LaunchConfiguration('controller'), 'none')))
     reference = _node(
-        'reference_generator',
+        'reference_generator', valve,
         {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
          'start_delay_s': 3.0, 'exit_when_finished': True},
         condition=IfCondition(AndSubstitution(*(
             NotEqualsSubstitution(LaunchConfiguration('experiment'), no) for no in ('', 'none')))))
+    recorder = _node(
+        RECORDER, kind, seed,
+        {'rig': _text(LaunchConfiguration('joint')),
+         'output': _text(LaunchConfiguration('output')),
+         'experiment': _text(LaunchConfiguration(RECORDED_EXPERIMENT)),
+         'controller': _text(LaunchConfiguration(RECORDED_CONTROLLER))},
+        condition=IfCondition(LaunchConfiguration('record')))
     ends = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
         for node, reason in (
             (reference, 'the experiment is over'), (plant, 'the joint ended'),
-            (controller, 'the controller ended'),
+            (controller, 'the controller ended'), (recorder, 'the recorder ended'),
             *((driver, 'a valve driver ended') for driver in drivers),
             *((watchdog, 'a watchdog ended') for watchdog in watchdogs))]
     return LaunchDescription(
-        [*_arguments(), OpaqueFunction(function=_note_names), plant, *drivers, *watchdogs,
-         controller, reference, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_names), recorder, plant, *drivers,
+         *watchdogs, controller, reference, *ends])
 
 
 def _note_names(context):
-    """Return the actions that note the namespace in one form, and the joint's name from it."""
-    namespace = launch_namespace(LaunchConfiguration('namespace').perform(context))
-    return [SetLaunchConfiguration('namespace', namespace),
-            SetLaunchConfiguration(NAME, namespace.rsplit('/', 1)[-1] or 'knee')]
+    """Return the actions that note the namespace in one form, and what follows from it."""
+    def given(name):
+        return LaunchConfiguration(name).perform(context)
+
+    namespace = launch_namespace(given('namespace'))
+    noted = {'namespace': namespace, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
+             RECORDER_NAME: '', RECORDED_CONTROLLER: '', RECORDED_EXPERIMENT: ''}
+    if given('record') == 'true':
+        above = '' if namespace.startswith('/') else context.launch_configurations.get(
+            'ros_namespace', '').rstrip('/') + '/'
+        noted[RECORDER_NAME] = f'{above}{namespace}/{RECORDER}'
+        if given('controller') != 'none':
+            noted[RECORDED_CONTROLLER] = given('controller_file') or joint_preset_for(
+                load_joint(given('joint')), given('valve'))
+        if given('experiment') != 'none':
+            noted[RECORDED_EXPERIMENT] = given('experiment')
+    return [SetLaunchConfiguration(name, value) for name, value in noted.items()]
 
 
 def _shut_down(reason):

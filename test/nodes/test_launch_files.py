@@ -67,6 +67,22 @@ def test_a_namespace_means_the_same_in_every_form(namespace):
     assert {parameters['muscle'] for parameters in nodes.values()} == {'leg'}
 
 
+@pytest.mark.parametrize('namespace', ['leg', '/leg'])
+def test_a_joint_is_recorded_as_a_whole_if_asked_for(namespace):
+    nodes = described('knee.launch.py', namespace=namespace, record='true', output='runs/knee',
+                      valve='hsv')
+    recorder = nodes.pop('/leg/experiment_recorder')
+    assert recorder['rig'] == 'joint_dmsp_5_300_realistic' and recorder['output'] == 'runs/knee'
+    assert recorder['controller'] == 'sofc_joint_hsv' and recorder['experiment'] == 'joint_sine'
+    assert 'await_subscriber' not in recorder and recorder['valve_type'] == 'hsv'
+    assert {parameters['await_subscriber'].lstrip('/') for parameters in nodes.values()} == {
+        'leg/experiment_recorder'}
+    alone = described('knee.launch.py', record='true', controller='none', experiment='none')
+    assert alone['/knee/experiment_recorder']['controller'] == ''
+    assert alone['/knee/experiment_recorder']['experiment'] == ''
+    assert described('knee.launch.py')['/knee/flexor/valve_driver']['await_subscriber'] == ''
+
+
 @pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
 def test_a_namespace_that_ros_refuses_is_one_sentence(file):
     with pytest.raises(InputError, match="'le-g' is not allowed"):
