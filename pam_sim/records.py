@@ -21,9 +21,10 @@ once, ``part(par, 0, PARAMETERS)``, and read ``par.supply_pa`` from there on. Py
 same with ``fields``. An inserted field moves its neighbours in memory and nowhere else.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import functools
 import itertools
+import operator
 import types
 from typing import Any
 
@@ -158,15 +159,14 @@ def put(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
         A field is missing, or there is none of a name.
 
     """
-    # Rigs are packed often: at once what begins the record as numbers alone.
-    leading, others, count = _order(dtype)
+    # Rigs are packed often: the numbers that begin the record are written at once.
+    numbers, count, others, total = _plan(dtype)
     try:
-        numbers = [values[name] for name in leading]
-        if len(values) != count:
+        if len(values) != total:
             raise KeyError
-        array[place:place + len(numbers)] = numbers
-        if others:
-            put_some(array, dtype, {name: values[name] for name in others}, place)
+        array[place:place + count] = numbers(values)
+        for name, begin, end in others:
+            array[place + begin:place + end] = _flat(values[name])
     except KeyError:
         unlike = sorted({*values}.symmetric_difference(dtype.names or ()))
         raise ValueError(f'fields {unlike} are missing or unknown') from None
@@ -181,8 +181,12 @@ def put_some(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
         if end == begin + 1:
             array[place + begin] = value
         else:
-            flat = value.ravel() if isinstance(value, np.ndarray) else value
-            array[place + begin:place + end] = flat
+            array[place + begin:place + end] = _flat(value)
+
+
+def _flat(value: Any) -> Any:
+    """Return an array of a field as a row; a number is left as it is."""
+    return value.ravel() if isinstance(value, np.ndarray) else value
 
 
 @functools.cache
@@ -196,11 +200,18 @@ def _spans(dtype: np.dtype[Any]) -> dict[str, tuple[int, int]]:
 
 
 @functools.cache
-def _order(dtype: np.dtype[Any]) -> tuple[list[str], list[str], int]:
-    """Return the first fields, as far as they are numbers, the others, and how many all are."""
-    names = list(dtype.names or ())
+def _plan(dtype: np.dtype[Any]) -> tuple[
+        Callable[[Mapping[str, Any]], Any], int, list[tuple[str, int, int]], int]:
+    """Return a reader of the first fields that are numbers, their count, the others, how many."""
+    names = dtype.names or ()
     leading = list(itertools.takewhile(lambda name: dtype[name] == np.float64, names))
-    return leading, names[len(leading):], len(names)
+    others = [(name, *span) for name, span in _spans(dtype).items() if name not in leading]
+    reader = operator.itemgetter(*leading) if leading else _nothing
+    return reader, len(leading), others, len(names)
+
+
+def _nothing(values: Mapping[str, Any]) -> tuple[()]:
+    return ()
 
 
 def _field(dtype: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:

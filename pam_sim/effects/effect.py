@@ -16,7 +16,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
 
-@dataclass(frozen=True)
-class Numbers:
+class Numbers(NamedTuple):
     """
     The rig's numbers an effect may need to pack its parameters.
 

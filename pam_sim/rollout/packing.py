@@ -14,7 +14,6 @@
 
 """Turn a rig into the arrays of the kernel."""
 
-from dataclasses import replace
 import math
 from typing import TYPE_CHECKING
 
@@ -38,6 +37,8 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 _LAW_CODES = law_codes()
+_RT_J_PER_KG = GAS_CONSTANT_AIR * TEMPERATURE_K
+_DENSITY_FACTOR = math.sqrt(T_REFERENCE_K / TEMPERATURE_K)
 
 
 def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
@@ -54,7 +55,7 @@ def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
     if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
         rest_m = kernel.rest_contraction(numbers.pressure_pa, state, par)
         if rest_m != numbers.contraction_m:         # effects start from where the load rests
-            numbers = replace(numbers, contraction_m=rest_m)
+            numbers = numbers._replace(contraction_m=rest_m)
             put_some(state, layout.STATE, {'contraction_m': rest_m})
             _pack_effects(rig, numbers, state, par)
     kernel.settle(state, par)
@@ -100,7 +101,7 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
     return Numbers(
         float(dt_s), _substep(rig, dt_s), rig.valve,
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
-        {**value, 'p_atm': P_ATM_PA}, tuple(float(s) for s in signal),
+        {**value, 'p_atm': P_ATM_PA}, tuple(map(float, signal)),
         float(pressure), float(contraction), value.get('mass_kg', 0.0) * GRAVITY_M_PER_S2,
         rig.muscle)
 
@@ -118,7 +119,7 @@ def _substep(rig: 'Rig', dt_s: float) -> float:
     smallest = rig.volume_m3(0.0)
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
     slope = interpreted(flow_function)(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
-    rate = GAS_CONSTANT_AIR * TEMPERATURE_K / smallest * value['C'] * RHO_REFERENCE * slope
+    rate = _RT_J_PER_KG / smallest * value['C'] * RHO_REFERENCE * slope
     count = max(1, math.ceil(dt_s * max(rate / 0.5, fastest)))
     if rig.fidelity == 'switching':
         count = max(count, math.ceil(dt_s / hsv.SWITCHING_STEP_S - 1e-9))
@@ -152,9 +153,8 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'thread_squared_m2': thread_squared,
         'inverse_4_pi_n2': inverse_4_pi_n2,
         'dead_volume_m3': value['V_dead'],
-        'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K,
-        'conductance_kg_per_s_pa':
-            value['C'] * RHO_REFERENCE * math.sqrt(T_REFERENCE_K / TEMPERATURE_K),
+        'rt_j_per_kg': _RT_J_PER_KG,
+        'conductance_kg_per_s_pa': value['C'] * RHO_REFERENCE * _DENSITY_FACTOR,
         'critical_ratio': value['b'],
         'supply_pa': value['supply_pa'],
         'gain_ppr_pa_per_v': value['K_m'],
@@ -163,7 +163,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'pwm_period_s': value['pwm_period_s'],
         'inverse_length_per_m': 1.0 / length_m,
         'inverse_mass_per_kg': 1.0 / mass,
-        'inverse_rt_kg_per_j': 1.0 / (GAS_CONSTANT_AIR * TEMPERATURE_K),
+        'inverse_rt_kg_per_j': 1.0 / _RT_J_PER_KG,
         'law': law,
         'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
         'beyond_nominal': law != 0.0,
