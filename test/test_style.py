@@ -17,6 +17,7 @@
 import configparser
 from importlib.metadata import distribution, PackageNotFoundError
 from pathlib import Path
+import re
 import statistics
 import subprocess
 import sys
@@ -36,6 +37,46 @@ PEP257_IGNORED = 'D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404'
 PLUG_INS = (
     'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline', 'flake8-comprehensions',
     'flake8-deprecated', 'flake8-docstrings', 'flake8-import-order', 'flake8-quotes')
+BAD_DOCSTRINGS = '''"""summary without a capital"""
+
+
+def one(a):
+    """Returns the thing
+    second line"""
+    return a
+
+
+class Two:
+    """
+    A class
+    """
+    def three(self):
+        """ Spaces. """
+
+    def four(self):
+        """The four(self) signature."""
+
+    def five(self):
+
+        """Blank lines."""
+
+        return 1
+
+    def six(self):
+        """Six!
+
+        Parameters
+        ---------
+        x : int
+        Returns
+        -------
+        y
+        """
+
+
+def seven():
+    """"""
+'''
 
 
 def checked(module, *arguments):
@@ -45,11 +86,31 @@ def checked(module, *arguments):
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
 
 
-@pytest.mark.parametrize('linter', ['flake8', 'pydocstyle'])
-def test_linter_finds_nothing(linter):
-    """The sources, the launch files, the examples, the benchmarks and the tests, all of them."""
-    pytest.importorskip(linter)
-    checked(linter, '--config', 'setup.cfg', *map(str, SOURCES))
+@pytest.mark.slow
+def test_linters_find_nothing():
+    """
+    The sources, the launch files, the examples, the benchmarks and the tests, all of them.
+
+    The plug-in for docstrings is pydocstyle, with the convention ``all`` every rule of it.
+    """
+    pytest.importorskip('flake8')
+    checked('flake8', '--config', 'setup.cfg', '--docstring-convention', 'all',
+            *map(str, SOURCES))
+
+
+def test_flake8_says_of_a_docstring_what_pydocstyle_says(tmp_path):
+    """One run of a linter over all files is enough."""
+    pytest.importorskip('flake8')
+    pytest.importorskip('pydocstyle')
+    file = tmp_path / 'bad.py'
+    file.write_text(BAD_DOCSTRINGS, encoding='utf-8')
+    found = []
+    for module, *options in (('pydocstyle',), ('flake8', '--docstring-convention', 'all')):
+        done = subprocess.run(
+            [sys.executable, '-m', module, '--config', str(ROOT / 'setup.cfg'), *options,
+             str(file)], cwd=ROOT, capture_output=True, text=True)
+        found.append(sorted(re.findall(r'\bD\d{3}\b', done.stdout)))
+    assert found[0] == found[1] and len(set(found[0])) > 10
 
 
 def test_setup_cfg_holds_the_rules_of_the_ament_linters():

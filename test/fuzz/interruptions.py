@@ -28,7 +28,7 @@ often each outcome came and exits with 1 otherwise.
 import argparse
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -63,7 +63,8 @@ SCRIPT = 'print(flush=True); import sys; from {} import {} as main; sys.exit(mai
 WORKS_S = {'simulate': 4.0, 'replay': 3.0, 'tune': 4.0, 'gap': 1.2, 'report': 2.0, 'info': 1.0,
            'models': 1.2, 'valves': 4.0, 'rules': 1.0, 'nodes': 1.0, 'up': 6.0}
 NODE_WORKS_S = 4.0
-ENDED_AFTER_S = 20.0        # a node that compiles, a session that ends all its nodes in order
+# A node that compiles, a session that ends all its nodes in order, at a low priority.
+ENDED_AFTER_S = 40.0
 MARK = 'PAM_INTERRUPTED_BY_TEST'
 
 
@@ -112,8 +113,9 @@ def interrupt(one, folder, environment):
     try:
         process.stdout.readline()
         for wait_s in one.waits_s:
-            time.sleep(wait_s)
-            if process.poll() is not None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(wait_s)
+            if process.returncode is not None:
                 break
             (os.killpg if one.to_group else os.kill)(process.pid, signal.SIGINT)
             sent += 1
