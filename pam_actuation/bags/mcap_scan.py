@@ -45,6 +45,8 @@ _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 1, 2, 3, 4, 5, 6
 _METADATA, _DATA_END = 12, 15
 _READ_BYTES = 1024 * 1024
 _POSITIONS = 2**16
+# To load compiled code takes half a second, as long as 60000 messages take without it.
+_FEW_MESSAGES = 5000
 _RECORD = struct.Struct('<BQ')
 _CHUNK_HEAD = struct.Struct('<QQQI')
 _U16 = struct.Struct('<H')
@@ -133,11 +135,15 @@ def _read(stream: BinaryIO, position: int, size: int) -> bytes:
 
 class _Scanner:
 
+    # Messages walked over by interpreted code, in all files of this process.
+    interpreted = 0
+
     def __init__(self, content: McapContent, stream: BinaryIO, wanted: Wanted | None) -> None:
         # Imported late: a recorder reads bags only after a crash, the compiler is large.
         from pam_actuation.bags.message_batch import MessageBatch
         from pam_actuation.bags.record_walk import walk_messages
-        self._walk_messages = walk_messages
+        from pam_sim.compiled import interpreted
+        self._compiled, self._interpreted = walk_messages, interpreted(walk_messages)
         self._positions = np.empty(_POSITIONS, dtype=np.int64)
         self._unpack_zstd = zstandard.ZstdDecompressor().decompress
         self.content = content
@@ -246,13 +252,17 @@ class _Scanner:
     def _messages(self, view: ByteArray, position: int) -> int:
         """Take the messages that follow each other; return where anything else begins."""
         while True:
-            count, end = self._walk_messages(view, position, self._positions)
+            if _Scanner.interpreted < _FEW_MESSAGES:
+                count, end = self._interpreted(view, position, self._positions[:_FEW_MESSAGES])
+                _Scanner.interpreted += count
+            else:
+                count, end = self._compiled(view, position, self._positions)
             if not count:
                 return position
             records = view[position:end]
             if self.batch.add(records, self._positions[:count] - position) < count:
                 raise Damaged('a message of an unknown channel', self.where)
-            position = end
+            position = int(end)
 
     def _loose_messages(self, position: int, length: int) -> int:
         """Take messages outside of chunks, a block of the file at a time."""
