@@ -83,6 +83,7 @@ def refused(tree, numbers, own):
     Parameters
     ----------
     tree : ast.Module
+        The module.
     numbers : dict of str -> set of str
         Names of whole numbers of each module.
     own : set of str
