@@ -60,8 +60,8 @@ NODES = ('valve_driver', 'valve_watchdog', 'plant_simulator', 'sofc_controller',
 SCRIPT = 'print(flush=True); import sys; from {} import {} as main; sys.exit(main())'
 # How long they work on a quiet machine [s]; a node does the same for ever after its first seconds.
 # A signal that comes later tells nothing.
-WORKS_S = {'simulate': 4.0, 'replay': 3.0, 'tune': 4.0, 'gap': 1.2, 'report': 2.0, 'info': 1.0,
-           'models': 1.2, 'valves': 4.0, 'rules': 1.0, 'nodes': 1.0, 'up': 6.0}
+WORKS_S = {'simulate': 2.2, 'replay': 1.3, 'tune': 1.8, 'gap': 1.1, 'report': 0.9, 'info': 0.6,
+           'models': 0.8, 'valves': 4.0, 'rules': 0.9, 'nodes': 1.0, 'up': 6.0}
 NODE_WORKS_S = 4.0
 # A node that compiles, a session that ends all its nodes in order, at a low priority.
 ENDED_AFTER_S = 40.0
