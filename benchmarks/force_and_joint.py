@@ -36,7 +36,7 @@ import sys
 
 import numpy as np
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.joint_loop import JointControllerLoop
+from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.messages import NamedEfforts
@@ -77,7 +77,7 @@ def angle(joint, name, valve, seed):
 def torque(joint, name, valve, seed, amplitude_n_m, parameters):
     """Return the RMSE [N m] of every cycle; efforts are sent at 100 Hz."""
     joint = load_joint(joint, valve=valve).with_(parameters=parameters)
-    loops = JointLoops(joint, JointControllerLoop(
+    loops = JointLoops(joint, ControllerLoop(
         load_controller(f'sofc_{name}_{valve}', joint), joint), seed)
     ticks = round(loops.control.rate_hz / FREQUENCY_HZ)
     settling = round(loops.control.rate_hz * SETTLING_S)
@@ -85,7 +85,7 @@ def torque(joint, name, valve, seed, amplitude_n_m, parameters):
     for k in range(len(errors)):
         wanted_n_m = amplitude_n_m * math.sin(2.0 * math.pi * k / ticks)
         if k % 2 == 0:
-            loops.control.on_named_efforts(NamedEfforts(loops.now_ns, (), (wanted_n_m,)))
+            loops.control.take('joint_effort', NamedEfforts(loops.now_ns, (), (wanted_n_m,)))
         loops.tick()
         errors[k] = wanted_n_m - loops.plant.plant.torque_n_m
     return np.sqrt(np.mean(errors[settling:].reshape(TORQUE_CYCLES, ticks) ** 2, axis=1))

@@ -13,26 +13,31 @@
 # limitations under the License.
 
 """
-The simulated rig on a clock: valve signal in, measurements out, no ROS.
+The simulated rig on a clock: valve signals in, measurements out, no ROS.
 
-The plant replaces the hardware behind the topics. It holds the last valve signal without limit,
-steps its physics up to a given time and reads its sensors on request. The simulator node and the
-offline simulation both use it.
+The plant replaces the hardware behind the topics, of one muscle or of a joint with two. It holds
+the last valve signal of each muscle without limit, steps its physics up to a given time and reads
+its sensors on request. The simulator nodes and the offline simulation use it.
 """
 
 from collections.abc import Callable, Hashable, Iterable
+from functools import partial
 import math
+from operator import attrgetter
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from pam_actuation.messages import (
-    Contraction, Force, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
-from pam_sim.rig import Rig
+    Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
 from pam_sim.sensors import SensorChain
+from pam_sim.sensors.encoder import Encoder
 
 if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
     from pam_sim.plant import Plant
+    from pam_sim.rig import Rig
 
 _NS = 1_000_000_000
+_EFFORTS = attrgetter('efforts')
 SAFE_COUNTS_NS = 100_000_000     # a safe signal against the openings of others
 
 
@@ -86,25 +91,46 @@ class HeldSignal:
         return bool(self._safe_until_ns.keys() - {writer})
 
 
-def muscle_readings(plant: 'Plant', sensors: SensorChain, stamp_ns: int,
-                    time_s: float) -> dict[str, Any]:
+class PlantMuscle:
     """
-    Read the sensors of one muscle; return the messages by short topic name.
+    One muscle of a plant on a clock: the signal held on its valve, and its sensors.
 
-    Stamped ``stamp_ns`` with the jitter of the sensor settings. Contraction carries no
-    velocity: the rig does not measure one. ``supply_pressure`` is there for the HSV only.
+    Parameters
+    ----------
+    place : str
+        Of the muscle below the namespace of its rig, as in ``Rig.muscles``.
+    plant : pam_sim.plant.Plant
+    seed : int
+        Of the sensor noise.
+
     """
-    pressure_pa, contraction_m, force_n, jitter_ns = sensors.read(
-        time_s, plant.pressure_pa, plant.contraction_m, plant.force_n)
-    stamp_ns += int(jitter_ns)
-    messages = {
-        'pressure': Pressure(stamp_ns, float(pressure_pa)),
-        'contraction': Contraction(stamp_ns, float(contraction_m)),
-        'force': Force(stamp_ns, float(force_n)),
-    }
-    if plant.rig.valve == 'hsv':
-        messages['supply_pressure'] = Pressure(stamp_ns, float(plant.supply_pa))
-    return messages
+
+    def __init__(self, place: str, plant: 'Plant', seed: int) -> None:
+        self.plant = plant
+        self.signal = HeldSignal(plant.rig.valve)
+        self.sensors = SensorChain(plant.rig.sensors, seed)
+        self._pressure, self._contraction, self._force, self._supply = topics = tuple(
+            f'{place}{topic}' for topic in (
+                'pressure', 'contraction', 'force', 'supply_pressure'))
+        self._knows_supply = plant.rig.valve == 'hsv'
+        self.topics = topics if self._knows_supply else topics[:-1]
+
+    def read(self, messages: dict[str, Any], stamp_ns: int, time_s: float) -> None:
+        """
+        Read the sensors; enter the messages by topic.
+
+        Stamped ``stamp_ns`` with the jitter of the sensor settings. Contraction carries no
+        velocity: the rig does not measure one. ``supply_pressure`` is there for the HSV only.
+        """
+        plant = self.plant
+        pressure_pa, contraction_m, force_n, jitter_ns = self.sensors.read(
+            time_s, plant.pressure_pa, plant.contraction_m, plant.force_n)
+        stamp_ns += jitter_ns
+        messages[self._pressure] = Pressure(stamp_ns, pressure_pa)
+        messages[self._contraction] = Contraction(stamp_ns, contraction_m)
+        messages[self._force] = Force(stamp_ns, force_n)
+        if self._knows_supply:
+            messages[self._supply] = Pressure(stamp_ns, plant.supply_pa)
 
 
 class PlantClock:
@@ -214,67 +240,80 @@ class Backlog(Generic[Arrived]):
 
 class PlantLoop(PlantClock):
     """
-    A live plant of one muscle on a clock.
+    A live plant on a clock: one muscle with its load, or the muscles of a joint with its limb.
 
     Parameters
     ----------
-    rig : pam_sim.rig.Rig
+    rig : pam_sim.rig.Rig or pam_sim.joint.JointRig
     seed : int
-        Of the sensor noise.
+        Of the sensor noise; the second muscle has the next one.
     longest_catch_up_s : float
         As of ``PlantClock``.
     **initial
-        Where it starts, as for :meth:`pam_sim.rig.Rig.pack`.
+        Where it starts, as for ``plant`` of the rig.
+
+    Attributes
+    ----------
+    muscles : dict of str to PlantMuscle
+        By their place as in ``Rig.muscles``.
 
     """
 
-    def __init__(self, rig: Rig, seed: int = 0, longest_catch_up_s: float = 0.25,
-                 **initial: float) -> None:
+    def __init__(self, rig: 'Rig | JointRig', seed: int = 0,
+                 longest_catch_up_s: float = 0.25, **initial: float) -> None:
         self.rig = rig
-        self.plant = rig.plant(seed, **initial)
+        self.plant: Any = rig.plant(seed, **initial)
         super().__init__(self.plant.dt_s, longest_catch_up_s)
-        self.sensors = SensorChain(rig.sensors, seed)
-        self._held = HeldSignal(rig.valve)
-        self._external_n = 0.0
+        self.muscles = {place: PlantMuscle(place, plant, seed + k)
+                        for k, (place, plant) in enumerate(self.plant.muscles.items())}
+        self._signals = [muscle.signal for muscle in self.muscles.values()]
+        self._encoder: Encoder | None = None
+        if '' not in rig.muscles:       # of a joint
+            self._encoder = Encoder((seed, len(rig.muscles)))
+        self._external = 0.0        # force on a load [N], torque on a limb [N m]
 
     @property
-    def signal(self) -> tuple[float, ...]:
-        """Return the efforts that act on the valve."""
-        return self._held.efforts
-
-    @property
-    def signals(self) -> int:
-        """Return the number of valve messages taken."""
-        return self._held.taken
-
-    @property
-    def signals_ignored(self) -> int:
-        """Return the number of efforts that were not usable."""
-        return self._held.ignored
+    def topics(self) -> tuple[str, ...]:
+        """Return the topics of the measurements, relative to the namespace of the rig."""
+        of_joint = () if self._encoder is None else ('joint_state',)
+        return (*of_joint, *(topic for muscle in self.muscles.values() for topic in muscle.topics))
 
     def takes(self) -> dict[str, Callable[[Any], None]]:
-        """Return what takes each topic, by short name."""
-        return {'external_force': self.set_external_force, 'valve_signal': self.set_signal}
+        """Return what takes each topic, by name relative to the namespace of the rig."""
+        takes: dict[str, Callable[[Any], None]] = {
+            f'{place}valve_signal': partial(self.set_signal, place=place)
+            for place in self.muscles}
+        return takes if self._encoder else {**takes, 'external_force': self.set_external_force}
 
-    def set_signal(self, message: ValveSignal, writer: Hashable = None) -> None:
+    def set_signal(self, message: ValveSignal, writer: Hashable = None, place: str = '') -> None:
         """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
-        self._held.take(message, writer, self.now_ns or 0)
+        self.muscles[place].signal.take(message, writer, self.now_ns or 0)
 
     def set_external_force(self, message: Force) -> None:
         """Take the disturbance force on the load [N]; not finite is ignored."""
         if math.isfinite(message.force_n):
-            self._external_n = float(message.force_n)
+            self._external = float(message.force_n)
 
     def step(self, count: int) -> None:
-        """Advance the plant by some steps with the signal held."""
-        self.plant.step(self._held.efforts, self._external_n, steps=count)
+        """Advance the plant by some steps with the signals held."""
+        self.plant.step(*map(_EFFORTS, self._signals), self._external, steps=count)
 
     def sample(self, now_ns: int) -> dict[str, Any]:
         """
-        Read the sensors; return the messages by short topic name.
+        Read the sensors; return the messages by topic, relative to the namespace of the rig.
 
         Stamps are the time of the plant's state (at most one step before ``now_ns``)
-        with the jitter of the rig's sensor settings; else as ``muscle_readings``.
+        with the jitter of the rig's sensor settings; see ``PlantMuscle.read``. Of a joint
+        ``joint_state`` carries the angle of an encoder and the torque of both tendons, which
+        no sensor measures: it is for people.
         """
-        stamp_ns = now_ns if self.now_ns is None else self.now_ns
-        return muscle_readings(self.plant, self.sensors, stamp_ns, self.plant.time_s)
+        now_of_plant_ns = self.now_ns
+        stamp_ns = now_ns if now_of_plant_ns is None else now_of_plant_ns
+        plant, messages = self.plant, {}
+        if self._encoder is not None:
+            messages['joint_state'] = JointAngle(
+                stamp_ns, self._encoder.read(plant.angle_rad), plant.torque_n_m)
+        time_s = plant.time_s
+        for muscle in self.muscles.values():
+            muscle.read(messages, stamp_ns, time_s)
+        return messages

@@ -61,6 +61,11 @@ class Plant:
         self._given, self._now = cells(self._inp, INPUT), cells(self._out, OUTPUT)
         self.reset()
 
+    @property
+    def muscles(self) -> dict[str, Plant]:
+        """Return the plant of each muscle, by its place as in ``Rig.muscles``: this one."""
+        return {'': self}
+
     def reset(self) -> None:
         """Go back to the start."""
         self.state, self.par = self.rig.pack(dt_s=self.dt_s, **self._initial)

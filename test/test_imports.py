@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = (
     ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'parallel', 'random_levels',
      'ros_missing', 'slow_rise', 'transport', 'control', 'drivers', 'loops', 'bags', 'hardware',
-     'plant_loop', 'joint_plant_loop'),
+     'plant_loop'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules'),
     ('report', 'models'),
     ('rigging',),

@@ -59,13 +59,13 @@ def test_signal_by_name_and_held():
     """Matched by name in any order; not finite or unknown: ignored, the old one stays."""
     plant = make('hsv')
     plant.set_signal(ValveSignal(0, ('vent_duty', 'fill_duty'), (0.0, 0.7)))
-    assert plant.signal == (0.7, 0.0)
+    assert plant.muscles[''].signal.efforts == (0.7, 0.0)
     plant.set_signal(ValveSignal(0, ('fill_duty', 'vent_duty'), (math.nan, 0.2)))
-    assert plant.signal == (0.7, 0.2)
+    assert plant.muscles[''].signal.efforts == (0.7, 0.2)
     plant.set_signal(ValveSignal(0, ('ppr_voltage',), (3.0,)))
-    assert plant.signal == (0.7, 0.2) and plant.signals_ignored == 2
+    assert plant.muscles[''].signal.efforts == (0.7, 0.2) and plant.muscles[''].signal.ignored == 2
     plant.set_signal(ValveSignal(0, ('fill_duty',), (0.0,)))
-    assert plant.signal == (0.0, 0.2) and plant.signals == 4
+    assert plant.muscles[''].signal.efforts == (0.0, 0.2) and plant.muscles[''].signal.taken == 4
 
 
 @pytest.mark.parametrize('valve, opening, safe', [
@@ -78,7 +78,7 @@ def test_of_several_senders_one_that_vents_is_enough(valve, opening, safe):
     def acts(at_ms, writer, efforts):
         plant.advance_to(START + at_ms * MS)
         plant.set_signal(ValveSignal(0, names, efforts), writer)
-        return plant.signal
+        return plant.muscles[''].signal.efforts
 
     assert acts(0, 'driver', opening) == opening
     assert acts(1, 'driver', safe) == safe

@@ -87,19 +87,26 @@ class CommandFollowing:
         if self._followed is None or self.followed_pa > P_ATM_PA + 1.0 or (
                 self.silent_ns(now_ns) > MAX_AGE_NS):
             return False
-        sent = self._sent_before(self._followed.stamp_ns)
-        return bool(sent) and min(sent) > P_ATM_PA + TOLERANCE_PA
+        lowest_pa, _ = self._sent_before(self._followed.stamp_ns)
+        return P_ATM_PA + TOLERANCE_PA < lowest_pa < math.inf
 
-    def _sent_before(self, stamp_ns: int) -> list[float]:
-        """Return the commands [Pa] of which one was followed at a time, the newest first."""
+    def _sent_before(self, stamp_ns: int) -> tuple[float, float]:
+        """
+        Return the lowest and highest command [Pa] of which one was followed at a time.
+
+        Where none was sent, infinite and minus infinite.
+        """
         oldest_ns = stamp_ns - ON_THE_WAY_NS
-        commands_pa: list[float] = []
+        lowest_pa, highest_pa = math.inf, -math.inf
         for time_ns, command_pa in reversed(self._sent):
             if time_ns < oldest_ns:
                 break
             if time_ns <= stamp_ns:
-                commands_pa.append(command_pa)
-        return commands_pa
+                if command_pa < lowest_pa:
+                    lowest_pa = command_pa
+                if command_pa > highest_pa:
+                    highest_pa = command_pa
+        return lowest_pa, highest_pa
 
     def sent(self, now_ns: int, command_pa: float) -> None:
         """Take note of a command [absolute Pa] sent now."""
@@ -142,13 +149,13 @@ class CommandFollowing:
         age_ns = now_ns - self._followed.stamp_ns
         if not -MAX_AHEAD_NS <= age_ns <= MAX_AGE_NS:
             return UNKNOWN
-        sent = self._sent_before(self._followed.stamp_ns)
-        if not sent:
+        lowest_pa, highest_pa = self._sent_before(self._followed.stamp_ns)
+        if lowest_pa > highest_pa:      # none
             return FOLLOWS
-        followed_pa = self.followed_pa
-        if followed_pa < max(min(sent), P_ATM_PA) - TOLERANCE_PA:
+        followed_pa = self._followed.pressure_pa
+        if followed_pa < max(lowest_pa, P_ATM_PA) - TOLERANCE_PA:
             return LESS
-        return MORE if followed_pa > max(max(sent), P_ATM_PA) + TOLERANCE_PA else FOLLOWS
+        return MORE if followed_pa > max(highest_pa, P_ATM_PA) + TOLERANCE_PA else FOLLOWS
 
     def _untold(self, now_ns: int, pressure_pa: float) -> float:
         if not math.isfinite(pressure_pa):

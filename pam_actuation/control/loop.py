@@ -13,160 +13,173 @@
 # limitations under the License.
 
 """
-The controller on a clock: messages in, pressure command and controller state out.
+The controller on a clock: messages in, one pressure command a muscle and controller state out.
 
-No ROS inside; the node and the offline simulation use the same class.
+No ROS inside; the nodes and the offline simulation use the same class. A rig of one muscle
+tracks contraction or force, a joint of two its angle or a torque.
 
-Faults of the inputs, all self-resuming:
+Faults of the inputs, all self-resuming; to vent is to command atmosphere to every muscle:
 
 =============================================  ==========================================
 input                                          what the loop does
 =============================================  ==========================================
-no contraction yet; older than 0.1 s; more     vents (command = atmosphere), says why;
-than 0.02 s ahead; not finite; outside the     starts bumplessly when it is back
-range a muscle can reach
-contraction the same to the last bit for       vents until it has changed, 2 s at least
-0.2 s while the pressure changed by 150 kPa;
-or, where the pressure stands still as well,
-while that followed by the driver did
+no measurement of what is tracked yet; older   vents, says why; starts bumplessly when it
+than 0.1 s; more than 0.02 s ahead; not        is back
+finite; outside what muscle or joint can do
+contraction or force the same to the last bit  vents until it has changed, 2 s at least
+for 0.2 s while the pressure changed by
+150 kPa; or, where the pressure stands still
+too, while that followed by the driver did
+the same of an angle: while the difference of  vents until it has changed, 2 s at least; not
+both pressures changed by 300 kPa              while a torque is followed: the joint may
+                                               be blocked then
 what is tracked is sent by two publishers      vents until one of them is silent for 1 s
-force, where a force is tracked                the same; contraction is then not needed
 no reference yet                               vents
 reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
 reference silent for more than 0.5 s           holds the last position, learning frozen
 reference silent for more than 2 s             vents
+torque that is followed silent for 0.1 s       vents
 a reference or trajectory that is not finite,  that message is ignored and counted
 out of reach or from the future
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
+of two muscles one stays empty; its driver     vents both until that one follows again
+vents against the commands or falls silent;    (``slack_muscle``): none is left alone
+its pressure is lost                           under air
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
+
+After every vent the commands rise slowly.
 """
 
 from collections.abc import Callable
+from functools import partial
 import math
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, TYPE_CHECKING
 
-from pam_actuation.control import reference_buffer, tick as codes
-from pam_actuation.control.following import CommandFollowing, LESS
-from pam_actuation.control.frozen import FrozenMeasurement, STOP_SWING_PA
-from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, tracked_by
-from pam_actuation.control.reference_buffer import MAX_AHEAD_NS, ReferenceBuffer
-from pam_actuation.control.tick import TickCore, TickInputs
-from pam_actuation.messages import (
-    Contraction, ControllerState, Force, Message, Pressure, Reference, ReferenceTrajectory)
+from pam_actuation.control import tick as codes
+from pam_actuation.control.following import FOLLOWS, UNKNOWN
+from pam_actuation.control.measurement import fresh, Measurement
+from pam_actuation.control.modes.tracked import FORCE, JOINT, tracked_by
+from pam_actuation.control.muscle_channel import MuscleChannel
+from pam_actuation.control.reference_buffer import ReferenceBuffer
+from pam_actuation.control.setpoint import MuscleSetpoint, Setpoint
+from pam_actuation.control.tick import Law, MuscleLaw, TickCore, TickInputs
+from pam_actuation.messages import ControllerState, Message, Pressure
 from pam_sim.errors import InputError
 
-MAX_AGE_NS = 100_000_000
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+
 STALL_NS = 250_000_000
-_FORCE_MARGIN = 1.5       # of the largest force in the table: above, the load cell is wrong
-# Codes of: none yet, too old, too far ahead, not finite, implausible.
-_REASONS = {
-    CONTRACTION: (codes.NO_CONTRACTION, codes.CONTRACTION_OLD, codes.CONTRACTION_AHEAD,
-                  codes.CONTRACTION_NOT_FINITE, codes.CONTRACTION_IMPLAUSIBLE),
-    FORCE: (codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD, codes.FORCE_NOT_FINITE,
-            codes.FORCE_IMPLAUSIBLE)}
-_FROZEN = {CONTRACTION: codes.CONTRACTION_FROZEN, FORCE: codes.FORCE_FROZEN}
-_RESTING = {CONTRACTION: 0.002, FORCE: 5.0}     # m, N: up to there it may lie on a stop
-# A muscle that has become short enough to be slack may stay without force.
-_STOP_SWING_PA = {CONTRACTION: STOP_SWING_PA, FORCE: math.inf}
-
-REFERENCE_REASONS = {
-    reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
-    reference_buffer.HELD: codes.REFERENCE_HELD, reference_buffer.LOST: codes.REFERENCE_LOST}
-
-
-Known = TypeVar('Known', bound=Message)
-
-
-def fresh(message: Known | None, now_ns: int) -> TypeGuard[Known]:
-    """Return whether a message is neither too old nor too far ahead."""
-    return message is not None and -MAX_AHEAD_NS <= now_ns - message.stamp_ns <= MAX_AGE_NS
-
-
-def reason_text(code: int, two_sensors: str) -> str:
-    """Return a code as words; of two sensors the sentence that names them."""
-    words = codes.REASONS[code]
-    return f'{words}: {two_sensors}' if code == codes.TWO_SENSORS else words
-
-
-def measurement_reason(message: Message | None, value: float, allowed: tuple[float, float],
-                       reasons: tuple[int, ...], now_ns: int) -> int:
-    """
-    Return the code for the newest measurement of what is tracked, ``codes.OK`` if usable.
-
-    Parameters
-    ----------
-    message, value
-        The message, None before the first, and its value.
-    allowed : tuple of float
-        Lowest and highest plausible value.
-    reasons : tuple of int
-        Codes of: none yet, too old, too far ahead, not finite, implausible.
-    now_ns : int
-        Time on the clock of the stamps.
-
-    """
-    none, old, ahead, not_finite, implausible = reasons
-    if message is None:
-        return none
-    if now_ns - message.stamp_ns > MAX_AGE_NS:
-        return old
-    if message.stamp_ns - now_ns > MAX_AHEAD_NS:
-        return ahead
-    if not math.isfinite(value):
-        return not_finite
-    return codes.OK if allowed[0] <= value <= allowed[1] else implausible
+_CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle
+_RESTING_M, _RESTING_N = 0.002, 5.0     # up to there a muscle may lie on a stop
+_FORCE_MARGIN = 1.5         # of the largest force in the table: above, the load cell is wrong
+_MARGIN_RAD = 0.05          # of an encoder's zero and noise, where the joint lies on a stop
+_STOP_RAD = 0.01            # this near an end of its range the joint may lie on a stop
 
 
 class ControllerLoop:
     """
-    Collects the newest inputs, checks them and runs the controller once per tick.
+    Collects the newest inputs, checks them and runs the law once per tick.
 
     Parameters
     ----------
-    controller : SelfOrganizingFuzzyController, PidController or ForceController
+    controller : SelfOrganizingFuzzyController, PidController, ForceController, JointController
         As ``load_controller`` gives it.
-    contraction_range_m : tuple of float
-        Measurements outside are implausible: the sensor is wrong, not the muscle. For a
-        controller that tracks force the range follows from the largest force of its table.
+    joint : pam_sim.joint.JointRig, optional
+        The joint that the controller is of; None: it is of one muscle.
+    name : str
+        Of the joint, by which it is found in messages to several joints.
+
+    Attributes
+    ----------
+    reason : str
+        What the last tick says of its inputs, one of ``tick.REASONS`` and perhaps more.
+    measurement : Measurement
+        Of what is tracked.
+    state : ControllerState or None
+        Of the last tick.
+    two_sensors : str
+        The sentence while two nodes send what is tracked, '' while one does.
+    setpoint : Setpoint
+        What is asked for.
+    muscles : tuple of MuscleChannel
+        In the order of their commands.
+    command_topics : tuple of str
+        Topics of these, relative to the namespace of the rig.
 
     Raises
     ------
     InputError
-        The controller tracks the angle of a joint: this loop has a single muscle.
+        The controller is of one muscle and a joint is given, or the other way round.
 
     """
 
-    def __init__(self, controller: Any,
-                 contraction_range_m: tuple[float, float] = (-0.01, 0.1)) -> None:
+    def __init__(self, controller: Any, joint: 'JointRig | None' = None,
+                 name: str = 'muscle') -> None:
         self.controller = controller
-        self.tracked = tracked_by(controller)
-        if self.tracked == JOINT:
-            raise InputError('the controller tracks a joint; this is the loop of one muscle',
-                             controller.rig_name)
-        self._range = contraction_range_m
-        if self.tracked == FORCE:
-            self._range = (
-                -0.5 * controller.upper_force_n, _FORCE_MARGIN * controller.upper_force_n)
-        self._reasons = _REASONS[self.tracked]
-        self.references = ReferenceBuffer(self.tracked, self._range)
-        self.reason = codes.REASONS[self._reasons[0]]
+        self._newest: dict[str, Message] = {}       # by topic
+        law, self.measurement, self.setpoint = (
+            self._of_muscle() if joint is None else self._of_joint(joint, name))
+        self._core = TickCore(law)
+        self.muscles = tuple(
+            MuscleChannel(place, rise) for place, rise in zip(law.places, self._core.rises))
+        self.command_topics = tuple(f'{place}pressure_command' for place in law.places)
+        self.tracked = law.tracked
+        self._takes = self._takers()
+        self._lead_ns = round(controller.lead_s * 1e9)
+        self.reason = codes.REASONS[self.measurement.sensor.none]
         self.valid = False
-        self.two_sensors = ''       # the sentence while two nodes send what is tracked
-        self._frozen = FrozenMeasurement(
-            _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
-        # Of a muscle whose pressure reading stands still too, by the pressure it should have.
-        self._frozen_both = FrozenMeasurement(
-            _RESTING[self.tracked], stop_swing_pa=_STOP_SWING_PA[self.tracked])
-        self._following = CommandFollowing()
-        self._core = TickCore(controller)
-        self._contraction: Contraction | None = None
-        self._pressure: Pressure | None = None
-        self._force: Force | None = None
+        self.state: ControllerState | None = None
+        self.two_sensors = ''
         self._last_tick_ns: int | None = None
         self._used_ns: int | None = None
+        self._commands_pa: tuple[float, ...] | None = None    # of the last tick, if it ran
+
+    def _of_muscle(self) -> tuple[Law, Measurement, Setpoint]:
+        controller, tracked = self.controller, tracked_by(self.controller)
+        if tracked == JOINT:
+            raise InputError('the controller tracks a joint; this is the loop of one muscle',
+                             controller.rig_name)
+        plausible, resting = _CONTRACTIONS_M, _RESTING_M
+        if tracked == FORCE:
+            upper_n = controller.upper_force_n
+            plausible, resting = (-0.5 * upper_n, _FORCE_MARGIN * upper_n), _RESTING_N
+        return (MuscleLaw(controller),
+                Measurement(tracked, self._newest, plausible, (resting, math.inf)),
+                MuscleSetpoint(tracked, plausible))
+
+    def _of_joint(self, joint: 'JointRig', name: str) -> tuple[Law, Measurement, Setpoint]:
+        from pam_actuation.control.joint_law import JointLaw
+        from pam_actuation.control.joint_setpoint import JointSetpoint
+        controller = self.controller
+        if tracked_by(controller) != JOINT:
+            raise InputError('this controller tracks a single muscle; a joint needs one with '
+                             '`mode: joint`', controller.rig_name)
+        lower, upper = joint.range_rad
+        return (JointLaw(controller, joint),
+                Measurement(JOINT, self._newest, (lower - _MARGIN_RAD, upper + _MARGIN_RAD),
+                            (lower + _STOP_RAD, upper - _STOP_RAD)),
+                JointSetpoint(joint.range_rad, name))
+
+    def _takers(self) -> dict[str, Callable[[Any], object]]:
+        """Return what takes each topic: wishes, then what the drivers follow and is measured."""
+        takes = self.setpoint.takes()
+        if self.tracked == JOINT:
+            takes.update(self._kept(self.measurement.sensor.topic))
+        for muscle in self.muscles:
+            takes[f'{muscle.place}followed_pressure'] = muscle.following.on_followed
+        takes.update(self._kept(*(muscle.pressure_topic for muscle in self.muscles),
+                                *(muscle.force_topic for muscle in self.muscles)))
+        if self.tracked != JOINT:       # also where a force is tracked
+            takes.update(self._kept('contraction'))
+        return takes
+
+    def _kept(self, *topics: str) -> dict[str, Callable[[Any], object]]:
+        """Return what keeps the newest message of each topic."""
+        return {topic: partial(self._newest.__setitem__, topic) for topic in topics}
 
     @property
     def rate_hz(self) -> float:
@@ -174,158 +187,170 @@ class ControllerLoop:
         return self.controller.rate_hz
 
     @property
-    def rejected_references(self) -> int:
-        """Return the number of references and trajectories that were not usable."""
-        return self.references.refused
+    def references(self) -> ReferenceBuffer:
+        """Return what is wanted of the tracked quantity."""
+        return self.setpoint.references
 
     @property
-    def ticks(self) -> int:
-        """Return the number of ticks run."""
-        return self._core.ticks
+    def rejected_references(self) -> int:
+        """Return the number of references and trajectories that were not usable."""
+        return self.setpoint.refused
 
-    def takes(self) -> dict[str, Callable[[Any], None]]:
-        """Return what takes each topic, by short name."""
-        return {'contraction': self.on_contraction, 'pressure': self.on_pressure,
-                'followed_pressure': self.on_followed_pressure, 'force': self.on_force,
-                'reference': self.on_reference,
-                'reference_trajectory': self.on_reference_trajectory}
+    def takes(self) -> dict[str, Callable[[Any], object]]:
+        """Return what takes each topic, by name relative to the namespace of the rig."""
+        return dict(self._takes)
 
-    def on_contraction(self, message: Contraction) -> None:
-        """Take a ``Contraction``."""
-        self._contraction = message
-
-    def on_pressure(self, message: Pressure) -> None:
-        """Take a measured ``Pressure``."""
-        self._pressure = message
-
-    def on_followed_pressure(self, message: Pressure) -> None:
-        """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
-        self._following.on_followed(message)
-
-    def on_force(self, message: Force) -> None:
-        """Take a ``Force``."""
-        self._force = message
+    def take(self, topic: str, message: Message) -> None:
+        """Take a message of one of the topics of ``takes``."""
+        self._takes[topic](message)
 
     def forget(self) -> None:
         """Forget all inputs, as before the first ones; what was learned stays."""
-        self.references.clear()
-        for part in (self._frozen, self._frozen_both, self._following):
-            part.forget()
-        self._contraction = self._pressure = self._force = None
+        self._newest.clear()
+        self.setpoint.forget()
+        self.measurement.forget()
+        for muscle in self.muscles:
+            muscle.forget()
 
-    def on_reference(self, message: Reference) -> None:
-        """Take a ``Reference``; an unusable one is ignored and counted."""
-        self.references.set_reference(message)
-
-    def on_reference_trajectory(self, message: ReferenceTrajectory) -> None:
-        """Take a ``ReferenceTrajectory``; an unusable one is ignored and counted."""
-        self.references.set_trajectory(message)
-
-    def tick(self, now_ns: int, learning: bool = True) -> tuple[Pressure, ControllerState]:
+    def tick(self, now_ns: int,
+             learning: bool = True) -> tuple[tuple[Pressure, ...], ControllerState]:
         """
         Run one tick at a time of the clock the stamps come from.
 
         Parameters
         ----------
         now_ns : int
-            Time of the tick, stamp of both results.
+            Time of the tick, stamp of all results.
         learning : bool
             Whether the rules may change; the controller's ``freeze_learning`` also counts.
 
         Returns
         -------
-        command : Pressure
-            Wanted muscle pressure, absolute; atmosphere while an input is invalid.
+        commands : tuple of Pressure
+            Wanted pressure of each muscle, absolute; atmosphere while an input is invalid.
         state : ControllerState
             Every input used and every internal of the tick.
 
         """
         inputs = self._gather(now_ns, learning)
-        command_pa, values = self._core.run(inputs)
-        self._following.sent(now_ns, command_pa)
+        commands_pa, values = self._core.run(inputs)
+        commands = []
+        for muscle, command_pa in zip(self.muscles, commands_pa):
+            muscle.following.sent(now_ns, command_pa)
+            commands.append(Pressure(now_ns, command_pa))
         self.valid = inputs.reason in codes.RUNNING
-        self.reason = reason_text(inputs.reason, self.two_sensors)
-        return (Pressure(now_ns, command_pa),
-                ControllerState(now_ns, self._core.names, values))
+        self._commands_pa = commands_pa if self.valid else None
+        self.reason = codes.REASONS[inputs.reason]
+        if inputs.reason == codes.TWO_SENSORS:
+            self.reason = f'{self.reason}: {self.two_sensors}'
+        self.state = ControllerState(now_ns, self._core.names, values)
+        return tuple(commands), self.state
 
     def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
-        """Run one tick; return what it sends by short topic name, as ``tick``."""
-        command, state = self.tick(now_ns, learning)
-        return {'pressure_command': command, 'controller_state': state}
-
-    def _measured(self) -> tuple[Contraction | Force | None, float]:
-        """Return the newest message of what is tracked and its value; None, NaN before."""
-        if self.tracked == FORCE:
-            return self._force, math.nan if self._force is None else self._force.force_n
-        message = self._contraction
-        return message, math.nan if message is None else message.contraction_m
-
-    def _measured_reason(self, now_ns: int) -> int:
-        """Return the code for the newest measurement of what is tracked, OK if usable."""
-        if self.two_sensors:
-            return codes.TWO_SENSORS
-        message, value = self._measured()
-        reason = measurement_reason(message, value, self._range, self._reasons, now_ns)
-        if message is not None and reason == codes.OK and self._stands_still(
-                now_ns, message.stamp_ns, value):
-            return _FROZEN[self.tracked]
-        return reason
-
-    def _stands_still(self, now_ns: int, stamp_ns: int, value: float) -> bool:
-        """Return whether what is tracked stands still although the pressure changed."""
-        pressure_pa = self._fresh_pressure_pa(now_ns)
-        expected_pa = self._following.expected_pa(now_ns, pressure_pa)
-        if math.isnan(expected_pa):
-            self._frozen_both.pause()
-        # Both are to be asked, whatever the first one says.
-        return any([self._frozen.judge(now_ns, stamp_ns, value, pressure_pa),
-                    self._frozen_both.judge(now_ns, stamp_ns, value, expected_pa)])
-
-    def _fresh_pressure_pa(self, now_ns: int) -> float:
-        """Return the measured pressure [Pa], NaN where none is fresh."""
-        return self._pressure.pressure_pa if fresh(self._pressure, now_ns) else math.nan
+        """Run one tick; return what it sends by topic relative to the rig, as ``tick``."""
+        commands, state = self.tick(now_ns, learning)
+        return {**dict(zip(self.command_topics, commands)), 'controller_state': state}
 
     def _gather(self, now_ns: int, learning: bool) -> TickInputs:
         """Return the ``TickInputs`` of now."""
         stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
         self._last_tick_ns = now_ns
-        reason = self._measured_reason(now_ns)
-        references = self.references
-        references.refuse_ahead(now_ns)
-        if reason == codes.OK:
-            reason = REFERENCE_REASONS[references.state(now_ns)]
-        may_learn = bool(
-            learning and reason == codes.OK and not self.controller.freeze_learning)
-        inputs = TickInputs(reason=reason, learning=may_learn, restarted=stalled)
-        held_back = self._following.judge(now_ns, self._fresh_pressure_pa(now_ns))
-        message, _ = self._measured()
-        if message is None or reason not in codes.RUNNING:
+        measurement, setpoint, muscles = self.measurement, self.setpoint, self.muscles
+        reason = measurement.reason(now_ns)
+        setpoint.begin(now_ns, measurement.value)
+        for muscle in muscles:
+            muscle.look(self._newest, now_ns)
+        if self.two_sensors:
+            reason = codes.TWO_SENSORS
+        elif reason == codes.OK:
+            reason = self._reason(now_ns)
+        effort = setpoint.effort
+        may_learn = bool(learning and reason == codes.OK and not effort.follows
+                         and not self.controller.freeze_learning)
+        inputs = TickInputs(reason, may_learn, stalled)
+        inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
+        held_back = self._held_back(now_ns)
+        running = reason in codes.RUNNING
+        if stalled or not running:
+            self._commands_pa = None
+        if not running:
             self._used_ns = None
+            if reason == codes.MUSCLE_SLACK:
+                inputs.proves = [muscle.slack.proves(now_ns) for muscle in muscles]
             return inputs
-        inputs.held_back = LESS if self._core.rise.limiting else held_back
-        measured_ns = message.stamp_ns
-        # The error belongs to the time of the measurement, the preview to now.
-        inputs.reference, inputs.reference_rate = references.at(now_ns, measured_ns)
-        inputs.lead_reference, inputs.lead_reference_rate = references.at(
-            now_ns, now_ns + round(self.controller.lead_s * 1e9))
+        inputs.held_back = held_back
+        measured_ns = measurement.stamp_ns
+        if not effort.follows:
+            # The error belongs to the time of the measurement, the preview to now.
+            at = setpoint.references.at
+            inputs.reference, inputs.reference_rate = at(now_ns, measured_ns)
+            inputs.lead_reference, inputs.lead_reference_rate = at(now_ns, now_ns + self._lead_ns)
         if self._used_ns is not None:
             inputs.elapsed_s = (measured_ns - self._used_ns) * 1e-9
         self._used_ns = measured_ns
-        contraction_ns = pressure_ns = force_ns = reference_ns = trajectory_ns = -1
-        if fresh(self._contraction, now_ns) and math.isfinite(
-                self._contraction.contraction_m):
-            inputs.contraction_m = self._contraction.contraction_m
-            contraction_ns = self._contraction.stamp_ns
-        if fresh(self._pressure, now_ns) and math.isfinite(self._pressure.pressure_pa):
-            inputs.pressure_pa = self._pressure.pressure_pa
-            pressure_ns = self._pressure.stamp_ns
-        if fresh(self._force, now_ns) and math.isfinite(self._force.force_n):
-            inputs.force_n = self._force.force_n
-            force_ns = self._force.stamp_ns
-        reference, trajectory = references.reference, references.trajectory
-        if trajectory is not None and (reference is None or references.uses_trajectory(now_ns)):
-            trajectory_ns = trajectory.stamp_ns
-        elif reference is not None:
-            reference_ns = reference.stamp_ns
-        inputs.stamps_ns = (contraction_ns, pressure_ns, force_ns, reference_ns, trajectory_ns)
+        position_ns, inputs.position = self._position(now_ns)
+        if len(muscles) == 1:
+            (muscle,) = muscles
+            inputs.pressures_pa, inputs.forces_n = (muscle.pressure_pa,), (muscle.force_n,)
+            inputs.stamps_ns = (
+                position_ns, muscle.pressure_ns, muscle.force_ns, *setpoint.stamps(now_ns))
+            return inputs
+        inputs.stamps_ns = (position_ns,)
+        inputs.pressures_pa = [muscle.pressure_pa for muscle in muscles]
+        inputs.forces_n = [muscle.force_n for muscle in muscles]
+        if setpoint.changed and self._commands_pa is not None:
+            inputs.pressures_pa = self._commands_pa     # one law goes on from those of the other
         return inputs
+
+    def _position(self, now_ns: int) -> tuple[int, float]:
+        """Return stamp and value of what the law starts from; -1, NaN where not usable."""
+        if self.tracked != FORCE:
+            return self.measurement.stamp_ns, self.measurement.value
+        message: Any = self._newest.get('contraction')
+        if fresh(message, now_ns) and math.isfinite(message.contraction_m):
+            return message.stamp_ns, message.contraction_m
+        return -1, math.nan
+
+    def _reason(self, now_ns: int) -> int:
+        """Return the code for a sound measurement, one of ``codes.RUNNING`` if all is usable."""
+        if len(self.muscles) > 1 and self._one_is_slack(now_ns):
+            return codes.MUSCLE_SLACK
+        if self.setpoint.effort.follows:
+            self.measurement.may_stand_still(now_ns)
+        elif self._stands_still(now_ns):
+            return self.measurement.sensor.frozen
+        return self.setpoint.reason(now_ns)
+
+    def _one_is_slack(self, now_ns: int) -> bool:
+        """Return whether one of several muscles is without air although it should not be."""
+        commanded_pa = self._commands_pa or self._core.vented_pa
+        # Into a list first: all are to be asked, also where the first one is slack.
+        slack = [muscle.slack.judge(now_ns, command_pa, muscle.pressure_pa)
+                 for muscle, command_pa in zip(self.muscles, commanded_pa)]
+        return any(slack)
+
+    def _stands_still(self, now_ns: int) -> bool:
+        """Return whether what is tracked stands still although the pressures changed."""
+        moving_pa = should_be_pa = 0.0
+        all_believed, sign = True, 1.0
+        for muscle in self.muscles:         # of a joint their difference moves the limb
+            measured_pa = muscle.pressure_pa
+            expected_pa = muscle.following.expected_pa(now_ns, measured_pa)
+            if math.isnan(expected_pa):
+                expected_pa = measured_pa
+            else:
+                all_believed = False
+            moving_pa += sign * measured_pa
+            should_be_pa += sign * expected_pa
+            sign = -sign
+        return self.measurement.stands_still(
+            now_ns, moving_pa, None if all_believed else should_be_pa)
+
+    def _held_back(self, now_ns: int) -> float:
+        """Return a code of ``following``; of several muscles less or more tells nothing."""
+        does = FOLLOWS
+        for muscle in self.muscles:
+            one = muscle.held_back(now_ns)
+            if one != FOLLOWS:
+                does = one if len(self.muscles) == 1 else UNKNOWN
+        return does

@@ -15,17 +15,20 @@
 """
 One controller tick as a pure function of its inputs: what live loop and replay share.
 
-``TickInputs`` is everything a tick depends on besides the controller's own
-state. ``TickCore`` turns it into a command and the numbers of
-``controller_state``; replaying the same inputs gives the same bits.
+``TickInputs`` is everything a tick depends on besides the law's own state. ``TickCore`` turns it
+into one command for each muscle and the numbers of ``controller_state``; replaying the same
+inputs gives the same bits.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
-from pam_actuation.control.modes.tracked import tracked_by
+from pam_actuation.control.modes.tracked import JOINT, Tracked, tracked_by
+from pam_actuation.control.slack_muscle import PROOF_PA
 from pam_actuation.slow_rise import SlowRise
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
 (OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
@@ -62,21 +65,25 @@ REASONS = (
     'what is tracked is measured twice, vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
+_NS = 1_000_000_000
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
-STAMPED = ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
+# Of which topics ``controller_state`` tells the stamps.
+STAMPED: tuple[str, ...] = (
+    'contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
+STAMPED_OF_JOINT: tuple[str, ...] = ('joint_state',)
 
 
-def input_names(unit: str) -> tuple[str, ...]:
-    """
-    Return the names of the inputs of a tick in ``controller_state``, in order.
-
-    ``unit`` is the suffix of the reference: ``m``, or ``n`` where a force is tracked.
-    """
+def input_names(tracked: Tracked) -> tuple[str, ...]:
+    """Return the names of the inputs of a tick in ``controller_state``, in order."""
+    stamped, position, muscles = STAMPED, 'contraction_m', ['']
+    if tracked == JOINT:
+        stamped, position, muscles = STAMPED_OF_JOINT, 'angle_rad', [f'{side}_' for side in SIDES]
     return (
         'tick', 'input_reason', 'learning', 'restarted', 'rules_replaced',
-        *(f'{name}_stamp_{part}' for name in STAMPED for part in ('sec', 'nanosec')),
-        'contraction_m', *reference_names(unit), 'elapsed_s', 'pressure_pa', 'force_n',
-        HELD_BACK)
+        *(f'{name}_stamp_{part}' for name in stamped for part in ('sec', 'nanosec')),
+        position, *reference_names(tracked.unit), 'elapsed_s',
+        *(f'{muscle}pressure_pa' for muscle in muscles),
+        *(f'{muscle}force_n' for muscle in muscles), HELD_BACK)
 
 
 def reference_names(unit: str) -> tuple[str, str, str, str]:
@@ -85,96 +92,169 @@ def reference_names(unit: str) -> tuple[str, str, str, str]:
             f'lead_reference_{unit}_per_s')
 
 
+class Effort(NamedTuple):
+    """The wanted torque [N m] of a joint, its stamp [ns], and whether the law follows it."""
+
+    follows: bool = False
+    stamp_ns: int = -1
+    torque_n_m: float = math.nan
+
+
 @dataclass(slots=True)
 class TickInputs:
     """
     Everything one tick depends on.
 
     ``reason`` is one of this module's codes; ``stamps_ns`` gives the stamp of every input
-    used, in the order of ``STAMPED``, -1 for one not used. References are in the unit of what
-    the controller tracks. Other fields: see ``step`` of the controller. ``restarted``: the
-    loop stood still, so that the motion known from before means nothing.
+    used, in the order of the law's ``stamped``, -1 for one not used. ``position`` is the
+    contraction or the angle of the joint. References are in the unit of what the controller
+    tracks. Pressures and forces are one of each muscle. ``proves`` tells which muscle of a joint
+    is asked for a little pressure while all are vented. ``co_contraction_pa`` is the one asked
+    for by message, absolute, NaN before the first. Other fields: see ``step`` of the controller.
+    ``restarted``: the loop stood still, so that the motion known from before means nothing.
     """
 
     reason: int = OK
     learning: bool = True
     restarted: bool = False
-    stamps_ns: tuple[int, ...] = (-1,) * len(STAMPED)
-    contraction_m: float = math.nan
+    stamps_ns: Sequence[int] = ()
+    position: float = math.nan
     reference: float = math.nan
     reference_rate: float = math.nan
     lead_reference: float = math.nan
     lead_reference_rate: float = math.nan
     elapsed_s: float = math.nan
-    pressure_pa: float = math.nan
-    force_n: float = math.nan
+    pressures_pa: Sequence[float] = ()
+    forces_n: Sequence[float] = ()
     held_back: float = 0.0
+    proves: Sequence[bool] = ()
+    effort: Effort = Effort()
+    co_contraction_pa: float = math.nan
 
 
-def split_stamp(stamp_ns: int) -> tuple[float, float]:
-    """Return a stamp as two numbers that a float holds exactly: seconds, nanoseconds."""
-    if stamp_ns < 0:
-        return -1.0, 0.0
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    return float(seconds), float(nanoseconds)
+def split_stamps(stamps_ns: Iterable[int]) -> list[float]:
+    """Return two numbers a stamp that a float holds exactly: seconds, nanoseconds."""
+    return [float(part) for stamp_ns in stamps_ns
+            for part in (divmod(stamp_ns, _NS) if stamp_ns >= 0 else (-1, 0))]
 
 
 def join_stamp(seconds: float, nanoseconds: float) -> int:
-    """Return the stamp [ns] of ``split_stamp``, -1 for none."""
-    return -1 if seconds < 0 else int(seconds) * 1_000_000_000 + int(nanoseconds)
+    """Return the stamp [ns] of ``split_stamps``, -1 for none."""
+    return -1 if seconds < 0 else int(seconds) * _NS + int(nanoseconds)
 
 
-class TickCore:
+class Law(Protocol):
+    """A controller as a tick calls it: of one muscle, or of all those of a joint."""
+
+    controller: Any
+    tracked: Tracked
+    places: tuple[str, ...]         # of its muscles below the namespace of the rig
+    stamped: tuple[str, ...]        # topics whose stamps ``controller_state`` tells
+    names: tuple[str, ...]          # of ``internals``
+
+    def pause(self) -> None:
+        """Forget the motion: the next step starts bumplessly."""
+
+    def step(self, inputs: TickInputs) -> tuple[float, ...]:
+        """Return the wanted absolute pressure [Pa] of each muscle."""
+
+    def internals(self, inputs: TickInputs) -> tuple[float, ...]:
+        """Return what ``controller_state`` tells of the law besides the inputs."""
+
+
+class MuscleLaw:
     """
-    A controller with a tick counter.
+    The controller of one muscle, as a tick calls it.
 
     Parameters
     ----------
     controller : SelfOrganizingFuzzyController, PidController or ForceController
+
+    """
+
+    places: tuple[str, ...] = ('',)
+    stamped = STAMPED
+
+    def __init__(self, controller: Any) -> None:
+        self.controller = controller
+        self.tracked = tracked_by(controller)
+        self.names = tuple(controller.state_names)
+
+    def pause(self) -> None:
+        """Forget the motion: the next step starts bumplessly."""
+        self.controller.pause()
+
+    def step(self, inputs: TickInputs) -> tuple[float, ...]:
+        """Return the wanted absolute pressure [Pa]."""
+        (pressure_pa,), (force_n,) = inputs.pressures_pa, inputs.forces_n
+        return float(self.controller.step(
+            inputs.position, inputs.reference, inputs.reference_rate,
+            inputs.lead_reference, inputs.lead_reference_rate, inputs.learning,
+            inputs.elapsed_s, pressure_pa, force_n, inputs.held_back)),
+
+    def internals(self, inputs: TickInputs) -> tuple[float, ...]:
+        """Return what the controller tells of its tick."""
+        values: tuple[float, ...] = self.controller.state_values()
+        return values
+
+
+class TickCore:
+    """
+    A law with a tick counter and the slow rise of its commands.
+
+    Parameters
+    ----------
+    law : Law
     rises_slowly : bool
-        Whether the command rises slowly after the inputs were invalid; False for recordings
+        Whether the commands rise slowly after the inputs were invalid; False for recordings
         of versions that did not.
 
     """
 
-    def __init__(self, controller: Any, rises_slowly: bool = True) -> None:
-        self.controller = controller
-        self.rise = SlowRise(active=False)
+    def __init__(self, law: Law, rises_slowly: bool = True) -> None:
+        self.law = law
+        self.rises = tuple(SlowRise(active=False) for _ in law.places)
         self._rises_slowly = rises_slowly
+        self._period_s = 1.0 / law.controller.rate_hz
+        self.vented_pa = (P_ATM_PA,) * len(law.places)
+        self._nothing = (math.nan,) * len(law.places)
+        self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
-        self.names = input_names(tracked_by(controller).unit) + tuple(controller.state_names)
+        self.names = input_names(law.tracked) + law.names
 
-    def run(self, inputs: TickInputs) -> tuple[float, tuple[float, ...]]:
+    def run(self, inputs: TickInputs) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """
         Run one tick.
 
         Returns
         -------
-        command_pa : float
-            Wanted absolute pressure; atmosphere (vented) while the inputs are invalid.
+        commands_pa : tuple of float
+            Wanted absolute pressure of each muscle; vented while the inputs are invalid.
         values : tuple of float
             What ``controller_state`` carries, in the order of ``names``.
 
         """
-        controller = self.controller
-        if inputs.restarted or inputs.reason not in RUNNING:
-            controller.pause()
-        command_pa = P_ATM_PA
-        if inputs.reason not in RUNNING and self._rises_slowly:
-            self.rise.begin()
-        if inputs.reason in RUNNING:
-            command_pa = float(controller.step(
-                inputs.contraction_m, inputs.reference, inputs.reference_rate,
-                inputs.lead_reference, inputs.lead_reference_rate, inputs.learning,
-                inputs.elapsed_s, inputs.pressure_pa, inputs.force_n, inputs.held_back))
-            command_pa = self.rise.limited(command_pa, 1.0 / controller.rate_hz)
+        law = self.law
+        running = inputs.reason in RUNNING
+        if inputs.restarted or not running:
+            law.pause()
+        if running:
+            commands_pa = tuple([rise.limited(command_pa, self._period_s)
+                                 for rise, command_pa in zip(self.rises, law.step(inputs))])
+        else:
+            commands_pa = self.vented_pa
+            if inputs.proves:
+                commands_pa = tuple(PROOF_PA if proof else P_ATM_PA for proof in inputs.proves)
+            if self._rises_slowly:
+                for rise in self.rises:
+                    rise.begin()
         values = (
             float(self.ticks), float(inputs.reason), float(inputs.learning),
-            float(inputs.restarted), float(controller.rules_replaced),
-            *(part for stamp_ns in inputs.stamps_ns for part in split_stamp(stamp_ns)),
-            inputs.contraction_m, inputs.reference, inputs.reference_rate,
+            float(inputs.restarted), float(law.controller.rules_replaced),
+            *split_stamps(inputs.stamps_ns or self._no_stamps_ns),
+            inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
-            inputs.pressure_pa, inputs.force_n, inputs.held_back,
-            *controller.state_values())
+            *(inputs.pressures_pa or self._nothing), *(inputs.forces_n or self._nothing),
+            inputs.held_back, *law.internals(inputs))
         self.ticks += 1
-        return command_pa, values
+        return commands_pa, values

@@ -21,15 +21,16 @@ The loops are the ones the nodes call, joined by messages that take no time.
 from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.loops.assembly import driver_loops, plant_loop
+from pam_actuation.loops.assembly import driver_loops
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
-from pam_actuation.messages import ControllerState, Pressure, START_NS
+from pam_actuation.messages import ControllerState, Message, Pressure, START_NS
+from pam_actuation.plant_loop import PlantLoop
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_actuation.control.joint_loop import JointControllerLoop
+    from pam_actuation.control.loop import ControllerLoop
     from pam_sim.joint.rig import JointRig
 
 _NS = 1_000_000_000
@@ -42,25 +43,28 @@ class JointLoops:
     Parameters
     ----------
     joint : pam_sim.joint.JointRig
-    control : pam_actuation.control.joint_loop.JointControllerLoop
+    control : pam_actuation.control.loop.ControllerLoop
         Whoever steps this hands it its wishes.
     seed : int
         Of the sensor noise.
+    on_sent : callable, optional
+        As of ``Bus``.
 
     """
 
-    def __init__(self, joint: 'JointRig', control: 'JointControllerLoop', seed: int = 0) -> None:
+    def __init__(self, joint: 'JointRig', control: 'ControllerLoop', seed: int = 0,
+                 on_sent: Callable[[str, Message, int], object] | None = None) -> None:
         self.control = control
-        self.plant, drivers = plant_loop(joint, seed), driver_loops(joint)
+        self.plant, drivers = PlantLoop(joint, seed), driver_loops(joint)
         self.drivers = list(drivers.values())
         self.period_ns = round(_NS / control.rate_hz)
         self.now_ns = START_NS
         self.state: ControllerState | None = None       # the newest
         self.ticks = 0
-        self._commands = Pressure(START_NS, P_ATM_PA), Pressure(START_NS, P_ATM_PA)
+        self._commands: tuple[Pressure, ...] = (Pressure(START_NS, P_ATM_PA),) * len(drivers)
         self._instead: dict[str, Any] = {}
         self.plant.advance_to(self.now_ns)
-        self._bus = bus = Bus()
+        self._bus = bus = Bus(on_sent=on_sent)
         first_ns = START_NS + self.period_ns
         bus.add(attach_plant(bus, self.plant), every(control.rate_hz, first_ns))
         bus.add(self._tick_control, every(control.rate_hz, first_ns))
@@ -71,7 +75,7 @@ class JointLoops:
             bus.connect(topic, self._unless_replaced(topic, take))
 
     def _unless_replaced(self, topic: str,
-                         take: Callable[[Any], None]) -> Callable[[Any], None]:
+                         take: Callable[[Any], object]) -> Callable[[Any], None]:
         """Return what hands on a message, or what stands in its place in this tick."""
         def taken(message: Any) -> None:
             both = self._instead.get(topic.rpartition('/')[2], message)
@@ -84,7 +88,7 @@ class JointLoops:
         for side, command in zip(SIDES, self._commands):
             self._bus.send(f'{side}/pressure_command', command, now_ns)
 
-    def tick(self, **instead: Any) -> tuple[Pressure, Pressure]:
+    def tick(self, **instead: Any) -> tuple[Pressure, ...]:
         """
         Run one period; return the commands of flexor and extensor as ``Pressure``.
 

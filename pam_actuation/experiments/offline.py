@@ -34,12 +34,13 @@ from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.loops.assembly import controller_loop, driver_loops, plant_loop
+from pam_actuation.loops.assembly import controller_loop, driver_loops
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
+from pam_actuation.plant_loop import PlantLoop
 from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
@@ -95,7 +96,7 @@ class _Loops:
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
-        plant, drivers = plant_loop(rig, seed), driver_loops(rig)
+        plant, drivers = PlantLoop(rig, seed), driver_loops(rig)
         reference = ReferenceLoop(experiment, valve=rig.valve)
         lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 

@@ -20,21 +20,11 @@ A rig names its muscles by their place below its own namespace (``Rig.muscles``)
 
 from typing import Any
 
-from pam_actuation.control.joint_loop import JointControllerLoop
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.joint_plant_loop import JointPlantLoop
-from pam_actuation.plant_loop import PlantLoop
 from pam_sim.joint import JointRig
 from pam_sim.rig import Rig
-
-
-def plant_loop(rig: Rig | JointRig, seed: int = 0) -> PlantLoop | JointPlantLoop:
-    """Return the simulated rig on a clock."""
-    if isinstance(rig, JointRig):
-        return JointPlantLoop(rig, seed)
-    return PlantLoop(rig, seed)
 
 
 def driver_loops(rig: Rig | JointRig) -> dict[str, DriverLoop]:
@@ -43,8 +33,7 @@ def driver_loops(rig: Rig | JointRig) -> dict[str, DriverLoop]:
             for prefix, muscle in rig.muscles.items()}
 
 
-def controller_loop(controller: Any, rig: Rig | JointRig,
-                    name: str = 'muscle') -> ControllerLoop | JointControllerLoop:
+def controller_loop(controller: Any, rig: Rig | JointRig, name: str = 'muscle') -> ControllerLoop:
     """
     Return the controller of a rig on a clock.
 
@@ -63,6 +52,4 @@ def controller_loop(controller: Any, rig: Rig | JointRig,
         The one is for a muscle, the other one a joint.
 
     """
-    if isinstance(rig, JointRig):
-        return JointControllerLoop(controller, rig, name)
-    return ControllerLoop(controller)
+    return ControllerLoop(controller, rig if isinstance(rig, JointRig) else None, name)

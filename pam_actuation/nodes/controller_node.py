@@ -14,13 +14,12 @@
 
 """What the controller nodes share: measurements and reference in, pressure command out."""
 
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.tick import REASONS
-from pam_actuation.messages import ControllerState, Pressure
+from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.diagnostics import DiagnosticsReporter, OK, Values
-from pam_actuation.nodes.diagnostics import WARN
+from pam_actuation.nodes.diagnostics import OK, Values, WARN
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import NodeParameter
@@ -31,30 +30,23 @@ from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.loop import ControllerLoop
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 MOST_WRONG_STEPS = 20
 ACCEPT_OTHER_RIG = NodeParameter(
     'accept_other_rig', False, 'Take a controller file that was made for another rig.')
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
-INPUTS = ('reference_trajectory', 'reference', 'followed_pressure', *MEASURED)
-FOLLOWING = 'following the reference'
-
-
-def report_reason(diagnostics: DiagnosticsReporter, reason: str, well: str = FOLLOWING) -> None:
-    """
-    Report what a controller loop says of its tick, one of ``REASONS``.
-
-    The first of them is well; what the loop does then are the words ``well``.
-    """
-    if reason == REASONS[0]:
-        diagnostics.update(OK, well)
-    else:
-        diagnostics.update(WARN, reason)
+FOLLOWING, GIVING = 'following the reference', 'giving the wanted torque'
 
 
 class ControllerNode(ManagedNode):
-    """Call a control law at its rate; on every way out command atmospheric pressure."""
+    """
+    Call a control law at its rate; on every way out command atmospheric pressure.
+
+    It listens to what its loop takes, of one muscle or of a joint.
+    """
 
     DEFAULT_CONTROLLERS: dict[str, str] = {}            # preset by valve
     PARAMETERS: tuple[NodeParameter, ...] = (
@@ -69,38 +61,52 @@ class ControllerNode(ManagedNode):
 
     learning = False
     loop: 'ControllerLoop | None' = None
+    controller: Any
     _last_ns: int | None = None
-    state: ControllerState | None = None            # what was sent last as controller_state
+
+    def load_rig(self) -> 'Rig | JointRig':
+        """Return the rig that the controller is made for."""
+        from pam_sim import load_rig
+        return load_rig(self.value('rig'), valve=self.value('valve_type'))
+
+    def preset_for(self, rig: Any) -> str:
+        """Return the name of the controller preset that fits a rig."""
+        return self.DEFAULT_CONTROLLERS[rig.valve]
 
     def setup(self) -> None:
         """Load the controller, create the topics."""
+        self.build(self.load_rig())
+        self.create_topics()
+
+    def build(self, rig: 'Rig | JointRig') -> None:
+        """Load the controller of a rig."""
         from pam_actuation.control.config import load_controller
-        from pam_actuation.control.loop import ControllerLoop
-        from pam_sim import load_rig
-        valve = self.value('valve_type')
-        rig = load_rig(self.value('rig'), valve=valve)
-        name = self.value('controller') or self.DEFAULT_CONTROLLERS[valve]
+        from pam_actuation.loops.assembly import controller_loop
+        name = self.value('controller') or self.preset_for(rig)
         accept = self.value('accept_other_rig')
         spare = load_controller(name, rig, accept_other_rig=accept)
         spare.step(0.0, 0.0, 0.0, 0.0, 0.0)         # compiled before time counts
         self.controller = load_controller(name, rig, accept_other_rig=accept)
         if self.controller.other_rig:
             self.get_logger().warning(f'the controller was {self.controller.other_rig}')
-        self.loop = ControllerLoop(self.controller)
+        self.loop = controller_loop(self.controller, rig, self.value('muscle'))
+
+    def create_topics(self) -> None:
+        """Create what the loop sends and takes."""
+        loop = self.loop
+        assert loop is not None
         self._refusals = RefusalLog(self.get_logger())
-        self.add_publisher('pressure_command')
-        self.add_publisher('controller_state')
-        tracked = self.loop.tracked.topic
-        self.inputs = [
-            (topic, self.add_subscription(topic, writers=topic == tracked),
-             getattr(self.loop, f'on_{topic}')) for topic in INPUTS]
-        self._ear = SensorEar(self, next(
-            subscription for topic, subscription, _ in self.inputs if topic == tracked))
+        for topic in (*loop.command_topics, 'controller_state'):
+            self.add_publisher(topic)
+        self._tracked = tracked = loop.measurement.sensor.topic
+        self.inputs = {topic: (self.add_subscription(topic, writers=topic == tracked), take)
+                       for topic, take in loop.takes().items()}
+        self._ear = SensorEar(self, self.inputs[tracked][0])
 
     def inputs_of_a_tick(self) -> list[TickInput]:
         """Return the measurements and, of a reference that takes part, what it asks for."""
         from pam_actuation.experiments.reference import TRAJECTORY_EVERY_NS
-        by_topic = {topic: subscription for topic, subscription, _ in self.inputs}
+        by_topic = {topic: subscription for topic, (subscription, _) in self.inputs.items()}
         awaited: list[TickInput] = [
             lockstep.EachTick(by_topic[topic]) for topic in SENT_LAST_FIRST]
         if lockstep.DRIVER in self.participants:
@@ -134,38 +140,37 @@ class ControllerNode(ManagedNode):
         self.add_loop(1.0 / self.controller.rate_hz)
 
     def tick(self) -> None:
-        """Take the newest inputs, compute, send command and internals."""
+        """Take the newest inputs, compute, send commands and internals."""
         loop = self.loop
         assert loop is not None
-        for topic, subscription, handler in self.inputs:
+        for topic, (subscription, take) in self.inputs.items():
             # In lockstep reference and followed pressure are those of the tick before.
             old = self.participants and topic not in MEASURED
             taken = subscription.take_before(self.now_ns()) if old else subscription.take()
             for message, _ in taken:
-                handler(message)
-            if topic == loop.tracked.topic:
+                take(message)
+            if topic == self._tracked:
                 measured = taken
         # Only now: what arrived while this node waited for the processor is not from the future.
         now_ns = self.now_ns()
         if self.participants:
             self._check_step(now_ns)
         loop.two_sensors = self._ear.took(measured, now_ns)
-        command, self.state = loop.tick(now_ns, self.learning)
-        self.send('pressure_command', command)
-        self.send('controller_state', self.state)
-        self._refusals.note(loop.references.refusal)
-        report_reason(self.diagnostics, loop.reason)
+        for topic, message in loop.sent(now_ns, self.learning).items():
+            self.send(topic, message)
+        self._refusals.note(*loop.setpoint.refusals)
+        if loop.reason == REASONS[0]:
+            self.diagnostics.update(OK, GIVING if loop.setpoint.effort.follows else FOLLOWING)
+        else:
+            self.diagnostics.update(WARN, loop.reason)
 
     def diagnostic_values(self) -> Values:
         """Add wishes that were refused."""
         values = super().diagnostic_values()
-        if self.loop is None:
-            return values
-        references = self.loop.references
-        return (*values, ('references.refused', references.refused),
-                ('references.refusal', references.refusal))
+        return values if self.loop is None else (*values, *self.loop.setpoint.values())
 
     def safe_stop(self, why: str) -> None:
-        """Command atmospheric pressure: the driver vents."""
-        if self.publishers_counted:
-            self.send('pressure_command', Pressure(self.now_ns(), P_ATM_PA))
+        """Command atmospheric pressure: the drivers vent."""
+        if self.loop is not None and self.publishers_counted:
+            for topic in self.loop.command_topics:
+                self.send(topic, Pressure(self.now_ns(), P_ATM_PA))

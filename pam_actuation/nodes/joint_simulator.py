@@ -15,14 +15,11 @@
 """The joint on ROS: valve signals of two muscles in, angle and their measurements out."""
 
 from collections.abc import Sequence
-from functools import partial
 import sys
 
-from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
-from pam_sim.joint.parameters import SIDES
 
 
 class JointSimulator(PhysicsNode):
@@ -44,31 +41,9 @@ class JointSimulator(PhysicsNode):
     )
 
     def setup(self) -> None:
-        """Load the joint, create the sensors' publishers."""
-        from pam_actuation.joint_plant_loop import JointPlantLoop
+        """Load the joint, create the topics."""
         from pam_sim.joint import load_joint
-        joint = load_joint(self.value('joint'), valve=self.value('valve_type'))
-        resting = (0.0,) * len(joint.flexor.signal_names)
-        joint.plant().step(resting, resting)                 # compiled before time counts
-        self.plant = JointPlantLoop(joint, seed=self.value('seed'))
-        self.add_publisher('joint_state')
-        self.signals: dict[str, PolledSubscription] = {}
-        for side in SIDES:
-            topics: tuple[str, ...] = ('pressure', 'contraction', 'force')
-            if joint.flexor.valve == 'hsv':
-                topics += ('supply_pressure',)
-            for topic in topics:
-                self.add_publisher(f'{side}/{topic}')
-            self.signals[side] = self.add_subscription(
-                f'{side}/valve_signal', writers=True)
-
-    def tick(self) -> None:
-        """Apply what arrived, run physics to the present, measure."""
-        arrived = [
-            (message, partial(self.plant.set_signal, side, writer=info['writer']))
-            for side in SIDES for message, info in self.signals[side].take()]
-        for topic, plain in self.measured(self.now_ns(), arrived).items():
-            self.send(topic, plain)
+        self.set_up(load_joint(self.value('joint'), valve=self.value('valve_type')))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -15,13 +15,20 @@
 """What the nodes of simulated physics share: they follow the clock and measure what is new."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.messages import Message
 from pam_actuation.nodes.diagnostics import Values
+from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.timing import Latency
 from pam_actuation.plant_loop import Backlog
+from pam_actuation.topics.table import short_name
+
+if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 Arrived = tuple[Any, Callable[[Any], object]]      # a plain message, and what takes it
 MAX_SEED = 2**31 - 1
@@ -29,15 +36,27 @@ MAX_SEED = 2**31 - 1
 
 class PhysicsNode(ManagedNode):
     """
-    Run ``plant``, a ``PlantClock``, up to the present at every tick.
+    Run ``plant``, a ``PlantLoop``, up to the present at every tick.
 
     What arrives acts from its own stamp on if physics has not passed it yet, else at once.
     How old it then is stands in the diagnostics, for the whole run (``input.latency``).
-    Derived nodes have the parameter ``publish_rate_hz`` and build ``plant`` in ``setup``.
+    Derived nodes have the parameters ``seed`` and ``publish_rate_hz`` and call ``set_up`` with
+    their rig.
     """
 
-    plant: Any = None           # a PlantClock, once configured
+    plant: Any = None           # a PlantLoop, once configured
     _latency: Latency | None = None
+
+    def set_up(self, rig: 'Rig | JointRig') -> None:
+        """Build the plant of a rig, publish its sensors, listen to its valve signals."""
+        from pam_actuation.plant_loop import PlantLoop
+        PlantLoop(rig).step(1)              # compiled before time counts
+        self.plant = plant = PlantLoop(rig, seed=self.value('seed'))
+        for topic in plant.topics:
+            self.add_publisher(topic)
+        self.inputs: dict[str, tuple[PolledSubscription, Callable[..., object]]] = {
+            topic: (self.add_subscription(topic, writers=short_name(topic) == 'valve_signal'),
+                    take) for topic, take in plant.takes().items()}
 
     def start(self) -> None:
         """Begin with the clock at the present."""
@@ -46,6 +65,18 @@ class PhysicsNode(ManagedNode):
         self._latency = Latency()
         self._backlog: Backlog[Arrived] = Backlog()
         self.add_loop(1.0 / self.value('publish_rate_hz'))
+
+    def tick(self) -> None:
+        """Apply what arrived, run physics to the present, measure."""
+        arrived = self.arrived()
+        for topic, plain in self.measured(self.now_ns(), arrived).items():
+            self.send(topic, plain)
+
+    def arrived(self) -> list[Arrived]:
+        """Return what arrived since the last call, each with what takes it."""
+        return [(message, partial(take, writer=info['writer']) if 'writer' in info else take)
+                for subscription, take in self.inputs.values()
+                for message, info in subscription.take()]
 
     def measured(self, now_ns: int, arrived: Sequence[Arrived]) -> dict[str, Message]:
         """

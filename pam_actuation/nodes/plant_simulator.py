@@ -15,7 +15,6 @@
 """The rig on ROS: valve signal in, measured pressure, contraction and force out."""
 
 from collections.abc import Sequence
-from functools import partial
 import sys
 from typing import Any
 
@@ -24,7 +23,7 @@ from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.parameters import NodeParameter
-from pam_actuation.nodes.physics_node import Arrived, MAX_SEED, PhysicsNode
+from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
 from pam_actuation.nodes.simulated_time import PlantTime
@@ -64,18 +63,9 @@ class PlantSimulator(PhysicsNode):
             raise InputError('0 is allowed in lockstep only', 'parameter clock_rate')
 
     def setup(self) -> None:
-        """Load the rig, create the sensors' publishers."""
-        from pam_actuation.plant_loop import PlantLoop
+        """Load the rig, create the topics and what steers the clock."""
         from pam_sim import load_rig
-        rig = load_rig(self.value('rig'), valve=self.value('valve_type'))
-        rig.plant().step((0.0,) * len(rig.signal_names))     # compiled before time counts
-        self.plant = PlantLoop(rig, seed=self.value('seed'))
-        for topic in ('pressure', 'contraction', 'force'):
-            self.add_publisher(topic)
-        if rig.valve == 'hsv':
-            self.add_publisher('supply_pressure')
-        self.signals = self.add_subscription('valve_signal', writers=True)
-        self.disturbances = self.add_subscription('external_force')
+        self.set_up(load_rig(self.value('rig'), valve=self.value('valve_type')))
         if self.uses_simulated_time:
             self._clock_services = [
                 self.create_service(SetBool, '~/pause', self._on_pause),
@@ -101,7 +91,9 @@ class PlantSimulator(PhysicsNode):
         """Return the signal of the driver and, where there is one, the disturbance."""
         if lockstep.DRIVER not in self.participants:
             return []
-        return [lockstep.Stamped(self.signals), lockstep.StampedIfSent(self.disturbances)]
+        (signals, _), (disturbances, _) = (
+            self.inputs[topic] for topic in ('valve_signal', 'external_force'))
+        return [lockstep.Stamped(signals), lockstep.StampedIfSent(disturbances)]
 
     def _on_pause(self, request: Any, response: Any) -> Any:
         assert self.simulated_time is not None
@@ -130,10 +122,7 @@ class PlantSimulator(PhysicsNode):
 
     def tick(self) -> None:
         """Apply what arrived, run physics to the present, measure."""
-        arrived: list[Arrived] = [
-            (message, self.plant.set_external_force) for message, _ in self.disturbances.take()]
-        arrived += [(message, partial(self.plant.set_signal, writer=info['writer']))
-                    for message, info in self.signals.take()]
+        arrived = self.arrived()
         messages = self.measured(self.now_ns(), arrived)
         if not messages:
             return

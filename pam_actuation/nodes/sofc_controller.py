@@ -72,9 +72,10 @@ class SofcNode(LearningSwitch, ControllerNode):
     def diagnostic_values(self) -> Values:
         """Add whether the rules change, and how often learning took changes back."""
         values = (*super().diagnostic_values(), ('learning', self.learning))
-        if self.state is None:
+        if self.loop is None or self.loop.state is None:
             return values
-        internals = dict(zip(self.state.names, self.state.values))
+        state = self.loop.state
+        internals = dict(zip(state.names, state.values))
         return (*values, ('rules_rolled_back', f'{internals["times_rolled_back"]:.0f}'))
 
     def _answered(self, action: Callable[[], str]) -> Callable[[Any, Any], Any]:

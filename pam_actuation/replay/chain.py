@@ -32,11 +32,12 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
-from pam_actuation.loops.assembly import controller_loop, driver_loops, plant_loop
+from pam_actuation.loops.assembly import controller_loop, driver_loops
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, send_followed, signal_tick)
 from pam_actuation.messages import ControllerState, JointAngle, Message, Pressure, ValveSignal
+from pam_actuation.plant_loop import PlantLoop
 from pam_actuation.replay.arrivals import (
     ORDER, recorded_topics, recorded_topics_of_joint, RecordedTopic)
 from pam_actuation.replay.difference import Difference, difference
@@ -145,7 +146,7 @@ class RepeatedLoops:
         for place, driver in self._drivers.items():
             attach(self.bus, driver, place)
         if 'plant' in parts:
-            self._measure = attach_plant(self.bus, plant_loop(rig, seed))
+            self._measure = attach_plant(self.bus, PlantLoop(rig, seed))
         self._drive = {place: signal_tick(self.bus, driver, place)
                        for place, driver in self._drivers.items()}
         self._decide: Callable[[int, bool], None] | None = None

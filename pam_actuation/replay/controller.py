@@ -27,9 +27,10 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.modes.tracked import TRACKED, tracked_by
+from pam_actuation.control.modes.tracked import TRACKED, Tracked, tracked_by
 from pam_actuation.control.tick import (
-    HELD_BACK, input_names, join_stamp, reference_names, RUNNING, TickCore, TickInputs)
+    HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED, TickCore,
+    TickInputs)
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
@@ -40,11 +41,8 @@ if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
     from pam_sim.run import Run, Series
 
-# Input of a tick -> (topic it came from, field of that topic).
-_MEASURED = {
-    'contraction': ('contraction_m', 'contraction_m'),
-    'pressure': ('pressure_pa', 'pressure_pa'),
-    'force': ('force_n', 'force_n')}
+# Topic of an input of a tick -> field of its messages.
+_MEASURED = {'contraction': 'contraction_m', 'pressure': 'pressure_pa', 'force': 'force_n'}
 _PROGRESS_EVERY = 2000    # ticks
 
 
@@ -142,15 +140,15 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
         chosen = load_controller(controller, load_rig(rig_text) if rig_text else None)
     else:
         chosen = controller
-    unit = tracked_by(chosen).unit
-    columns = _columns(states, unit, run.path)
+    tracked = tracked_by(chosen)
+    columns = _columns(states, tracked, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     check_complete(columns, order, run.path)
     lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
     command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
 
     rises_slowly = HELD_BACK in states.values       # versions before did not
-    core = TickCore(chosen, rises_slowly)
+    core = TickCore(MuscleLaw(chosen), rises_slowly)
     sent_after = SlowRise(active=False)     # what made the recorded commands of those of the law
     compare = tuple(core.names) if own else ()
     lacking = [name for name in compare if name not in columns]
@@ -164,7 +162,7 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     for place, row in enumerate(order.tolist()):
         if progress is not None and place % _PROGRESS_EVERY == 0:
             progress(place / len(order))
-        command_pa, values = core.run(_inputs(columns, row, lookups, unit, run.path))
+        (command_pa,), values = core.run(_inputs(columns, row, lookups, tracked, run.path))
         replayed[place] = command_pa
         if keep_states:
             kept[place] = values
@@ -195,15 +193,15 @@ def _same(a: float, b: float) -> bool:
     return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
 
 
-def _columns(states: 'Series', unit: str, path: str) -> dict[str, FloatArray]:
+def _columns(states: 'Series', tracked: Tracked, path: str) -> dict[str, FloatArray]:
     """Return the columns of ``controller_state``, refusing foreign ones."""
-    if f'reference_{unit}' not in states.values and any(
+    if f'reference_{tracked.unit}' not in states.values and any(
             f'reference_{one.unit}' in states.values for one in TRACKED.values()):
         raise InputError('the recorded controller and this one track different quantities', path)
     columns = dict(states.values)
     # Recordings from before it existed: every command was taken to be followed.
     columns.setdefault(HELD_BACK, np.zeros(len(states.stamp_ns)))
-    missing = [name for name in input_names(unit) if name not in columns]
+    missing = [name for name in input_names(tracked) if name not in columns]
     if missing:
         raise InputError(
             f'controller_state is not from a controller of this project: it lacks {missing[0]}',
@@ -235,30 +233,29 @@ def _lookup(run: 'Run', topic: str) -> dict[int, float]:
     if topic not in run:
         return {}
     series = run.topics[topic]
-    return dict(zip(series.stamp_ns.tolist(), series.values[_MEASURED[topic][1]].tolist()))
+    return dict(zip(series.stamp_ns.tolist(), series.values[_MEASURED[topic]].tolist()))
 
 
 def _inputs(columns: dict[str, FloatArray], row: int, lookups: dict[str, dict[int, float]],
-            unit: str, path: str) -> TickInputs:
+            tracked: Tracked, path: str) -> TickInputs:
     """Return the ``TickInputs`` of one recorded tick, measurements taken from their topics."""
     stamps = tuple(
         join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])
-        for name in ('contraction', 'pressure', 'force', 'reference', 'reference_trajectory'))
-    inputs = TickInputs(
-        reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
-        restarted=bool(columns['restarted'][row]), stamps_ns=stamps,
-        held_back=float(columns[HELD_BACK][row]))
-    inputs.elapsed_s = float(columns['elapsed_s'][row])
-    fields = ('reference', 'reference_rate', 'lead_reference', 'lead_reference_rate')
-    for field_name, name in zip(fields, reference_names(unit)):
-        setattr(inputs, field_name, float(columns[name][row]))
-    for (topic, (target, _)), stamp_ns in zip(_MEASURED.items(), stamps):
-        if stamp_ns < 0:
+        for name in STAMPED)
+    measured = dict.fromkeys(_MEASURED, np.nan)
+    for topic, stamp_ns in zip(STAMPED, stamps):
+        if stamp_ns < 0 or topic not in measured:
             continue
         value = lookups[topic].get(stamp_ns)
         if value is None:
             raise InputError(
                 f'the {topic} message of stamp {stamp_ns} ns that controller tick '
                 f'{int(columns["tick"][row])} used is not in the recording', path)
-        setattr(inputs, target, value)
-    return inputs
+        measured[topic] = value
+    reference, rate, lead_reference, lead_rate = (
+        float(columns[name][row]) for name in reference_names(tracked.unit))
+    return TickInputs(
+        int(columns['input_reason'][row]), bool(columns['learning'][row]),
+        bool(columns['restarted'][row]), stamps, measured['contraction'], reference, rate,
+        lead_reference, lead_rate, float(columns['elapsed_s'][row]), (measured['pressure'],),
+        (measured['force'],), float(columns[HELD_BACK][row]))

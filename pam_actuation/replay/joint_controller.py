@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
-from pam_actuation.control.joint_tick import (
-    ADDED_NAMES, CO_CONTRACTION, JointTickCore, JointTickInputs, Measured, MEASURED_NAMES, PROVES)
-from pam_actuation.control.tick import HELD_BACK, join_stamp
+from pam_actuation.control.joint_law import ADDED_NAMES, CO_CONTRACTION, JointLaw, PROVES
+from pam_actuation.control.tick import (
+    Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
 from pam_actuation.replay.chain import ChainReplay, same_bits
 from pam_actuation.replay.controller import check_complete
 from pam_sim.annotations import FloatArray, IntArray
@@ -105,7 +105,7 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
     sent_at = {topic: dict(zip(run.topics[topic].stamp_ns.tolist(),
                                run.topics[topic].values['pressure_pa'].tolist()))
                for topic in COMMANDS if topic in run}
-    core = JointTickCore(controller, joint)
+    core = TickCore(JointLaw(controller, joint))
     compared = [(name, columns[name], core.names.index(name))
                 for name in core.names if name in columns]
     differing: dict[str, int] = {}
@@ -130,24 +130,29 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
 
 
 def _inputs(columns: dict[str, FloatArray], row: int, angle_at: dict[int, float],
-            path: str) -> JointTickInputs:
-    """Return the ``JointTickInputs`` of one recorded tick, the angle taken from its topic."""
+            path: str) -> TickInputs:
+    """Return the ``TickInputs`` of one recorded tick, the angle taken from its topic."""
+    def numbers(*names: str) -> tuple[float, ...]:
+        return tuple(float(columns[name][row]) for name in names)
+
     angle_ns, effort_ns = (
         join_stamp(columns[f'{name}_stamp_sec'][row], columns[f'{name}_stamp_nanosec'][row])
         for name in (MEASURED, 'joint_effort'))
-    measured = Measured(*(float(columns[name][row]) for name in MEASURED_NAMES))
+    (angle_rad,) = numbers('angle_rad')
     if angle_ns >= 0:
-        angle_rad = angle_at.get(angle_ns)
-        if angle_rad is None:
+        if angle_ns not in angle_at:
             raise InputError(
                 f'the {MEASURED} message of stamp {angle_ns} ns that controller tick '
                 f'{int(columns["tick"][row])} used is not in the recording', path)
-        measured = measured._replace(angle_rad=angle_rad)
-    flexor, extensor = (bool(columns[name][row]) for name in PROVES)
-    return JointTickInputs(
-        reason=int(columns['input_reason'][row]), learning=bool(columns['learning'][row]),
-        restarted=bool(columns['restarted'][row]), angle_stamp_ns=angle_ns, measured=measured,
-        held_back=float(columns[HELD_BACK][row]),
-        follows_torque=bool(columns['follows_torque'][row]), effort_stamp_ns=effort_ns,
-        torque_n_m=float(columns['wanted_torque_n_m'][row]),
-        co_contraction_pa=float(columns[CO_CONTRACTION][row]), proves=(flexor, extensor))
+        angle_rad = angle_at[angle_ns]
+    reason, learning, restarted, elapsed_s, held_back, follows, torque_n_m, co_contraction_pa = (
+        numbers('input_reason', 'learning', 'restarted', 'elapsed_s', HELD_BACK,
+                'follows_torque', 'wanted_torque_n_m', CO_CONTRACTION))
+    reference, rate, lead_reference, lead_rate = numbers(*reference_names('rad'))
+    return TickInputs(
+        int(reason), bool(learning), bool(restarted), (angle_ns,), angle_rad, reference, rate,
+        lead_reference, lead_rate, elapsed_s,
+        pressures_pa=numbers(*(f'{side}_pressure_pa' for side in SIDES)),
+        forces_n=numbers(*(f'{side}_force_n' for side in SIDES)), held_back=held_back,
+        proves=[bool(proof) for proof in numbers(*PROVES)],
+        effort=Effort(bool(follows), effort_ns, torque_n_m), co_contraction_pa=co_contraction_pa)

@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.joint_plant_loop import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
 from pam_actuation.tuning.closed_loop import Course
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
@@ -37,6 +36,7 @@ from pam_actuation.tuning.mode_result import ModeResult
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
+from pam_sim.sensors.encoder import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
 
 if TYPE_CHECKING:
     from pam_actuation.control.modes.joint import JointController

@@ -29,8 +29,8 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import attach, attach_plant, signal_tick
-from pam_actuation.messages import Pressure, START_NS, ValveSignal
-from pam_actuation.plant_loop import muscle_readings, PlantLoop
+from pam_actuation.messages import Message, Pressure, START_NS, ValveSignal
+from pam_actuation.plant_loop import PlantLoop
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.response import Response
@@ -97,17 +97,18 @@ class _RecordedPlant(PlantLoop):
     def __init__(self, rig: Rig, seed: int, **initial: Any) -> None:
         super().__init__(rig, seed, _LONGEST_S, **initial)
         self._rows: list[FloatArray] = [self.plant.outputs[np.newaxis]]
-        self._signals: list[tuple[float, ...]] = []
+        self._acted: list[tuple[float, ...]] = []
 
     def step(self, count: int) -> None:
         """Advance the plant by some steps with the signal held."""
-        self._rows.append(self.plant.roll(self.signal, steps=count))
-        self._signals += [self.signal] * count
+        signal = self.muscles[''].signal.efforts
+        self._rows.append(self.plant.roll(signal, steps=count))
+        self._acted += [signal] * count
 
     def taken(self) -> tuple[FloatArray, FloatArray]:
         """Return (outputs, signals) since the last call; outputs begin with the row before."""
-        outputs, signals = np.concatenate(self._rows), np.array(self._signals, dtype=float)
-        self._rows, self._signals = [self.plant.outputs[np.newaxis]], []
+        outputs, signals = np.concatenate(self._rows), np.array(self._acted, dtype=float)
+        self._rows, self._acted = [self.plant.outputs[np.newaxis]], []
         return outputs, signals
 
 
@@ -132,8 +133,9 @@ class Chain:
         """Call the driver one period before the start: it knows the time of a tick then."""
         before_ns = self._time_ns(-self._every)
         if self._every % SENSOR_EVERY == 0:
-            for topic, message in muscle_readings(
-                    self._plant.plant, self._plant.sensors, before_ns, 0.0).items():
+            readings: dict[str, Message] = {}
+            self._plant.muscles[''].read(readings, before_ns, 0.0)
+            for topic, message in readings.items():
                 self._bus.send(topic, message, before_ns)
         self._bus.send('pressure_command', Pressure(before_ns, command_pa), before_ns)
         self._bus.deliver(before_ns)

@@ -24,6 +24,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
+from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.step import Arrays
 from pam_sim.plant import Plant
 from pam_sim.records import cells, zeros
@@ -91,6 +92,11 @@ class JointPlant:
         kernel.joint_look(*self.arrays)
 
     @property
+    def muscles(self) -> dict[str, Plant]:
+        """Return the plant of each muscle, by its place as in ``JointRig.muscles``."""
+        return {f'{side}/': getattr(self, side) for side in SIDES}
+
+    @property
     def arrays(self) -> tuple[Arrays, Arrays, Arrays]:
         """Arguments of the compiled step: joint, flexor, extensor."""
         return ((self._inp, self.state, self.par, self._out), self.flexor.arrays,
@@ -98,9 +104,9 @@ class JointPlant:
 
     def step(self, flexor_signal: float | Sequence[float],
              extensor_signal: float | Sequence[float],
-             external_torque_n_m: float = 0.0) -> None:
+             external_torque_n_m: float = 0.0, steps: int = 1) -> None:
         """
-        Advance by ``dt_s`` with the valve signals held.
+        Advance by ``steps`` times ``dt_s`` with the valve signals held.
 
         Parameters
         ----------
@@ -108,6 +114,8 @@ class JointPlant:
             PPR: voltage [V] (or a tuple of it); HSV: (fill duty, vent duty), 0..1.
         external_torque_n_m : float
             On the limb, N m, flexion positive.
+        steps : int
+            How many, 1 or more; faster than as many calls, with the same numbers.
 
         Raises
         ------
@@ -131,8 +139,10 @@ class JointPlant:
             for place, value in zip(places, values):
                 place[...] = value
         self._given.torque_n_m[...] = external_torque_n_m
-        kernel.joint_step(*self.arrays)
-        if not all(np.isfinite(out).all() for *_, out in self.arrays):
+        arrays = self.arrays
+        for _ in range(steps):
+            kernel.joint_step(*arrays)
+        if not all(np.isfinite(out).all() for *_, out in arrays):
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no joint that can be stepped',
                              f'joint {self.joint.name}')

@@ -15,14 +15,14 @@
 """A joint of the classes of the live nodes, in which drivers, sensors and controller may fail."""
 
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.joint_loop import JointControllerLoop
+from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.watchdog import SignalWatchdog
-from pam_actuation.joint_plant_loop import JointPlantLoop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach_plant, driver_tick
 from pam_actuation.messages import AngleReference, START_NS
+from pam_actuation.plant_loop import PlantLoop
 from pam_sim.joint import load_joint
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
@@ -52,8 +52,8 @@ class FaultyJoint:
     def __init__(self, valve, wanted=lambda time_s: 0.1, seed=3):
         self.joint = joint = load_joint('joint_dmsp_5_300_realistic', valve=valve)
         self.wanted = wanted
-        self.plant = JointPlantLoop(joint, seed=seed)
-        self.control = JointControllerLoop(load_controller(f'sofc_joint_{valve}', joint), joint)
+        self.plant = PlantLoop(joint, seed=seed)
+        self.control = ControllerLoop(load_controller(f'sofc_joint_{valve}', joint), joint)
         self.drivers = {side: DriverLoop(valve, driver_config(rig))
                         for side, rig in zip(SIDES, (joint.flexor, joint.extensor))}
         self.spoil, self.stopped, self.late_ns = {}, set(), dict.fromkeys(SIDES, 0)
@@ -107,13 +107,17 @@ class FaultyJoint:
         self.angle_rad.append(plant.angle_rad)
         if 'controller' in self.stopped:
             return
-        wanted = self.wanted((now_ns - START_NS) * 1e-9)
-        self.control.on_joint_reference(AngleReference(now_ns, wanted, 0.0))
+        self.control.take(*self.ask(now_ns))
         commands, self.state = self.control.tick(now_ns)
         self.commands_pa.append([command.pressure_pa for command in commands])
         self.reasons.append(self.control.reason)
         for side, command in zip(SIDES, commands):
             self._bus.send(f'{side}/pressure_command', command, now_ns)
+
+    def ask(self, now_ns):
+        """Return topic and message of what is wanted now."""
+        wanted = self.wanted((now_ns - START_NS) * 1e-9)
+        return 'joint_reference', AngleReference(now_ns, wanted, 0.0)
 
     def run(self, duration_s):
         """Go on for a while."""

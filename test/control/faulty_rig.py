@@ -82,8 +82,8 @@ class FaultyRig:
                 self._measure(now_ns, fault if topics else '', topics)
                 self.reference_m.append(wanted[0])
             if self._ms % 5 == 0 and fault != 'stopped':
-                self.control.on_reference(Reference(now_ns, *wanted))
-                command, state = self.control.tick(now_ns)
+                self.control.take('reference', Reference(now_ns, *wanted))
+                (command,), state = self.control.tick(now_ns)
                 self.internals = dict(zip(state.names, state.values))
                 if fault != 'apart':
                     self.driver.on_command(command)
@@ -91,7 +91,7 @@ class FaultyRig:
             if self._ms % round(self.driver.period_s * 1e3) == 0:
                 self.plant.set_signal(self.driver.tick(now_ns)[0])
                 if self._tells and fault != 'apart':
-                    self.control.on_followed_pressure(self.driver.followed())
+                    self.control.take('followed_pressure', self.driver.followed())
             self._ms += 1
         return self
 
@@ -109,9 +109,8 @@ class FaultyRig:
             if message is None:
                 continue
             for loop in (self.driver, self.control):
-                take = {'supply_pressure': 'on_supply'}.get(topic, f'on_{topic}')
-                if hasattr(loop, take):
-                    getattr(loop, take)(message)
+                if topic in loop.takes():
+                    loop.takes()[topic](message)
 
     def excursion_m(self, since_s):
         """Return how far it went beyond all that was wanted since a time."""

@@ -30,8 +30,8 @@ START = 1_700_000_000_000_000_123
 
 def ready(contraction=0.01):
     loop = ControllerLoop(sofc())
-    loop.on_contraction(Contraction(START, contraction))
-    loop.on_reference(Reference(START, 0.01, 0.0))
+    loop.take('contraction', Contraction(START, contraction))
+    loop.take('reference', Reference(START, 0.01, 0.0))
     return loop
 
 
@@ -41,14 +41,14 @@ def by_name(state):
 
 def test_vented_and_says_why_until_there_are_contraction_and_reference():
     loop = ControllerLoop(sofc())
-    command, _ = loop.tick(START)
+    (command,), _ = loop.tick(START)
     assert command.pressure_pa == P_ATM_PA
     assert not loop.valid and 'no contraction' in loop.reason
-    loop.on_contraction(Contraction(START, 0.01))
-    assert loop.tick(START + MS)[0].pressure_pa == P_ATM_PA
+    loop.take('contraction', Contraction(START, 0.01))
+    assert loop.tick(START + MS)[0][0].pressure_pa == P_ATM_PA
     assert 'no reference' in loop.reason
-    loop.on_reference(Reference(START, 0.01, 0.0))
-    assert loop.tick(START + 2 * MS)[0].pressure_pa > P_ATM_PA
+    loop.take('reference', Reference(START, 0.01, 0.0))
+    assert loop.tick(START + 2 * MS)[0][0].pressure_pa > P_ATM_PA
     assert loop.valid and loop.reason == 'ok'
 
 
@@ -59,21 +59,21 @@ def test_vented_and_says_why_until_there_are_contraction_and_reference():
 def test_unusable_contraction_vents_and_recovers(message, words):
     loop = ready()
     loop.tick(START)
-    loop.on_contraction(message)
-    command, state = loop.tick(START)
+    loop.take('contraction', message)
+    (command,), state = loop.tick(START)
     assert command.pressure_pa == P_ATM_PA
     assert words in loop.reason
     assert by_name(state)['contraction_stamp_sec'] == -1.0
-    loop.on_contraction(Contraction(START, 0.01))
-    assert loop.tick(START)[0].pressure_pa > P_ATM_PA
+    loop.take('contraction', Contraction(START, 0.01))
+    assert loop.tick(START)[0][0].pressure_pa > P_ATM_PA
 
 
 def test_stale_pressure_is_not_used_but_does_not_stop_the_loop():
     loop = ready()
-    loop.on_pressure(Pressure(START - 200 * MS, 3e5))
+    loop.take('pressure', Pressure(START - 200 * MS, 3e5))
     _, state = loop.tick(START)
     assert loop.valid and math.isnan(by_name(state)['pressure_pa'])
-    loop.on_pressure(Pressure(START, 3e5))
+    loop.take('pressure', Pressure(START, 3e5))
     assert by_name(loop.tick(START + MS)[1])['pressure_pa'] == 3e5
 
 
@@ -82,7 +82,7 @@ def test_silent_reference_is_held_then_vented_then_resumed():
     reasons = {}
     for k in range(0, 600):
         now = START + k * 5 * MS
-        loop.on_contraction(Contraction(now, 0.01))
+        loop.take('contraction', Contraction(now, 0.01))
         _, state = loop.tick(now)
         reasons.setdefault(loop.reason, (k * 0.005, by_name(state)['learning'], loop.valid))
     assert reasons['ok'] == (0.0, 1.0, True)
@@ -90,15 +90,15 @@ def test_silent_reference_is_held_then_vented_then_resumed():
     assert at == pytest.approx(0.505) and learning == 0.0 and valid
     at, _, valid = reasons['reference lost, muscle vented']
     assert at == pytest.approx(2.005) and not valid
-    loop.on_reference(Reference(now, 0.01, 0.0))
+    loop.take('reference', Reference(now, 0.01, 0.0))
     loop.tick(now)
     assert loop.reason == 'ok'
 
 
 def test_reference_that_is_not_finite_is_ignored_and_counted():
     loop = ready()
-    loop.on_reference(Reference(START + MS, math.nan, 0.0))
-    loop.on_reference_trajectory(ReferenceTrajectory(START, (0, 0), (0.1, 0.2), (0.0, 0.0)))
+    loop.take('reference', Reference(START + MS, math.nan, 0.0))
+    loop.take('reference_trajectory', ReferenceTrajectory(START, (0, 0), (0.1, 0.2), (0.0, 0.0)))
     _, state = loop.tick(START + MS)
     assert loop.rejected_references == 2
     assert by_name(state)['reference_m'] == 0.01
@@ -108,23 +108,23 @@ def test_a_reference_from_the_future_does_not_keep_the_muscle_filled():
     loop = ready()
     loop.tick(START)
     now = START + MS
-    loop.on_reference(Reference(now + 3600_000 * MS, 0.02, -0.05))
-    loop.on_reference_trajectory(ReferenceTrajectory(
+    loop.take('reference', Reference(now + 3600_000 * MS, 0.02, -0.05))
+    loop.take('reference_trajectory', ReferenceTrajectory(
         now + 3600_000 * MS, (0, 500 * MS), (0.01, 0.02), (0.02, 0.02)))
     _, state = loop.tick(now)
     assert loop.reason == 'ok' and by_name(state)['reference_m'] == 0.01    # the one before
     assert loop.rejected_references == 2 and 's ahead' in loop.references.refusal
     now += 2100 * MS
-    loop.on_contraction(Contraction(now, 0.01))
-    command, _ = loop.tick(now)
+    loop.take('contraction', Contraction(now, 0.01))
+    (command,), _ = loop.tick(now)
     assert loop.reason == 'reference lost, muscle vented' and command.pressure_pa == P_ATM_PA
 
 
 def test_a_reference_a_little_ahead_counts_and_one_of_a_clock_set_back_does_not():
     loop = ready()
-    loop.on_reference(Reference(START + 15 * MS, 0.012, 0.0))
+    loop.take('reference', Reference(START + 15 * MS, 0.012, 0.0))
     assert by_name(loop.tick(START)[1])['reference_m'] == 0.012
-    loop.on_contraction(Contraction(START - 60_000 * MS, 0.01))
+    loop.take('contraction', Contraction(START - 60_000 * MS, 0.01))
     loop.tick(START - 60_000 * MS)
     assert loop.reason == 'no reference yet' and loop.rejected_references == 0
 
@@ -132,8 +132,8 @@ def test_a_reference_a_little_ahead_counts_and_one_of_a_clock_set_back_does_not(
 @pytest.mark.parametrize('wanted', [14.0, -0.02, 0.11])
 def test_a_contraction_no_muscle_has_is_refused(wanted):
     loop = ready()
-    loop.on_reference(Reference(START + MS, wanted, 0.0))
-    loop.on_reference_trajectory(ReferenceTrajectory(
+    loop.take('reference', Reference(START + MS, wanted, 0.0))
+    loop.take('reference_trajectory', ReferenceTrajectory(
         START, (0, 500 * MS), (0.01, wanted), (0.0, 0.0)))
     _, state = loop.tick(START + MS)
     assert by_name(state)['reference_m'] == 0.01 and loop.rejected_references == 2
@@ -145,17 +145,17 @@ def test_a_loop_that_forgot_waits_for_new_inputs():
     loop.tick(START)
     assert loop.reason == 'ok'
     loop.forget()
-    command, _ = loop.tick(START + MS)
+    (command,), _ = loop.tick(START + MS)
     assert loop.reason == 'no contraction measured yet' and command.pressure_pa == P_ATM_PA
-    loop.on_contraction(Contraction(START + MS, 0.01))
+    loop.take('contraction', Contraction(START + MS, 0.01))
     loop.tick(START + MS)
     assert loop.reason == 'no reference yet'
 
 
 def test_error_belongs_to_the_measurement_and_preview_to_now():
     loop = ControllerLoop(sofc({'lead_s': 0.1}))
-    loop.on_contraction(Contraction(START - 4 * MS, 0.01))
-    loop.on_reference(Reference(START, 0.01, 0.05))
+    loop.take('contraction', Contraction(START - 4 * MS, 0.01))
+    loop.take('reference', Reference(START, 0.01, 0.05))
     values = by_name(loop.tick(START + MS)[1])
     assert values['reference_m'] == pytest.approx(0.01 - 0.05 * 0.004)
     assert values['lead_reference_m'] == pytest.approx(0.01 + 0.05 * 0.101)
@@ -221,10 +221,10 @@ def test_a_loop_that_stood_still_starts_bumplessly():
     loop = ready()
     loop.tick(START)
     later = START + 900 * MS
-    loop.on_contraction(Contraction(later, 0.004))
-    loop.on_pressure(Pressure(later, 3e5))
-    loop.on_reference(Reference(later, 0.02, 0.0))
-    command, state = loop.tick(later)
+    loop.take('contraction', Contraction(later, 0.004))
+    loop.take('pressure', Pressure(later, 3e5))
+    loop.take('reference', Reference(later, 0.02, 0.0))
+    (command,), state = loop.tick(later)
     assert by_name(state)['restarted'] == 1.0
     assert abs(command.pressure_pa - 3e5) < 2e4
 
@@ -234,10 +234,10 @@ def swing(loop, start_ns, duration_s, contraction, pressure_pa):
     seen = []
     for k in range(round(duration_s / 0.005)):
         now = start_ns + k * 5 * MS
-        loop.on_contraction(Contraction(now, contraction(k * 0.005)))
-        loop.on_pressure(Pressure(now, pressure_pa(k * 0.005)))
-        loop.on_reference(Reference(now, 0.01, 0.0))
-        command, _ = loop.tick(now)
+        loop.take('contraction', Contraction(now, contraction(k * 0.005)))
+        loop.take('pressure', Pressure(now, pressure_pa(k * 0.005)))
+        loop.take('reference', Reference(now, 0.01, 0.0))
+        (command,), _ = loop.tick(now)
         seen.append((k * 0.005, loop.reason, command.pressure_pa))
     return seen
 

@@ -129,19 +129,19 @@ def test_stiffness_is_the_slope_of_the_static_force(rig):
 
 def ready(rig):
     loop = ControllerLoop(load_controller(TEXT, rig))
-    loop.on_reference(Reference(START, force_n=20.0))
+    loop.take('reference', Reference(START, force_n=20.0))
     return loop
 
 
 def test_the_loop_needs_a_force_and_no_contraction(rig):
     loop = ready(rig)
-    loop.on_contraction(Contraction(START, 0.01))
-    assert loop.tick(START)[0].pressure_pa == P_ATM_PA
+    loop.take('contraction', Contraction(START, 0.01))
+    assert loop.tick(START)[0][0].pressure_pa == P_ATM_PA
     assert not loop.valid and loop.reason == 'no force measured yet'
     loop = ready(rig)
-    loop.on_force(Force(START, 15.0))
-    loop.on_pressure(Pressure(START, 2e5))
-    command, state = loop.tick(START)
+    loop.take('force', Force(START, 15.0))
+    loop.take('pressure', Pressure(START, 2e5))
+    (command,), state = loop.tick(START)
     assert loop.valid and command.pressure_pa > P_ATM_PA
     state = by_name(state.names, state.values)
     assert state['reference_n'] == 20.0 and 'reference_m' not in state
@@ -153,20 +153,20 @@ def test_the_loop_needs_a_force_and_no_contraction(rig):
     (Force(START, math.nan), 'finite'), (Force(START, 1e4), 'outside')])
 def test_an_unusable_force_vents_and_recovers(rig, message, words):
     loop = ready(rig)
-    loop.on_force(Force(START, 15.0))
-    loop.on_pressure(Pressure(START, 2e5))
+    loop.take('force', Force(START, 15.0))
+    loop.take('pressure', Pressure(START, 2e5))
     loop.tick(START)
-    loop.on_force(message)
-    assert loop.tick(START)[0].pressure_pa == P_ATM_PA
+    loop.take('force', message)
+    assert loop.tick(START)[0][0].pressure_pa == P_ATM_PA
     assert 'force' in loop.reason and words in loop.reason
-    loop.on_force(Force(START, 15.0))
-    assert loop.tick(START)[0].pressure_pa > P_ATM_PA
+    loop.take('force', Force(START, 15.0))
+    assert loop.tick(START)[0][0].pressure_pa > P_ATM_PA
 
 
 def test_a_reference_in_metres_says_nothing_to_force_mode(rig):
     loop = ControllerLoop(load_controller(TEXT, rig))
-    loop.on_force(Force(START, 15.0))
-    loop.on_reference(Reference(START, 0.01, 0.0))
+    loop.take('force', Force(START, 15.0))
+    loop.take('reference', Reference(START, 0.01, 0.0))
     loop.tick(START)
     assert loop.rejected_references == 1 and 'no reference' in loop.reason
 

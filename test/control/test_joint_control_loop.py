@@ -19,17 +19,16 @@ import math
 import numpy as np
 from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.joint_loop import JointControllerLoop
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.control.modes.joint import EXTENSOR, FLEXOR
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.messages import (
-    AngleReference, JointAngle, NamedEfforts, Pressure, START_NS)
+    AngleReference, Force, JointAngle, NamedEfforts, Pressure, START_NS)
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -43,7 +42,7 @@ def joint():
 
 @pytest.fixture
 def loop(joint):
-    return JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint)
+    return ControllerLoop(load_controller('sofc_joint_ppr', joint), joint)
 
 
 class Bench(JointLoops):
@@ -57,7 +56,7 @@ class Bench(JointLoops):
         """Run one period; return the true angle [rad] and the commands."""
         if self.reference is not None:
             for topic, plain in self.reference.tick(self.now_ns + self.period_ns).items():
-                getattr(self.control, f'on_{topic}')(plain)
+                self.control.take(topic, plain)
         commands = super().tick(**instead)
         return self.plant.plant.angle_rad, commands
 
@@ -83,7 +82,7 @@ def test_it_tracks_a_sine_of_the_joint(joint, loop):
     (lambda now: JointAngle(now + 200 * MS_NS, 0.0), codes.ANGLE_AHEAD)])
 def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, reason):
     bench = Bench(joint, loop)
-    loop.on_joint_reference(AngleReference(START_NS, 0.1, 0.0))
+    loop.take('joint_reference', AngleReference(START_NS, 0.1, 0.0))
     for _ in range(20):
         _, commands = bench.tick()
     assert min(command.pressure_pa for command in commands) > P_ATM_PA + 10e3
@@ -95,15 +94,15 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
     assert bench.internal('tick') == 21
 
 
-@pytest.mark.parametrize('stops', [FLEXOR, EXTENSOR])
+@pytest.mark.parametrize('stops', SIDES)
 @pytest.mark.parametrize('reading', [
     lambda now: Pressure(now, P_ATM_PA + 2e3),          # its driver has vented it
     lambda now: Pressure(1, P_ATM_PA + 100e3)])         # the readings have stopped
 def test_no_muscle_is_left_alone_under_air(joint, loop, stops, reading):
-    topic = ('flexor/pressure', 'extensor/pressure')[stops]
+    topic = f'{stops}/pressure'
     bench, highest, spoiled = Bench(joint, loop), [], {}
     for k in range(1700):
-        loop.on_joint_reference(AngleReference(bench.now_ns, 0.1, 0.0))
+        loop.take('joint_reference', AngleReference(bench.now_ns, 0.1, 0.0))
         if 200 <= k < 1000:
             spoiled = {topic: reading(bench.now_ns + bench.period_ns)}
         _, commands = bench.tick(**spoiled)
@@ -122,10 +121,10 @@ def test_a_frozen_encoder_vents_both_muscles_until_the_joint_moves_again(joint, 
     for k in range(2200):
         now = bench.now_ns
         wanted = 0.5 * math.sin(2.0 * math.pi * 0.5 * k * 0.005)
-        loop.on_joint_reference(AngleReference(now, wanted, 0.0))
+        loop.take('joint_reference', AngleReference(now, wanted, 0.0))
         if not 600 <= k < 1600:
             angle, commands = bench.tick()
-            held.append(loop._angle.angle_rad)
+            held.append(loop.measurement.value)
         else:
             angle, commands = bench.tick(
                 joint_state=JointAngle(now + bench.period_ns, held[-1]))
@@ -148,10 +147,10 @@ def test_what_a_joint_may_do_is_not_taken_for_a_frozen_encoder(joint, loop, angl
     for k in range(700):
         now = START_NS + k * 5 * MS_NS
         swing = swing_pa * math.sin(0.01 * k)
-        loop.on_joint_state(JointAngle(now, angle_rad))
-        loop.on_joint_reference(AngleReference(now, angle_rad, 0.0))
-        for side, pressure_pa in ((FLEXOR, 3e5 + swing / 2.0), (EXTENSOR, 3e5 - swing / 2.0)):
-            loop.on_pressure(side, Pressure(now, pressure_pa))
+        loop.take('joint_state', JointAngle(now, angle_rad))
+        loop.take('joint_reference', AngleReference(now, angle_rad, 0.0))
+        for side, pressure_pa in (('flexor', 3e5 + swing / 2.0), ('extensor', 3e5 - swing / 2.0)):
+            loop.take(f'{side}/pressure', Pressure(now, pressure_pa))
         loop.tick(now)
         assert loop.reason == codes.REASONS[codes.OK]
 
@@ -160,26 +159,26 @@ def test_a_frozen_encoder_is_not_forgotten_for_a_torque(joint, loop):
     def drive(begin, ticks, difference_pa, torque=False):
         for k in range(begin, begin + ticks):
             now = START_NS + k * 5 * MS_NS
-            loop.on_joint_state(JointAngle(now, 0.1))
+            loop.take('joint_state', JointAngle(now, 0.1))
             if torque:
-                loop.on_named_efforts(NamedEfforts(now, ('muscle',), (0.1,)))
+                loop.take('joint_effort', NamedEfforts(now, ('muscle',), (0.1,)))
             else:
-                loop.on_joint_reference(AngleReference(now, 0.3, 0.0))
-            for side, sign in ((FLEXOR, 0.5), (EXTENSOR, -0.5)):
-                loop.on_pressure(side, Pressure(now, 3e5 + sign * difference_pa(k - begin)))
+                loop.take('joint_reference', AngleReference(now, 0.3, 0.0))
+            for side, sign in (('flexor', 0.5), ('extensor', -0.5)):
+                loop.take(f'{side}/pressure', Pressure(now, 3e5 + sign * difference_pa(k - begin)))
             loop.tick(now)
 
     drive(0, 100, lambda k: 4e3 * k)
     assert loop.reason == codes.REASONS[codes.ANGLE_FROZEN]
     drive(300, 100, lambda k: 0.0, torque=True)
-    assert loop.follows_torque and loop.reason == codes.REASONS[codes.OK]
+    assert loop.setpoint.effort.follows and loop.reason == codes.REASONS[codes.OK]
     drive(800, 1, lambda k: 0.0)
-    assert not loop.follows_torque and loop.reason == codes.REASONS[codes.ANGLE_FROZEN]
+    assert not loop.setpoint.effort.follows and loop.reason == codes.REASONS[codes.ANGLE_FROZEN]
 
 
 @pytest.mark.parametrize('angle_rad', [20.0, -1.1])
 def test_an_angle_the_joint_does_not_have_is_refused_and_not_gone_to(joint, loop, angle_rad):
-    loop.on_joint_reference(AngleReference(START_NS, angle_rad, 0.0))
+    loop.take('joint_reference', AngleReference(START_NS, angle_rad, 0.0))
     assert loop.references.reference is None and loop.rejected_references == 1
     assert 'not within -1.02 to 1.02 rad' in loop.references.refusal
 
@@ -187,19 +186,35 @@ def test_an_angle_the_joint_does_not_have_is_refused_and_not_gone_to(joint, loop
 def test_a_blocked_joint_may_be_given_any_torque(joint, loop):
     for k in range(400):
         now = START_NS + k * 5 * MS_NS
-        loop.on_joint_state(JointAngle(now, 0.1))
-        loop.on_named_efforts(NamedEfforts(now, ('muscle',), (0.3 * math.sin(0.05 * k),)))
-        for side, sign in ((FLEXOR, 1.0), (EXTENSOR, -1.0)):
-            loop.on_pressure(side, Pressure(now, 4e5 + sign * 1e3 * k))
+        loop.take('joint_state', JointAngle(now, 0.1))
+        loop.take('joint_effort', NamedEfforts(now, ('muscle',), (0.3 * math.sin(0.05 * k),)))
+        for side, sign in (('flexor', 1.0), ('extensor', -1.0)):
+            loop.take(f'{side}/pressure', Pressure(now, 4e5 + sign * 1e3 * k))
         loop.tick(now)
         assert loop.reason == codes.REASONS[codes.OK]
+
+
+@pytest.mark.parametrize('value', [math.inf, -math.inf, math.nan])
+def test_a_reading_of_a_muscle_that_is_not_finite_is_not_used(joint, loop, value):
+    bench = Bench(joint, loop)
+    for _ in range(20):
+        loop.take('joint_reference', AngleReference(bench.now_ns, 0.1, 0.0))
+        bench.tick()
+    before_pa = bench.internal('flexor_pressure_pa')
+    now_ns = bench.now_ns + bench.period_ns
+    _, commands = bench.tick(**{'flexor/pressure': Pressure(now_ns, value),
+                                'extensor/force': Force(now_ns, value)})
+    assert before_pa > P_ATM_PA and loop.reason == codes.REASONS[codes.OK]
+    assert math.isnan(bench.internal('flexor_pressure_pa'))
+    assert math.isnan(bench.internal('extensor_force_n'))
+    assert all(math.isfinite(command.pressure_pa) for command in commands)
 
 
 def test_without_reference_or_with_one_long_lost_it_vents(joint, loop):
     bench = Bench(joint, loop)
     bench.tick()
     assert loop.reason == codes.REASONS[codes.NO_REFERENCE]
-    loop.on_joint_reference(AngleReference(bench.now_ns, 0.1, 0.0))
+    loop.take('joint_reference', AngleReference(bench.now_ns, 0.1, 0.0))
     seen = []
     for _ in range(460):
         _, commands = bench.tick()
@@ -210,7 +225,7 @@ def test_without_reference_or_with_one_long_lost_it_vents(joint, loop):
 
 
 def test_a_reference_that_is_not_finite_is_counted_and_ignored(loop):
-    loop.on_joint_reference(AngleReference(START_NS, math.inf, 0.0))
+    loop.take('joint_reference', AngleReference(START_NS, math.inf, 0.0))
     assert loop.rejected_references == 1
     assert loop.references.reference is None
 
@@ -219,9 +234,9 @@ def test_co_contraction_follows_what_is_asked_within_the_limits(joint, loop):
     bench = Bench(joint, loop)
     means = []
     for wanted in (300e3, 200e3, math.nan, 5e6):
-        loop.on_co_contraction(Pressure(bench.now_ns, P_ATM_PA + wanted))
+        loop.take('co_contraction', Pressure(bench.now_ns, P_ATM_PA + wanted))
         for _ in range(300):
-            loop.on_joint_reference(AngleReference(bench.now_ns, 0.0, 0.0))
+            loop.take('joint_reference', AngleReference(bench.now_ns, 0.0, 0.0))
             _, commands = bench.tick()
         means.append(np.mean([command.pressure_pa for command in commands]) - P_ATM_PA)
     assert means[0] == pytest.approx(300e3, abs=1.0)
@@ -232,7 +247,7 @@ def test_co_contraction_follows_what_is_asked_within_the_limits(joint, loop):
 
 def test_each_loop_refuses_the_controller_of_the_other(joint):
     with pytest.raises(InputError, match='single muscle'):
-        JointControllerLoop(load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic')), joint)
+        ControllerLoop(load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic')), joint)
     with pytest.raises(InputError, match='joint'):
         ControllerLoop(load_controller('sofc_joint_ppr', joint))
 

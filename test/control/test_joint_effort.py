@@ -20,7 +20,7 @@ import numpy as np
 from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.effort_buffer import EffortBuffer
-from pam_actuation.control.joint_loop import JointControllerLoop
+from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.messages import (
     AngleReference, NamedEfforts, NamedTrajectory, START_NS)
@@ -34,12 +34,12 @@ ANGLE_RAD = 0.2
 
 def loops(valve, parameters=None):
     joint = load_joint('joint_dmsp_5_300_realistic', valve=valve).with_(parameters=parameters)
-    return JointLoops(joint, JointControllerLoop(
+    return JointLoops(joint, ControllerLoop(
         load_controller(f'sofc_joint_{valve}', joint), joint, 'knee'), seed=3)
 
 
 def ask(bench, torque_n_m):
-    bench.control.on_named_efforts(NamedEfforts(bench.now_ns, ('knee',), (torque_n_m,)))
+    bench.control.take('joint_effort', NamedEfforts(bench.now_ns, ('knee',), (torque_n_m,)))
 
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
@@ -66,7 +66,7 @@ def test_an_angle_comes_first_every_change_is_bumpless_and_without_both_it_vents
         """Run some ticks with these wishes."""
         for _ in range(ticks):
             if angle:
-                bench.control.on_joint_reference(AngleReference(bench.now_ns, ANGLE_RAD, 0.0))
+                bench.control.take('joint_reference', AngleReference(bench.now_ns, ANGLE_RAD, 0.0))
             if torque:
                 ask(bench, 0.085)     # what the change jumps by grows with the speed of the joint
             pair = [command.pressure_pa for command in bench.tick()]
@@ -74,17 +74,17 @@ def test_an_angle_comes_first_every_change_is_bumpless_and_without_both_it_vents
 
     run(300, angle=True)
     run(20, angle=True, torque=True)        # both: the angle counts
-    assert seen[-1][0] == 0.0 and bench.control.efforts.rejected == 20
-    assert 'angle is wanted' in bench.control.efforts.refusal
+    assert seen[-1][0] == 0.0 and bench.control.setpoint.efforts.rejected == 20
+    assert 'angle is wanted' in bench.control.setpoint.efforts.refusal
     run(90, torque=True)                    # half a second after the last angle
     assert seen[-1][0] == 0.0
     run(100, torque=True)
-    assert seen[-1][0] == 1.0 and bench.control.efforts.refusal == ''
+    assert seen[-1][0] == 1.0 and bench.control.setpoint.efforts.refusal == ''
     assert bench.internal('flexor_command_pa') == seen[-1][1]
     assert bench.internal('learning') == 0.0
     present_rad = bench.internal('angle_rad')
-    bench.control.on_named_trajectory(
-        NamedTrajectory(bench.now_ns, (), ((100 * MS_NS, (ANGLE_RAD,), ()),)))
+    bench.control.take('joint_trajectory', NamedTrajectory(
+        bench.now_ns, (), ((100 * MS_NS, (ANGLE_RAD,), ()),)))
     run(30, angle=True, torque=True)        # at once, from where it is
     begin_rad = bench.control.references.trajectory.angle_rad[0]
     assert begin_rad == pytest.approx(present_rad, abs=5e-3)

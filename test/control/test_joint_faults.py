@@ -129,7 +129,7 @@ def _clock_right(rig, side):
 
 def _ends(rig, side):
     rig.stopped.add(side)
-    rig.plant.set_signal(side, rig.drivers[side].safe_signal(rig.now_ns))
+    rig.plant.set_signal(rig.drivers[side].safe_signal(rig.now_ns), place=f'{side}/')
 
 
 def _nothing(rig, side):
@@ -246,11 +246,12 @@ def test_a_muscle_whose_air_somebody_else_lets_out_is_not_left_to_the_other_one(
     """A dump valve or a lost supply: the driver knows of nothing."""
     rig = under_pressure(valve)
     safe = SAFE_EFFORTS[valve]
-    rig.plant.signals[side].take = lambda message, writer, now_ns: None
-    rig.plant.signals[side].efforts = safe
+    held = rig.plant.muscles[f'{side}/'].signal
+    held.take = lambda message, writer, now_ns: None
+    held.efforts = safe
     rig.run(1.0)
     both_stay_vented(rig, side)
-    del rig.plant.signals[side].take
+    del held.take
     comes_back(rig)
 
 
@@ -281,10 +282,9 @@ def test_a_stop_is_seen_where_no_pressure_was_ever_measured():
 def test_a_stop_vents_both_muscles_of_a_joint_that_gives_a_torque():
     rig = under_pressure('ppr')
     rig.control.references.clear()
-    rig.control.on_joint_reference = lambda message: rig.control.on_named_efforts(
-        NamedEfforts(message.stamp_ns, ('muscle',), (0.05,)))
+    rig.ask = lambda now_ns: ('joint_effort', NamedEfforts(now_ns, ('muscle',), (0.05,)))
     rig.run(0.5)
-    assert rig.control.follows_torque and min(rig.gauge_pa[-1]) > 100e3
+    assert rig.control.setpoint.effort.follows and min(rig.gauge_pa[-1]) > 100e3
     rig.drivers['extensor'].emergency_stop()
     rig.run(0.8)
     assert max(rig.gauge_pa[-1]) < 10e3
@@ -357,7 +357,7 @@ def test_a_joint_that_forgot_waits_for_new_inputs():
 
 def test_a_reference_from_the_future_does_not_keep_the_muscles_filled():
     rig = under_pressure('ppr')
-    rig.control.on_joint_reference(AngleReference(rig.now_ns + 3600 * SECOND, ANGLE_RAD, 0.0))
+    rig.control.take('joint_reference', AngleReference(rig.now_ns + 3600 * SECOND, ANGLE_RAD, 0.0))
     rig.wanted = lambda time_s: math.nan        # no other one is usable
     rig.run(3.0)
     assert rig.reasons[-1] == codes.REASONS[codes.REFERENCE_LOST]

@@ -63,6 +63,11 @@ class LiveRig:
         """Return the time since the start [s]."""
         return self._done * rig.STEP_S
 
+    @property
+    def muscles(self):
+        """Return the plant of each muscle by its place: this one."""
+        return {'': self}
+
     def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
         """
         Advance by ``steps`` times ``dt_s`` with the signal held.

@@ -27,7 +27,7 @@ from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.cli.main import main
 from pam_actuation.messages import NamedEfforts, Pressure
 from pam_actuation.nodes import qos
-from pam_actuation.nodes.joint_controller import GIVING
+from pam_actuation.nodes.controller_node import GIVING
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.replay.joint import replay_joint
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee

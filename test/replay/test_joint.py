@@ -24,8 +24,8 @@ from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.cli.main import main
 from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.joint_loop import JointControllerLoop
-from pam_actuation.control.joint_tick import ADDED_NAMES
+from pam_actuation.control.joint_law import ADDED_NAMES
+from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
@@ -152,19 +152,19 @@ def test_a_changed_recording_is_noticed(run):
 
 def test_torques_faults_and_co_contraction_are_reproduced_from_the_states_alone():
     joint = load_joint('joint_dmsp_5_300_realistic', valve='ppr')
-    control = JointControllerLoop(load_controller('sofc_joint_ppr', joint), joint, 'knee')
+    control = ControllerLoop(load_controller('sofc_joint_ppr', joint), joint, 'knee')
     told = {topic: [] for topic in ('joint_state', 'controller_state', *COMMANDS)}
-    text, taken = control.controller.to_yaml(), control.on_joint_state
-    control.on_joint_state = lambda plain: (told['joint_state'].append(plain), taken(plain))
-    loops = JointLoops(joint, control, seed=4)
+    text = control.controller.to_yaml()
+    loops = JointLoops(joint, control, seed=4, on_sent=lambda topic, message, now_ns: (
+        topic == 'joint_state' and told[topic].append(message)))
     for k in range(2400):
         now_ns = loops.now_ns + loops.period_ns
         if k < 600 or k > 2100:
-            control.on_joint_reference(AngleReference(now_ns, 0.2 * np.sin(0.02 * k), np.nan))
+            control.take('joint_reference', AngleReference(now_ns, 0.2 * np.sin(0.02 * k), np.nan))
         if k == 300:
-            control.on_co_contraction(Pressure(now_ns, 401325.7))
+            control.take('co_contraction', Pressure(now_ns, 401325.7))
         if k > 750:
-            control.on_named_efforts(NamedEfforts(now_ns, ('knee',), (0.1,)))
+            control.take('joint_effort', NamedEfforts(now_ns, ('knee',), (0.1,)))
         missing = {'flexor/pressure': None} if 1100 < k < 1250 else {}
         commands = loops.tick(**missing)
         told['controller_state'].append(loops.state)
