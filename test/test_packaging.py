@@ -315,7 +315,7 @@ def test_this_python_is_supported(setup_keywords):
 
 
 def test_the_printed_fault_table_is_the_one_the_driver_uses():
-    text = (ROOT / 'docs' / 'explanation' / 'safety.md').read_text(encoding='utf-8')
+    text = (ROOT / 'docs' / 'reference' / 'faults.md').read_text(encoding='utf-8')
     printed = re.search(
         r'<!-- fault table: begin -->\n(.*)<!-- fault table: end -->', text, re.S)[1]
     assert printed == fault_table_markdown(), 'copy what fault_table_markdown() returns'
