@@ -196,7 +196,8 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
             topic, info, stamp_ns, values, length_m)
         topics.append(info)
     muscles = namespaces(bag)
-    missing, notes = plausibility.missing_topics(muscles)
+    missing, notes = plausibility.missing_topics(
+        muscles, bag.experiment.get('valve', ''))
     remarks += missing
     if ending_of(bag.experiment).early:
         remarks.append(ending_of(bag.experiment).sentence)

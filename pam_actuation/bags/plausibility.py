@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pam_actuation.topics.table import NEEDED, OF_A_RUN, RECORDED, short_name, USED
+from pam_actuation.topics.table import (
+    NEEDED, OF_A_RUN, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.joint.parameters import SIDES
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
 if TYPE_CHECKING:
@@ -114,12 +116,26 @@ def topic_findings(topic: str, values: Mapping[str, FloatArray],
             for found in value_findings(topic, name, column, length_m)]
 
 
-def missing_topics(namespaces: Mapping[str, Collection[str]]) -> tuple[list[str], list[str]]:
+def missing_topics(namespaces: Mapping[str, Collection[str]],
+                   valve: str = '') -> tuple[list[str], list[str]]:
     """
     Return (remarks, notes): sentences on topics that are not there.
 
-    Notes are harmless: topics that a rig need not have. ``namespaces`` maps
-    each namespace to the set of its short names.
+    A muscle of a joint has no reference of its own, and a rig with a regulator no supply
+    pressure: they are not told as missing.
+
+    Parameters
+    ----------
+    namespaces : mapping of str to collection of str
+        The short names of the topics in each namespace.
+    valve : {'', 'ppr', 'hsv'}
+        Type of valve of the rig, empty where the bag does not say it.
+
+    Returns
+    -------
+    remarks, notes : list of str
+        Notes are harmless: topics that a rig need not have.
+
     """
     if not namespaces:
         return ['The bag has no messages on any topic of a muscle.'], []
@@ -127,8 +143,9 @@ def missing_topics(namespaces: Mapping[str, Collection[str]]) -> tuple[list[str]
     for namespace, present in sorted(namespaces.items()):
         if any(other.startswith(f'{namespace}/') for other in namespaces):
             continue        # a joint: its muscles have namespaces of their own
-        needed, optional = ([name for name, row in OF_A_RUN.items()
-                             if row.need == need and name not in present]
+        expected = [row for row in _topics_of_muscle(namespace, namespaces)
+                    if row.name not in present and (not valve or valve in row.valves)]
+        needed, optional = ([row.name for row in expected if row.need == need]
                             for need in (NEEDED, USED))
         if needed:
             remarks.append(
@@ -137,6 +154,14 @@ def missing_topics(namespaces: Mapping[str, Collection[str]]) -> tuple[list[str]
         if optional:
             notes.append(f'{namespace or "/"} has no messages on {", ".join(optional)}.')
     return remarks, notes
+
+
+def _topics_of_muscle(namespace: str, namespaces: Collection[str]) -> list[Topic]:
+    """Return what a recording of a muscle can hold, alone or as one of the two of a joint."""
+    joint, _, side = namespace.rpartition('/')
+    if side not in SIDES or not all(f'{joint}/{other}' in namespaces for other in SIDES):
+        return [*OF_A_RUN.values()]
+    return [row for row in OF_A_RUN.values() if f'{side}/{row.name}' in RECORDED_OF_JOINT]
 
 
 def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:

@@ -72,6 +72,8 @@ class Topic:
         Whether its numbers are internals of a node, which may be anything.
     drawn : bool
         Whether the layouts for other programs in ``config/layouts`` show it.
+    valves : tuple of str
+        Types of valve with which a rig has it.
     limits : dict of str to tuple of float
         Lowest and highest plausible number of a value, SI, where ``bags/plausibility.py`` does
         not know the value.
@@ -92,6 +94,7 @@ class Topic:
     missing: str = TOLD
     internals: bool = False
     drawn: bool = False
+    valves: tuple[str, ...] = ('ppr', 'hsv')
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     service: Service = USUAL
 
@@ -133,7 +136,7 @@ TOPICS = (
     Topic('force', _FORCE, 'measured force', SENSORS, CONTROLLERS, need=USED, steady=True,
           drawn=True),
     Topic('supply_pressure', _PRESSURE, 'measured supply pressure', SENSORS, DRIVER, need=USED,
-          drawn=True),
+          drawn=True, valves=('hsv',)),
     Topic('external_force', _FORCE, 'disturbance on the simulated load', REFERENCE,
           ('plant_simulator',), drawn=True),
     Topic('reference', Numbers(

@@ -245,6 +245,26 @@ def test_slow_and_missing_topics(tmp_path):
     assert info.notes == ['/muscle has no messages on force.']
 
 
+@pytest.mark.parametrize('valve, expected', [
+    ('ppr', []),
+    ('hsv', ['/knee/extensor has no messages on supply_pressure.',
+             '/knee/flexor has no messages on supply_pressure.'])])
+def test_a_muscle_of_a_joint_needs_no_reference_and_a_regulator_no_supply(
+        tmp_path, valve, expected):
+    left_out = ('reference', 'supply_pressure')
+    joint = bag_info(write_bag(
+        tmp_path / 'joint', namespaces=('/knee/flexor', '/knee/extensor'), leave_out=left_out,
+        valve=valve, metadata={'valve': valve}))
+    assert joint.notes == expected
+    alone = bag_info(write_bag(
+        tmp_path / 'alone', namespaces=('/flexor',), leave_out=left_out, valve=valve,
+        metadata={'valve': valve}))
+    also = 'supply_pressure, ' if valve == 'hsv' else ''
+    assert alone.notes == [f'/flexor has no messages on {also}reference.']
+    unsaid = bag_info(write_bag(tmp_path / 'unsaid', leave_out=left_out, metadata={}))
+    assert unsaid.notes == ['/muscle has no messages on supply_pressure, reference.']
+
+
 def test_foreign_topics_are_listed(tmp_path):
     with BagWriter(tmp_path / 'run', {}) as writer:
         writer.add_topic('/chatter', 'std_msgs/msg/String')
