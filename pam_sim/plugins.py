@@ -64,7 +64,15 @@ def plugin_files(own_folder: Path, variable: str, not_plugins: tuple[str, ...] =
 
 
 def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> ModuleType:
-    """Return the imported module of a plug-in file, of the package or from elsewhere."""
+    """
+    Return the imported module of a plug-in file, of the package or from elsewhere.
+
+    Raises
+    ------
+    InputError
+        A file from elsewhere is not Python, or declares what is not allowed.
+
+    """
     if path.parent == Path(own_folder):
         return importlib.import_module(f'{package}.{path.stem}')
     name = f'{prefix}_{path.stem}'
@@ -73,7 +81,14 @@ def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> Mo
         raise InputError('is no Python file', str(path))
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except (SyntaxError, InputError) as error:
+        del sys.modules[name]
+        if isinstance(error, InputError):
+            raise InputError(error.problem, error.where or path) from error
+        raise InputError(
+            f'is not valid Python: {error.msg}', f'{error.filename}:{error.lineno}') from error
     return module
 
 

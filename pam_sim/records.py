@@ -33,6 +33,7 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
 
 # A name; a name with the length of an array; a name with a record, or with so many of it.
 Declared = str | tuple[str, 'int | np.dtype[Any] | tuple[np.dtype[Any], int]']
@@ -55,7 +56,7 @@ def record(*declared: Declared) -> np.dtype[Any]:
 
     Raises
     ------
-    ValueError
+    InputError
         A name that records of numpy have for something else.
 
     """
@@ -63,7 +64,9 @@ def record(*declared: Declared) -> np.dtype[Any]:
     for one in declared:
         name = one if isinstance(one, str) else one[0]
         if hasattr(np.record, name):        # read as an attribute, it would be numpy's own
-            raise ValueError(f'`{name}` cannot be a field of a record: numpy has taken the name')
+            raise InputError(
+                f'`{name}` cannot name a number of a record, as numpy uses this name itself; '
+                f'allowed are other names, such as `{name}_value`')
         if isinstance(one, str):
             parts.append((one, np.float64))
         elif isinstance(one[1], int):

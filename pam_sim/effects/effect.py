@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
 
@@ -159,15 +160,28 @@ class Effect:
     hooks: dict[str, Callable[..., Any]] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        """Fill in the record of the packed values and check the declaration."""
+        """
+        Fill in the record of the packed values and check the declaration.
+
+        Raises
+        ------
+        InputError
+            Unknown subsystem, no amplitude, what is no parameter, or a name that numpy uses.
+
+        """
         if self.packed is _BY_PARAMETERS:
             object.__setattr__(self, 'packed', record(*(p.name for p in self.parameters)))
-        known = {parameter.name for parameter in self.parameters}
-        if self.subsystem not in SUBSYSTEMS or not self.amplitude or set(self.amplitude) - known:
-            raise ValueError(f'effect {self.name}: wrong subsystem or amplitude')
-        fitted = {free.name for free in self.fitting.free}
-        if (fitted | {*self.fitting.edges, *filter(None, [self.fitting.delay])}) - known:
-            raise ValueError(f'effect {self.name}: fits what is no parameter of it')
+        if self.subsystem not in SUBSYSTEMS:
+            raise InputError(f'effect `{self.name}` has the subsystem `{self.subsystem}`; '
+                             f'allowed: {", ".join(SUBSYSTEMS)}')
+        if not self.amplitude:
+            raise InputError(f'effect `{self.name}` has no amplitude; name at least one parameter')
+        known = [parameter.name for parameter in self.parameters]
+        fitted = [free.name for free in self.fitting.free]
+        for name in (*self.amplitude, *fitted, *self.fitting.edges, self.fitting.delay):
+            if name and name not in known:
+                raise InputError(f'effect `{self.name}` has no parameter `{name}`'
+                                 f'{did_you_mean(name, known)}; allowed: {", ".join(known)}')
 
     def free_parameters(self, valve: str) -> tuple[FreeParameter, ...]:
         """Return what is fitted with a type of valve; by default every amplitude."""

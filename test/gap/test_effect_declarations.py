@@ -21,6 +21,7 @@ import re
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.registry import effects
+from pam_sim.errors import InputError
 import pam_sim.gap
 from pam_sim.gap.subsystems.effects import SENSOR_CHANGES
 from pam_sim.parameters import Parameter
@@ -84,6 +85,6 @@ def test_fitted_ranges_lie_within_those_of_the_model_file():
     Fitting(free=(FreeParameter('width_m', 1.0, 0.0, 2.0),)), Fitting(delay='delay_s'),
     Fitting(edges=('open_time_s',))))
 def test_what_is_no_parameter_cannot_be_fitted(fitting):
-    with pytest.raises(ValueError, match='no parameter'):
+    with pytest.raises(InputError, match='`made_up` has no parameter .*allowed: force_n'):
         Effect('made_up', 'friction', 'muscle', 'A test.', 'here',
                (Parameter('force_n', 'N', 1.0, 0.0, 2.0),), ('force_n',), fitting=fitting)

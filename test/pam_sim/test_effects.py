@@ -15,6 +15,7 @@
 """Effects: what they do, that zero is nothing, and that a new file is all it takes."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -250,20 +251,51 @@ def muscle_force({arguments}):
 """
 
 
+def refused(folder, monkeypatch, text):
+    """Return the InputError on a file ``ripple.py`` with an effect."""
+    path = folder / 'ripple.py'
+    path.write_text(text)
+    monkeypatch.setenv('PAM_EFFECTS_PATH', str(folder))
+    effects.cache_clear()
+    try:
+        with pytest.raises(InputError) as caught:
+            effects()
+        assert caught.value.where.startswith(str(path))
+        return caught.value
+    finally:
+        monkeypatch.undo()
+        effects.cache_clear()
+
+
+@pytest.mark.parametrize('old, new, sentence', [
+    ('depth_n', 'mean', '`mean` cannot name a number of a record, as numpy uses this name '
+                        'itself; allowed are other names, such as `mean_value`'),
+    ('depth_n', 'shape', '`shape` cannot name a number of a record, as numpy uses this name '
+                         'itself; allowed are other names, such as `shape_value`'),
+    ('subsystem="muscle"', 'subsystem="limb"',
+     'effect `ripple` has the subsystem `limb`; allowed: valve, muscle, load, sensor'),
+    ('amplitude=("depth_n",)', 'amplitude=("dept_n",)',
+     'effect `ripple` has no parameter `dept_n` (did you mean `depth_n`?); allowed: depth_n'),
+    ('amplitude=("depth_n",)', 'amplitude=()',
+     'effect `ripple` has no amplitude; name at least one parameter')])
+def test_a_wrong_declaration_is_told_in_one_sentence_with_its_file(
+        tmp_path, monkeypatch, old, new, sentence):
+    text = EFFECT_FILE.format(arguments='force_n, contraction_m, par')
+    error = refused(tmp_path, monkeypatch, text.replace(old, new))
+    assert error.problem == sentence and error.where == str(tmp_path / 'ripple.py')
+
+
+def test_a_file_that_is_not_python_is_told_with_its_line(tmp_path, monkeypatch):
+    error = refused(tmp_path, monkeypatch, 'EFFECT = (\n\n')
+    assert error.where == f'{tmp_path / "ripple.py"}:1'
+    assert error.problem.startswith('is not valid Python: ')
+
+
 @pytest.mark.parametrize('arguments, named', [
     ('force_n, p, x, v, dx, elapsed, state, i, par, k', 'p'),
     ('force_n, contraction_m, state, par', 'state'), ('force_n, strain, par', 'strain')])
 def test_a_hook_that_names_what_it_has_not_is_refused_in_one_sentence(
         tmp_path, monkeypatch, arguments, named):
-    path = tmp_path / 'ripple.py'
-    path.write_text(EFFECT_FILE.format(arguments=arguments))
-    monkeypatch.setenv('PAM_EFFECTS_PATH', str(tmp_path))
-    effects.cache_clear()
-    try:
-        with pytest.raises(InputError, match=f'hook `muscle_force` names `{named}`; write `def '
-                           r'muscle_force\(force_n, pressure_pa, .* by name') as caught:
-            effects()
-        assert caught.value.where == str(path)
-    finally:
-        monkeypatch.undo()
-        effects.cache_clear()
+    error = refused(tmp_path, monkeypatch, EFFECT_FILE.format(arguments=arguments))
+    assert re.match(f'hook `muscle_force` names `{named}`; write `def '
+                    r'muscle_force\(force_n, pressure_pa, .* by name', error.problem)

@@ -16,6 +16,7 @@
 
 from numba import njit
 import numpy as np
+from pam_sim.errors import InputError
 from pam_sim.records import cells, columns, fields, record, size_of, values_of, zeros
 import pytest
 
@@ -73,5 +74,5 @@ def test_every_field_is_named_once(values):
 
 
 def test_a_name_that_numpy_has_taken_is_refused():
-    with pytest.raises(ValueError, match='`fill` cannot be a field'):
+    with pytest.raises(InputError, match='`fill` cannot name a number .* numpy uses'):
         record('supply_pa', 'fill')
