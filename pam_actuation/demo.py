@@ -33,6 +33,7 @@ from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.place import check_bag_target
+from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.parallel import in_processes
@@ -214,8 +215,10 @@ class Demo:
         """Tune an untuned controller on the recorded rig and experiment, for a few seconds."""
         metadata = self._runs['ppr_learning'].metadata
         rig = load_rig(metadata['rig'])
+        untuned = load_controller('sofc_untuned', rig)
+        assert isinstance(untuned, CompiledController)      # of a rig, in no mode
         self._tuning = tune(
-            rig, load_controller('sofc_untuned', rig), load_experiment(self._short),
+            rig, untuned, load_experiment(self._short),
             budget=TUNING_ROLLOUTS, seed=SEED,
             progress=lambda done: progress(done / TUNING_ROLLOUTS))
         self._tuning.save(Path(self.result.folder, 'tuned.yaml'))

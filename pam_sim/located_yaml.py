@@ -178,7 +178,7 @@ class Located(Mapping[str, Any]):
         return check_value(
             self._values[key], f'`{key}`', self.where(key), type, lower, upper, choices, unit)
 
-    def get(  # type: ignore[override]
+    def get(  # type: ignore[override]  # of a Mapping: the second argument is the default
             self, key: str, type: type | None = None, default: Any = None,  # noqa: A002
             lower: float | None = None, upper: float | None = None,
             choices: Collection[Any] | None = None, unit: str = '') -> Any:

@@ -17,6 +17,7 @@
 import ast
 import importlib
 from pathlib import Path
+import re
 import subprocess
 import sys
 import tomllib  # noqa: I201
@@ -61,6 +62,32 @@ def test_mypy_finds_nothing():
         pytest.skip('the annotations of numpy before 2.2 say less')
     done = subprocess.run([sys.executable, '-m', 'mypy'], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
+
+
+# What mypy is told to pass over, and why: `# type: ignore[code]  # reason`.
+PASSED_OVER = re.compile(r'#\s*type:\s*ignore')
+REASONED = re.compile(r'# type: ignore\[[a-z-]+\]  # \w+( \S+)+$')
+
+
+def unreasoned(text):
+    """Return the numbers of the lines that mypy passes over without a code and a reason."""
+    return [number for number, line in enumerate(text.splitlines(), 1)
+            if PASSED_OVER.search(line) and not REASONED.search(line)]
+
+
+def test_what_mypy_passes_over_has_a_reason():
+    found = {name: lines for name, path in modules().items()
+             if (lines := unreasoned(path.read_text(encoding='utf-8')))}
+    assert found == {}
+
+
+@pytest.mark.parametrize('line, is_refused', [
+    ('a = b  # type: ignore[assignment]  # mcap has no annotations', False),
+    ('a = b     # type: ignore[assignment]', True), ('a = b  # type: ignore', True),
+    ('a = b  # type:ignore  # mcap has no annotations', True),
+    ('a = b  # type: ignore[misc]  # why', True), ('a = b  # of type ignore', False)])
+def test_what_counts_as_a_reason(line, is_refused):
+    assert bool(unreasoned(line)) == is_refused
 
 
 def test_no_module_is_left_out():

@@ -22,7 +22,7 @@ from pam_sim.files import StrPath
 try:
     import fcntl
 except ImportError:             # not on Windows: there only offline bags are written
-    fcntl = None    # type: ignore[assignment]
+    fcntl = None    # type: ignore[assignment]  # a module that Windows lacks
 
 
 def write_all(stream: BinaryIO, data: bytes) -> None:

@@ -302,7 +302,7 @@ def _bytes(record: Any) -> bytes:
     """Return a record of the ``mcap`` package as bytes."""
     builder = RecordBuilder()
     record.write(builder)
-    data: bytes = builder.end()     # type: ignore[no-untyped-call]
+    data: bytes = builder.end()     # type: ignore[no-untyped-call]  # mcap annotates all but this
     return data
 
 

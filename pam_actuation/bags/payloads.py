@@ -111,7 +111,7 @@ class Payloads:
             return NotImplemented
         return len(self) == len(other) and all(map(bytes.__eq__, self, other))
 
-    __hash__ = None     # type: ignore[assignment]
+    __hash__ = None     # type: ignore[assignment]  # that is how Python says `not hashable`
 
 
 def alike(numbers: IntArray) -> Iterator[tuple[int, IntArray]]:

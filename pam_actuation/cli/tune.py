@@ -83,6 +83,7 @@ def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.control.config import load_controller
+    from pam_actuation.control.modes.force import ForceController
     from pam_actuation.control.modes.tracked import CONTRACTION, JOINT, tracked_by
     from pam_actuation.report.tuning_page import tuning_report
     from pam_actuation.tuning.random_rigs import random_rigs
@@ -100,7 +101,7 @@ def run(args: argparse.Namespace) -> int | None:
         args.controller or _first(runs, 'controller') or _preset(args, rig),
         rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
     wanted = JOINT if isinstance(rig, JointRig) else CONTRACTION
-    if tracked_by(controller) != wanted:
+    if isinstance(controller, ForceController) or tracked_by(controller) != wanted:
         raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
                          f'{wanted.topic} can be tuned on {rig.name}', 'controller')
     if wanted == JOINT and controller.kind != 'sofc':

@@ -33,14 +33,15 @@ see ``lqi_files``.
 """
 
 import os
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.controller_text import INDEX_FORMS
 from pam_actuation.control.lqi_files import KEYS as LQI_KEYS, lqi_from_tree
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
-from pam_actuation.control.modes.wrapped import WrappedLaw
+from pam_actuation.control.modes.force import ForceController
+from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
     from pam_actuation.control.modes.joint import JointMode
     from pam_sim.rig import Rig
 
-Controller = CompiledController | WrappedLaw
+Controller = CompiledController | ForceController | JointController
 
 _KINDS = ('sofc', 'pid', 'lqi')
 KEYS = (
@@ -100,7 +101,7 @@ def rig_identity(rig: 'JointRig | Rig') -> str:
 def load_controller(name_or_path_or_text: str | os.PathLike[str],
                     rig: 'JointRig | Rig | None' = None,
                     rules_file: str | os.PathLike[str] | None = None,
-                    accept_other_rig: bool = False) -> Any:
+                    accept_other_rig: bool = False) -> Controller:
     """
     Build a controller.
 
@@ -120,6 +121,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
     Returns
     -------
     SelfOrganizingFuzzyController, PidController or LqiController
+        In mode force or joint: a ForceController or JointController about it.
 
     Raises
     ------
@@ -146,7 +148,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
 
 
 def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, folder: str = '.',
-                         accept_other_rig: bool = False) -> Any:
+                         accept_other_rig: bool = False) -> Controller:
     """Build a controller from a ``Located`` mapping; ``folder`` is where ``rules`` is sought."""
     tree.check_keys(_ALL_NAMES)
     if rig is None:
@@ -158,7 +160,7 @@ def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, fol
     return controller
 
 
-def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Any:
+def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controller:
     kind = tree.require('controller', str, choices=_KINDS)
     for key in tree:
         if key not in _NAMES + names_of(OWN_KEYS[kind]):

@@ -31,8 +31,7 @@ from typing import Any
 import numpy as np
 
 from pam_actuation.bags.load import load_run, RecordedRun
-from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.modes.force import ForceController
+from pam_actuation.control.config import Controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim.annotations import FloatArray
@@ -229,7 +228,7 @@ def _sensors(noise: Mapping[str, float]) -> dict[str, float]:
 
 
 def simulated(plain: dict[str, Any], rig: Rig,
-              controller: CompiledController | ForceController | None = None) -> RecordedRun:
+              controller: Controller | None = None) -> RecordedRun:
     """Return the simulated run of an experiment, given as plain data."""
     with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
         simulate_experiment(load_experiment(dump_yaml(plain)), rig, controller,

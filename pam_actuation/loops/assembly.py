@@ -18,13 +18,16 @@ The loops of a rig, whatever it is: one muscle, or a joint of two.
 A rig names its muscles by their place below its own namespace (``Rig.muscles``).
 """
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_sim.joint import JointRig
 from pam_sim.rig import Rig
+
+if TYPE_CHECKING:
+    from pam_actuation.control.config import Controller
 
 
 def driver_loops(rig: Rig | JointRig) -> dict[str, DriverLoop]:
@@ -33,13 +36,14 @@ def driver_loops(rig: Rig | JointRig) -> dict[str, DriverLoop]:
             for prefix, muscle in rig.muscles.items()}
 
 
-def controller_loop(controller: Any, rig: Rig | JointRig, name: str = 'muscle') -> ControllerLoop:
+def controller_loop(controller: 'Controller', rig: Rig | JointRig,
+                    name: str = 'muscle') -> ControllerLoop:
     """
     Return the controller of a rig on a clock.
 
     Parameters
     ----------
-    controller
+    controller : Controller
         As ``load_controller`` gives it.
     rig : Rig or JointRig
         What it is made for.

@@ -339,7 +339,7 @@ class ManagedNode(LifecycleNode):
         alive until the process ends. There Fast DDS takes its tables down under the threads
         that still receive, which now and then ended a process by a segmentation fault.
         """
-        super().destroy_node()      # type: ignore[no-untyped-call]
+        super().destroy_node()      # type: ignore[no-untyped-call]  # rclpy has no annotations
         del self._state_machine
 
     # Transitions: each is wrapped, since rclpy swallows exceptions without a word.

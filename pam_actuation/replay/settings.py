@@ -23,12 +23,12 @@ from pam_sim.joint import load_rig_or_joint
 from pam_sim.located_yaml import dump_yaml, load_yaml
 
 if TYPE_CHECKING:
-    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.config import Controller
     from pam_sim.run import Run
 
 
 def changed_controller(run: 'Run', wanted: list[str] | None,
-                       accept_other_rig: bool = False) -> 'CompiledController | None':
+                       accept_other_rig: bool = False) -> 'Controller | None':
     """
     Return the controller that ``--set`` asks for, None if it asks for nothing.
 

@@ -254,6 +254,7 @@ def counterfactual_of_joint(run: 'Run', controller: JointController) -> Counterf
         raise InputError('the recording does not say which joint it is', str(run.path))
     joint = load_joint(run.metadata['rig'])
     fresh = load_controller(controller.to_yaml(), joint, accept_other_rig=True)
+    assert isinstance(fresh, JointController)
     fresh.freeze_learning = True
     again = replay_joint_controller(run, fresh, joint)
     commands, names = again.commands, [f'{topic}.pressure_pa' for topic in COMMANDS]
