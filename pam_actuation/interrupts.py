@@ -40,7 +40,7 @@ from types import FrameType
 from typing import Any
 
 EXIT_INTERRUPTED = 130
-ONE_WISH_S = 1.0            # several within this time are one
+ONE_REQUEST_S = 1.0            # several within this time are one
 AGAIN_S = 0.005             # until the end of an import
 # Where an exception from outside leaves something half done that is told of later, or never.
 IMPORTING = '<frozen importlib._bootstrap>'
@@ -100,7 +100,7 @@ def held() -> Iterator[Callable[[], bool]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         first_s.append(time.monotonic())
-        if first_s[-1] - first_s[0] > ONE_WISH_S:
+        if first_s[-1] - first_s[0] > ONE_REQUEST_S:
             raise KeyboardInterrupt
         came.set()
 
@@ -144,7 +144,7 @@ class Worker:
     def __init__(self) -> None:
         self._base = sys._getframe(1)
         self._pid = os.getpid()
-        self._asked_s = -ONE_WISH_S
+        self._asked_s = -ONE_REQUEST_S
         self._unraisable = sys.unraisablehook
         sys.unraisablehook = self._not_raised
         signal.signal(signal.SIGALRM, self._ask)
@@ -154,7 +154,7 @@ class Worker:
         if os.getpid() != self._pid:        # a child on its way to another program
             return
         now_s = time.monotonic()
-        if now_s - self._asked_s < ONE_WISH_S:
+        if now_s - self._asked_s < ONE_REQUEST_S:
             return
         if self._is_delicate(frame):
             self._ask_again()
@@ -178,7 +178,7 @@ class Worker:
     def _not_raised(self, unraisable: 'sys.UnraisableHookArgs') -> None:
         """Ask again where an interruption fell into a callback, which cannot hand it on."""
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            self._asked_s = -ONE_WISH_S
+            self._asked_s = -ONE_REQUEST_S
             self._ask_again()
         else:
             self._unraisable(unraisable)

@@ -169,7 +169,7 @@ class NamedEfforts:
 @dataclass(frozen=True, slots=True)
 class ValveSignal:
     """
-    What goes to the valve: topics valve_signal and, as a wish to the driver, valve_command.
+    What goes to the valve: topics valve_signal and, as a command to the driver, valve_command.
 
     PPR: names ``('ppr_voltage',)``, efforts in V. HSV: ``('fill_duty', 'vent_duty')``,
     efforts 0..1, mean opening of the next PWM period.

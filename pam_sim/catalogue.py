@@ -55,7 +55,7 @@ def catalogue() -> list[dict[str, Any]]:
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
         ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``,
         ``fitted`` (what ``pam gap`` fits: name, typical, lower, upper), ``limits`` (simpler
-        look-alikes), ``same_as`` (number of the model); valves ``signals``; rigs ``yaml``. A
+        look-alikes), ``same_as`` (parameter of the model); valves ``signals``; rigs ``yaml``. A
         muscle's nominal numbers are its own. Plain data.
 
     Raises

@@ -31,7 +31,7 @@ ASKED = '_ARGCOMPLETE'      # in the environment while a shell asks
 
 
 def asked() -> bool:
-    """Tell whether it is a shell that starts this process, to complete a command line."""
+    """Return whether it is a shell that starts this process, to complete a command line."""
     return ASKED in os.environ
 
 

@@ -46,7 +46,7 @@ def add_arguments(parser: Parser) -> None:
                         'like it; in the bag, or without one in a simulated identification')
     parser.add_argument('--plan', action='store_true',
                         help='before measuring: say which effects this model and the experiments '
-                        'named in place of bags could tell apart, from which size on, and make '
+                        'named in place of bags could distinguish, from which size on, and make '
                         'the best protocol of 60 s')
     parser.add_argument('--valve', default=None, metavar='ppr|hsv',
                         help='plan for a model preset with this valve')

@@ -41,14 +41,14 @@ _DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that tells a mistake in one line, without repeating the usage."""
+    """A parser that reports a mistake in one line, without repeating the usage."""
 
     as_json = False
 
     def parse_known_args(  # type: ignore[override]  # one of the overloads, as pam calls it
             self, args: Sequence[str] | None = None,
             namespace: argparse.Namespace | None = None) -> tuple[argparse.Namespace, list[str]]:
-        """Parse as always; note first whether mistakes are to be told as JSON."""
+        """Parse as always; note first whether mistakes are to be reported as JSON."""
         words = sys.argv[1:] if args is None else list(args)
         self.as_json = any(len(word) > 2 and '--json'.startswith(word) for word in words)
         found, unknown = super().parse_known_args(args, namespace)
@@ -59,7 +59,7 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Tell the mistake and exit with code 2."""
+        """Report the mistake and exit with code 2."""
         said = ' '.join(message.removeprefix('argument ').split())
         complain(said, EXIT_BAD_INPUT, self.prog, self.as_json)
         self.exit(EXIT_BAD_INPUT)
@@ -77,7 +77,7 @@ class Parser(argparse.ArgumentParser):
 
 def complain(sentence: str, code: int, program: str, as_json: bool = False) -> int:
     """
-    Tell why a verb did not do its work; return the exit code.
+    Say why a verb did not do its work; return the exit code.
 
     One line on stderr, ``program: sentence``. For programs, beside it, one JSON document on
     stdout, where they look for the result: ``{"error": sentence, "exit_code": code}``.

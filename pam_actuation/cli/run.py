@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         'recorded': result.recorded, 'exit_codes': result.exit_codes,
         'cpu_share': result.cpu_share}, '\n'.join(lines))
     if result.stopped:
-        # What was recorded is told; with --json in one document.
+        # What was recorded is reported; with --json in one document.
         print('pam run: stopped', file=sys.stderr)
         return EXIT_INTERRUPTED
     return EXIT_DONE if result.complete and not result.findings else EXIT_FINDING

@@ -50,9 +50,9 @@ def run(args: argparse.Namespace) -> int:
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
     result['remarks'] = remarks
-    told = ''.join(f'remark: {text}\n' for text in remarks)
+    said = ''.join(f'remark: {text}\n' for text in remarks)
     emit(args, result, (
         f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
-        f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{told}'
+        f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{said}'
         f'next: pam report {result["bag"]}'))
     return EXIT_DONE

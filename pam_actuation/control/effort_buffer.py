@@ -56,7 +56,7 @@ class EffortBuffer:
         self._arrived.append(message)
 
     def judge(self, now_ns: int, angle_wanted: bool) -> None:
-        """Judge what arrived; none counts where ``angle_wanted``, a fresh wish of an angle."""
+        """Judge what arrived; none counts where ``angle_wanted``, a fresh angle set point."""
         for message in self._arrived:
             try:
                 self.torque_n_m = _usable_torque_n_m(message, self._joint, now_ns, angle_wanted)

@@ -97,7 +97,7 @@ class JointLaw:
         return commands_pa
 
     def internals(self, inputs: TickInputs) -> tuple[float, ...]:
-        """Return what both laws tell of their tick, and the wanted torque."""
+        """Return what both laws report of their tick, and the wanted torque."""
         effort = inputs.effort
         return (*self.controller.state_values(), float(effort.follows),
                 *split_stamps([effort.stamp_ns]), effort.torque_n_m, *self.torque.state_values(),

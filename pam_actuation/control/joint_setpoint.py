@@ -43,7 +43,7 @@ class JointSetpoint:
     Parameters
     ----------
     range_rad : tuple of float
-        Lowest and highest angle of the joint; wishes outside are refused.
+        Lowest and highest angle of the joint; set points outside are refused.
     name : str
         Of the joint, by which it is found in messages to several joints.
 
@@ -134,7 +134,7 @@ class JointSetpoint:
         return REFERENCE_REASONS[self.references.state(now_ns)]
 
     def stamps(self, now_ns: int) -> tuple[int, ...]:
-        """Return none: ``controller_state`` of a joint does not tell them."""
+        """Return none: ``controller_state`` of a joint does not hold them."""
         return ()
 
     @property
@@ -148,7 +148,7 @@ class JointSetpoint:
         return self.refusal, self.references.refusal, self.efforts.refusal
 
     def values(self) -> tuple[tuple[str, object], ...]:
-        """Return what the diagnostics tell of it."""
+        """Return what the diagnostics say of it."""
         return (('follows', 'torque' if self.effort.follows else 'angle'),
                 ('references.refused', self.refused),
                 ('references.refusal', self.refusal or self.references.refusal),

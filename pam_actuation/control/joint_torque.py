@@ -15,7 +15,7 @@
 """
 The torque of a joint on command: pressures of flexor and extensor for a wanted torque.
 
-Feed-forward is the static inverse of the nominal muscles; wish and angle are carried on with
+Feed-forward is the static inverse of the nominal muscles; torque and angle are carried on with
 their rates over the lag of the valves. Both pressures lie about the wanted co-contraction,
 which gives way where a muscle would leave its limits: torque comes first. What force maps and
 friction make wrong is fed back, slowly, where the forces of both tendons are measured.
@@ -38,7 +38,7 @@ GAIN = 0.5                      # of the error of torque
 INTEGRAL_TIME_S = 0.5
 _START_TIME_S = 0.25            # decay of the bumpless start offset, as of the laws
 _MOST_INTEGRAL = 0.25           # of half the torque between the limits
-_MEMORY_S = 0.03                # of the filters that give the rates of wish and angle
+_MEMORY_S = 0.03                # of the filters that give the rates of wanted torque and angle
 _ANGLES, _PRESSURES, _DIFFERENCES = 65, 33, 65
 _SLOPE_N_M_PER_PA = 1e-12       # where both tendons are slack: still one difference per torque
 
@@ -75,7 +75,7 @@ class JointTorque:
                 [joint.flexor, joint.extensor], self._arms, joint.contractions_m(self._angles))]
         self._period_s = 1.0 / controller.rate_hz
         self._lag_s = controller.lead_s + settings.get('valve_lag_s', 0.0)
-        self._wish = _Ahead(self._lag_s, self._period_s)
+        self._wanted = _Ahead(self._lag_s, self._period_s)
         self._angle = _Ahead(self._lag_s, self._period_s)
         self.pause()
 
@@ -83,7 +83,7 @@ class JointTorque:
         """Forget what was: the next tick starts from the pressures it is given."""
         self._mean = self._given = self._measured = math.nan
         self._integral = 0.0
-        self._wish.forget()
+        self._wanted.forget()
         self._angle.forget()
 
     def state_values(self) -> tuple[float, float, float]:
@@ -129,9 +129,9 @@ class JointTorque:
             wanted_n_m * self._room(angle_rad, wanted_n_m), torques[0]), torques[-1])
         if starting:
             self._start(np.interp(0.5 * (flexor - extensor), self._differences, torques))
-        wish = min(max(self._wish.at(self._given) + self._offset, torques[0]), torques[-1])
+        wanted = min(max(self._wanted.at(self._given) + self._offset, torques[0]), torques[-1])
         self._offset *= _START_TIME_S / (_START_TIME_S + self._period_s)
-        torque = wish + self._correction(wish, torques)
+        torque = wanted + self._correction(wanted, torques)
         difference = float(np.interp(torque, torques, self._differences))
         mean = min(max(self._mean, low + abs(difference)), high - abs(difference))
         return mean + difference, mean - difference
@@ -159,24 +159,24 @@ class JointTorque:
         return flexor - extensor + _SLOPE_N_M_PER_PA * self._differences
 
     def _start(self, torque_n_m: float) -> None:
-        """Begin at the torque of the pressures before; its way to the wish is a fading offset."""
+        """Begin at the torque of the pressures before; an offset to it fades."""
         self._offset = torque_n_m - self._given
         self._expected = self._measured if math.isfinite(self._measured) else torque_n_m
 
-    def _correction(self, wish: float, torques: FloatArray) -> float:
+    def _correction(self, wanted: float, torques: FloatArray) -> float:
         """
-        Return what feedback adds to the wish [N m]; ``torques`` are those that can be had.
+        Return what feedback adds [N m]; ``torques`` are those that can be had.
 
         Proportional and integral of the difference between what the valves should have made
-        of the wishes by now and what is measured. At the limits the integral does not grow.
+        of the torques wanted by now and what is measured. The integral stands still at limits.
         """
-        self._expected += (wish - self._expected) * self._period_s / (
+        self._expected += (wanted - self._expected) * self._period_s / (
             self._lag_s + self._period_s)
         error = self._expected - self._measured
         if not math.isfinite(error):
             return self._integral
         correction = self._integral + GAIN * error
-        beyond = wish + correction - min(max(wish + correction, torques[0]), torques[-1])
+        beyond = wanted + correction - min(max(wanted + correction, torques[0]), torques[-1])
         if beyond * error <= 0.0:
             most = _MOST_INTEGRAL * 0.5 * (torques[-1] - torques[0])
             self._integral = min(max(

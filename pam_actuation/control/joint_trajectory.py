@@ -26,7 +26,7 @@ import math
 from pam_actuation.messages import AngleTrajectory
 from pam_sim.errors import InputError
 
-TOLERANCE_RAD = 0.02        # beyond the stops: a wish at the stop may be rounded
+TOLERANCE_RAD = 0.02        # beyond the stops: a set point at the stop may be rounded
 # Time from the start [ns], positions, velocities (perhaps none).
 Point = tuple[int, Sequence[float], Sequence[float]]
 WHERE = 'joint_trajectory'

@@ -165,7 +165,7 @@ class ControllerLoop:
                 JointSetpoint(joint.range_rad, name))
 
     def _takers(self) -> dict[str, Callable[[Any], object]]:
-        """Return what takes each topic: wishes, then what the drivers follow and is measured."""
+        """Return what takes each topic: set points, followed pressures, measurements."""
         takes = self.setpoint.takes()
         if self.tracked == JOINT:
             takes.update(self._kept(self.measurement.sensor.topic))

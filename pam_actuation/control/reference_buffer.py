@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from pam_actuation.messages import (
         AngleReference, AngleTrajectory, Reference, ReferenceTrajectory)
 
-    Wish = Reference | AngleReference
+    SetPoint = Reference | AngleReference
     Trajectory = ReferenceTrajectory | AngleTrajectory
 
 TRAJECTORY_LIFE_S = 1.0
@@ -95,14 +95,14 @@ class ReferenceBuffer:
 
     def clear(self) -> None:
         """Forget everything."""
-        self.reference: Wish | None = None
-        self._accepted: Wish | None = None
+        self.reference: SetPoint | None = None
+        self._accepted: SetPoint | None = None
         self.trajectory: Trajectory | None = None
         self._times_ns: tuple[int, ...] = ()
         self._values: tuple[float, ...] = ()
         self._rates: tuple[float, ...] = ()
 
-    def set_reference(self, message: 'Wish') -> bool:
+    def set_reference(self, message: 'SetPoint') -> bool:
         """Take a ``Reference``; one that is not usable is ignored and False returned."""
         if not self._allowed(self._value(message)):
             return self._refuse(f'a reference {self._outside}')
@@ -156,7 +156,7 @@ class ReferenceBuffer:
             self.trajectory = None
             self._times_ns = self._values = self._rates = ()
 
-    def _value(self, message: 'Wish') -> float:
+    def _value(self, message: 'SetPoint') -> float:
         """Return what a message asks for, of the quantity that counts here."""
         value: float = getattr(message, self._field)
         return value

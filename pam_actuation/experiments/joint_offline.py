@@ -44,7 +44,7 @@ class JointLoops:
     ----------
     joint : pam_sim.joint.JointRig
     control : pam_actuation.control.loop.ControllerLoop
-        Whoever steps this hands it its wishes.
+        Whoever steps this hands it its set points.
     seed : int
         Of the sensor noise.
     on_sent : callable, optional

@@ -165,7 +165,7 @@ class ControllerNode(ManagedNode):
             self.diagnostics.update(WARN, loop.reason)
 
     def diagnostic_values(self) -> Values:
-        """Add wishes that were refused."""
+        """Add set points that were refused."""
         values = super().diagnostic_values()
         return values if self.loop is None else (*values, *self.loop.setpoint.values())
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The controller of a joint on ROS: angle and wishes in, two pressure commands out."""
+"""The controller of a joint on ROS: angle and set points in, two pressure commands out."""
 
 from collections.abc import Sequence
 import sys

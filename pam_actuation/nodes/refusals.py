@@ -37,4 +37,4 @@ class RefusalLog:
         before, self._before = self._before, refusals
         for refusal in refusals:
             if refusal and refusal not in before:
-                self._logger.warning(f'a wish was refused: {refusal}')
+                self._logger.warning(f'a set point was refused: {refusal}')

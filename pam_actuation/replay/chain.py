@@ -301,13 +301,13 @@ def recorded_seed(run: Run) -> int:
 
 def _controller(
         run: Run, rig: Rig | JointRig, controller: 'Controller | str | os.PathLike[str] | None',
-        wish: str) -> 'Controller | None':
+        reference: str) -> 'Controller | None':
     """Return the controller of the loop, None for an experiment without one."""
     own = run.metadata.get('controller')
     if controller is None and not own:
         return None
     run.require('controller_state')
-    run.require(wish)
+    run.require(reference)
     if isinstance(controller, (str, os.PathLike)):
         return load_controller(controller, rig)
     if controller is not None:

@@ -36,7 +36,7 @@ MUSCLE, JOINT, ROOT = 'muscle', 'joint', 'root'
 # How much a recording of a muscle is worth without it.
 NEEDED, USED, EXTRA = 'needed', 'used', 'extra'
 # What a number means that is missing or not finite: a fault to be told; that the one before it
-# still counts, as a valve takes it; or nothing, since what is not wished for may be missing.
+# still counts, as a valve takes it; or nothing, since what is not asked for may be missing.
 TOLD, KEPT, ALLOWED = 'told', 'kept', 'allowed'
 
 RECORDER = 'experiment_recorder'

@@ -83,7 +83,7 @@ class Fitting:
     limits : tuple of str
         Simpler look-alikes that it contains. One that explains as much is named instead.
     same_as : str
-        Number of the model that does the same.
+        Parameter of the model that does the same.
     delay : str
         Parameter by which the effect is late as a whole, as behind the filter of a sensor.
     edges : tuple of str

@@ -74,7 +74,7 @@ class Share:
 @dataclass(frozen=True)
 class Calibrated:
     """
-    One number of the model after calibration.
+    One parameter of the model after calibration.
 
     ``pull`` is (value - nominal) in standard deviations of how well the nominal
     number is known; ``ci95`` the 95 % interval of the value.

@@ -33,7 +33,7 @@ KEYS = (
         otherwise='name of the file'),
     Key('joint', str, 'Preset to start from; the other keys say what differs.',
         otherwise='none: state `load` and both sides'),
-    Key('load', str, 'Tells that the file describes a joint.',
+    Key('load', str, 'Says that the file describes a joint.',
         otherwise='required without `joint`', choices=(NAME,)),
     *(Key(side, dict, f'Rig of the {side}: a preset, or a mapping as in the file of a rig.',
           otherwise='required without `joint`') for side in SIDES),

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult, SignalGap
 
 VERDICT_TEXT = {
-    'no_gap': 'No gap beyond noise', 'parameter': 'A number of the model is wrong',
+    'no_gap': 'No gap beyond noise', 'parameter': 'A parameter of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
 EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %

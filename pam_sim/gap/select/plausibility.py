@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether named effects explain enough, without numbers of the model far from their prior."""
+"""Whether named effects explain enough, without parameters of the model far from their prior."""
 
 from collections.abc import Mapping
 
@@ -47,7 +47,7 @@ def is_poor(context: SearchContext, problem: SubsystemProblem, current: Fit,
 
 
 def has_implausible_numbers(problem: SubsystemProblem, current: Fit, criteria: Criteria) -> bool:
-    """Return whether a fit takes a number of the model far from its prior."""
+    """Return whether a fit takes a parameter of the model far from its prior."""
     return any(abs(z) > criteria.certain_sd
                for z in current.prior_deviations(problem).values())
 

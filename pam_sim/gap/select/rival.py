@@ -60,7 +60,7 @@ class Rival:
 
     @property
     def is_exact(self) -> bool:
-        """Return whether it has one form: a number of the model, a bias or gain of a sensor."""
+        """Return whether it has one form: a parameter of the model, a bias or gain of a sensor."""
         return self.name not in effects() or (
             effects()[self.name].fitting.sensor_change in ('bias', 'gain'))
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the doubt about the numbers of a model leaves on the certify data."""
+"""What the doubt about the parameters of a model leaves on the certify data."""
 
 import math
 
