@@ -24,6 +24,7 @@ from collections.abc import Mapping
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import HsvConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 _UNKNOWN_SWING_HZ = 5.9
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
 _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
-_GAUGES_PA = tuple(range(10_000, 600_001, 10_000))
+_GAUGES_PA = np.arange(10e3, 601e3, 10e3)
 
 
 def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
@@ -90,8 +91,8 @@ def _load(rig: 'Rig') -> dict[str, float]:
         volume_m3 = float(rig.volume_m3(rig.parameters.get('contraction_m', 0.0)))
         return {'hsv.volume_m3': volume_m3, 'hsv.volume_at_600kpa_m3': volume_m3,
                 'hsv.volume_slope_m3_per_pa': 0.0}
-    lift_off = next((gauge for gauge in _GAUGES_PA
-                     if rig.static_contraction_m(P_ATM_PA + gauge) > 0.0), 550_000) - 10_000.0
+    lifted = rig.static_contraction_m(P_ATM_PA + _GAUGES_PA) > 0.0
+    lift_off = (float(_GAUGES_PA[lifted][0]) if lifted.any() else 550e3) - 10e3
     lift_off = min(max(lift_off, 0.0), 550_000.0)
     swings = [(_swing_hz(rig, lift_off + part * (600_000.0 - lift_off)),
                lift_off + part * (600_000.0 - lift_off)) for part in

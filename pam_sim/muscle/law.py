@@ -236,11 +236,12 @@ class MuscleLaw:
         pressure, load = np.broadcast_arrays(
             np.asarray(pressure_gauge_pa, float), np.asarray(load_n, float))
         low, high = np.zeros(pressure.shape), np.full(pressure.shape, MAX_STRAIN)
+        lifted = self.formula_n(pressure, low) > load       # all that follows is as sound
         for _ in range(52):
-            middle = 0.5 * (low + high)
-            pulls = self.formula_n(pressure, middle) > load
+            middle = np.asarray(0.5 * (low + high))
+            pulls = self._tension_n(pressure, middle) > load
             low, high = np.where(pulls, middle, low), np.where(pulls, high, middle)
-        return np.where(self.formula_n(pressure, 0.0 * low) > load, 0.5 * (low + high), 0.0)[()]
+        return np.where(lifted, 0.5 * (low + high), 0.0)[()]
 
     def holding_pressure_pa(self, force_n: ArrayLike, strain: ArrayLike,
                             upper_pa: float = 2e6) -> FloatArray:
@@ -263,9 +264,11 @@ class MuscleLaw:
         force, contraction = np.broadcast_arrays(
             np.asarray(force_n, float), np.asarray(strain, float))
         low, high = np.zeros(force.shape), np.full(force.shape, float(upper_pa))
+        holds_alone = self.formula_n(low, contraction) >= force
+        self._judged(high, contraction, 'allow')        # all between is as sound
         for _ in range(52):
-            middle = 0.5 * (low + high)
-            short = self.formula_n(middle, contraction) < force
+            middle = np.asarray(0.5 * (low + high))
+            short = self._tension_n(middle, contraction) < force
             low, high = np.where(short, middle, low), np.where(short, high, middle)
-        found = np.where(self.formula_n(high, contraction) < force, np.inf, 0.5 * (low + high))
-        return np.where(self.formula_n(0.0 * low, contraction) >= force, 0.0, found)[()]
+        found = np.where(self._tension_n(high, contraction) < force, np.inf, 0.5 * (low + high))
+        return np.where(holds_alone, 0.0, found)[()]
