@@ -78,6 +78,7 @@ class DriverLoop:
         self.saturated_ticks = 0
         self.saturated_s = 0.0
         self._last_ns: int | None = None
+        self._decision: Decision | None = None
         self._law_ns: int | None = None
         self._used_stamp_ns: int | None = None
         self._efforts = self._safe_efforts()
@@ -159,7 +160,11 @@ class DriverLoop:
 
     def tick(self, now_ns: int) -> tuple[ValveSignal, Status]:
         """Return (ValveSignal, Status) for ``now_ns``."""
-        decision = self.safety.tick(now_ns)
+        return self.act(now_ns), self.status()
+
+    def act(self, now_ns: int) -> ValveSignal:
+        """Decide for ``now_ns``; return the signal. ``status`` then tells of it."""
+        decision = self._decision = self.safety.tick(now_ns)
         self._count(now_ns)
         if isinstance(self.law, HsvLaw):
             efforts = self._hsv(self.law, decision, now_ns)
@@ -172,7 +177,7 @@ class DriverLoop:
             if self._last_ns is not None:
                 self.saturated_s += max(now_ns - self._last_ns, 0) / _NS
         self._last_ns = now_ns
-        return self._signal(now_ns, efforts), self._status(now_ns, decision)
+        return self._signal(now_ns, efforts)
 
     def followed(self) -> Pressure | None:
         """
@@ -260,8 +265,10 @@ class DriverLoop:
             self._rate_measured_hz = (self.ticks - self._rate_start[1]) / span_s
             self._rate_start = (now_ns, self.ticks)
 
-    def _status(self, now_ns: int, decision: Decision) -> Status:
-        safety = self.safety
+    def status(self) -> Status:
+        """Return how the driver is as of the last tick; there must have been one."""
+        now_ns, decision, safety = self._last_ns, self._decision, self.safety
+        assert now_ns is not None and decision is not None
         command_age_ms = math.nan
         if safety.command_stamp_ns is not None:
             command_age_ms = (now_ns - safety.command_stamp_ns) * 1e-6

@@ -32,6 +32,7 @@ from pam_actuation import interrupts
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.loops.assembly import controller_loop, driver_loops
@@ -117,13 +118,13 @@ class _Loops:
             decide = controller_tick(bus, control)
             add('controller', lambda now_ns: decide(now_ns, learning), controller.rate_hz)
         for place, driver in drivers.items():
-            add(f'{place}driver', driver_tick(bus, driver, place, partial(self._told, place)),
-                driver.rate_hz)
+            add(f'{place}driver', driver_tick(bus, driver, place, partial(
+                self._tell, place, driver)), driver.rate_hz)
 
-    def _told(self, place: str, now_ns: int, status: Status) -> None:
+    def _tell(self, place: str, driver: DriverLoop, now_ns: int) -> None:
         """Record the status of a driver from time to time."""
         if now_ns - self._status_ns.get(place, -STATUS_EVERY_NS) >= STATUS_EVERY_NS:
-            self._status_ns[place] = now_ns
+            self._status_ns[place], status = now_ns, driver.status()
             self._recorder.write(
                 'diagnostics', replace(status, name=f'{place}{status.name}'), now_ns)
 

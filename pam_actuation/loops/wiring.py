@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from pam_actuation.loops.bus import Bus, Take, Tick
-from pam_actuation.messages import Message, Pressure, Status, ValveSignal
+from pam_actuation.messages import Message, Pressure, ValveSignal
 
 
 class Takes(Protocol):
@@ -60,8 +60,8 @@ class Controller(Takes, Protocol):
 class Driver(Takes, Protocol):
     """What a valve driver on a clock does."""
 
-    def tick(self, now_ns: int) -> tuple[ValveSignal, Status]:
-        """Return the valve signal and how the driver is."""
+    def act(self, now_ns: int) -> ValveSignal:
+        """Run one tick; return the valve signal."""
 
     def followed(self) -> Pressure | None:
         """Return the pressure that the driver follows."""
@@ -115,22 +115,25 @@ def controller_tick(bus: Bus, control: Controller) -> Callable[[int, bool], None
 
 
 def driver_tick(bus: Bus, driver: Driver, prefix: str = '',
-                told: Callable[[int, Status], object] | None = None) -> Tick:
-    """Return the tick of a driver; ``told(now_ns, status)`` hears its status."""
+                done: Tick | None = None) -> Tick:
+    """Return the tick of a driver; ``done(now_ns)`` is called at its end."""
+    signal_topic = f'{prefix}valve_signal'
+
     def tick(now_ns: int) -> None:
-        signal, status = driver.tick(now_ns)
-        bus.send(f'{prefix}valve_signal', signal, now_ns)
+        bus.send(signal_topic, driver.act(now_ns), now_ns)
         send_followed(bus, driver, now_ns, prefix)
-        if told is not None:
-            told(now_ns, status)
+        if done is not None:
+            done(now_ns)
 
     return tick
 
 
 def signal_tick(bus: Bus, driver: Driver, prefix: str = '') -> Tick:
     """Return the tick of a driver that does not say which pressure it follows."""
+    topic = f'{prefix}valve_signal'
+
     def tick(now_ns: int) -> None:
-        bus.send(f'{prefix}valve_signal', driver.tick(now_ns)[0], now_ns)
+        bus.send(topic, driver.act(now_ns), now_ns)
 
     return tick
 

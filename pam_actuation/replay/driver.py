@@ -118,7 +118,7 @@ def replay_driver(run: Run) -> DriverReplay:
     sent: dict[str, array[float]] = {}
 
     def tick(message: ValveSignal, now_ns: int) -> None:
-        signal, _ = driver.tick(now_ns)
+        signal = driver.act(now_ns)
         stamps.append(now_ns)
         efforts = dict(zip(message.names, message.efforts))
         for name, effort in zip(signal.names, signal.efforts):

@@ -83,8 +83,8 @@ class FaultyJoint:
 
     def _driver(self, side, driver):
         tick = driver_tick(self._bus, driver, f'{side}/',
-                           lambda now_ns, status: self.faults[side].add(
-                               dict(status.values)['fault']))
+                           lambda now_ns: self.faults[side].add(
+                               dict(driver.status().values)['fault']))
 
         def tick_unless_stopped(now_ns):
             if side not in self.stopped:

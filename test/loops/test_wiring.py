@@ -21,12 +21,13 @@ import pytest
 
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
-def test_a_driver_sends_signal_and_followed_pressure_before_it_tells_its_status(valve):
+def test_a_driver_sends_signal_and_followed_pressure_before_its_status_is_asked_for(valve):
     # A recorder writes messages of one time in the order in which they come.
     order = []
     bus = Bus(on_sent=lambda topic, message, now_ns: order.append(topic))
+    driver = DriverLoop(valve)
     tick = driver_tick(
-        bus, DriverLoop(valve), 'left/', lambda now_ns, status: order.append('told'))
+        bus, driver, 'left/', lambda now_ns: order.append(driver.status().stamp_ns - now_ns))
     for k in range(2):
         tick(k * 10_000_000)
-    assert order == ['left/valve_signal', 'left/followed_pressure', 'told'] * 2
+    assert order == ['left/valve_signal', 'left/followed_pressure', 0] * 2
