@@ -59,6 +59,7 @@ class Plant:
         self._initial = initial
         self._inp, self._out = zeros(INPUT), zeros(OUTPUT)
         self._given, self._now = cells(self._inp, INPUT), cells(self._out, OUTPUT)
+        self._signal = (self._given.signal_0, self._given.signal_1)[:len(rig.signal_names)]
         self.reset()
 
     @property
@@ -126,11 +127,11 @@ class Plant:
               contraction_m: float | None) -> None:
         """Set the inputs of the next steps."""
         values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)
-        wanted = 1 if self.rig.valve == 'ppr' else 2
-        if len(values) != wanted:
-            raise InputError(f'valve `{self.rig.valve}` takes {wanted} numbers, got {len(values)}',
-                             'valve signal')
-        self._inp[:wanted] = values
+        if len(values) != len(self._signal):
+            raise InputError(f'valve `{self.rig.valve}` takes {len(self._signal)} numbers, got '
+                             f'{len(values)}', 'valve signal')
+        for place, value in zip(self._signal, values):
+            place[...] = value
         self._given.external_force_n[...] = external_force_n
         if contraction_m is not None:
             self._given.contraction_m[...] = contraction_m

@@ -64,13 +64,17 @@ class Bus:
         """Put a message on its way to all who take the topic."""
         if self._on_sent is not None:
             self._on_sent(topic, message, now_ns)
-        for take in self._takers.get(topic, ()):
-            self._on_the_way.append((now_ns + self._transport_ns, take, message))
+        takers = self._takers.get(topic)
+        if takers:
+            arrival_ns, on_the_way = now_ns + self._transport_ns, self._on_the_way
+            for take in takers:
+                on_the_way.append((arrival_ns, take, message))
 
     def deliver(self, now_ns: int) -> None:
         """Hand over what has arrived."""
-        while self._on_the_way and self._on_the_way[0][0] <= now_ns:
-            _, take, message = self._on_the_way.popleft()
+        on_the_way = self._on_the_way
+        while on_the_way and on_the_way[0][0] <= now_ns:
+            _, take, message = on_the_way.popleft()
             take(message)
 
     def add(self, tick: Tick, times_ns: Iterable[int]) -> None:

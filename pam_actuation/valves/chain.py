@@ -155,20 +155,19 @@ class Chain:
 
         """
         command = np.array(command_gauge_pa, dtype=float)
-        first, steps = self._steps, range(self._steps, self._steps + len(command))
-        ticks = [step for step in steps if step == first or step % self._every == 0]
+        first, end = self._steps, self._steps + len(command)
+        readings, ticks = (range(first + -first % every, end, every)
+                           for every in (SENSOR_EVERY, self._every))
+        ticks_of_driver = [first, *ticks] if first % self._every else [*ticks]
+        wanted_pa = iter((P_ATM_PA + command[np.subtract(ticks_of_driver, first)]).tolist())
 
         def drive(now_ns: int) -> None:
-            step = (now_ns - self._time_ns(first)) // _STEP_NS
-            wanted_pa = P_ATM_PA + command[step]
-            self._bus.send('pressure_command', Pressure(now_ns, float(wanted_pa)), now_ns)
-            self._bus.deliver(now_ns)
+            self.driver.on_command(Pressure(now_ns, next(wanted_pa)))
             self._drive(now_ns)
 
         # At equal times: measure, then command and act.
-        self._bus.add(self._measure, map(self._time_ns, (
-            step for step in steps if step % SENSOR_EVERY == 0)))
-        self._bus.add(drive, map(self._time_ns, ticks))
+        self._bus.add(self._measure, map(self._time_ns, readings))
+        self._bus.add(drive, map(self._time_ns, ticks_of_driver))
         self._bus.run_until()
         outputs, signals = self._advance(len(command))
         if self.driver.safety.vents:

@@ -121,11 +121,10 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
         _check_range(signal[:, column], *rig.signal_range, name)
     inputs = np.zeros((count, size_of(INPUT)))
     inputs[:, :wanted] = signal
-    given = columns(inputs, INPUT)
     if external_force_n is not None:
         force = _sized(external_force_n, (count,), 'external_force_n')
         _check_range(force, -MAX_FORCE_N, MAX_FORCE_N, 'N', 'external_force_n')
-        given['external_force_n'] = force
+        columns(inputs, INPUT)['external_force_n'] = force
     start = None
     if contraction_m is not None:
         if LOADS[rig.load].MOVES_FREELY:
@@ -136,8 +135,9 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
         low, high = (share * rig.muscle.length_m for share in STRAIN_RANGE)
         _check_range(path, low, high, 'm', 'contraction_m')
         start = float(path[0])
-        given['contraction_m'][:len(path) - 1] = path[1:]
-        given['contraction_m'][len(path) - 1:] = path[-1]
+        held_m = columns(inputs, INPUT)['contraction_m']
+        held_m[:len(path) - 1] = path[1:]
+        held_m[len(path) - 1:] = path[-1]
     elif LOADS[rig.load].NEEDS_CONTRACTION:
         raise InputError('is missing; a driven load needs it', 'contraction_m')
     return inputs, start
