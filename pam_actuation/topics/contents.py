@@ -24,6 +24,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+import itertools
 import math
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -209,7 +210,9 @@ def _joint_encoder(values: tuple[Value, ...], name: str, frame_id: str) -> Encod
     places = tuple(cdr.JOINT_FIELDS.index(value.field) for value in values)
     get = [attrgetter(value.name) for value in values]
     first_get, first_place, others = get[0], places[0], tuple(zip(get[1:], places[1:]))
-    split, names = cdr.split_stamp, (name,)
+    split = cdr.split_stamp
+    packers = {lengths: cdr.joint_packer(frame_id, (name,), lengths)
+               for lengths in itertools.product((0, 1), (0, 1), (0, 1))}
 
     def encode(message: Any) -> bytes:
         numbers: list[tuple[float, ...]] = [(), (), ()]
@@ -219,8 +222,7 @@ def _joint_encoder(values: tuple[Value, ...], name: str, frame_id: str) -> Encod
             if value == value:          # not NaN
                 numbers[place] = value,
         position, velocity, effort = numbers
-        packer, (one, two, three) = cdr.joint_packer(
-            frame_id, names, (len(position), len(velocity), len(effort)))
+        packer, (one, two, three) = packers[len(position), len(velocity), len(effort)]
         return packer.pack(cdr.ENCAPSULATION, *split(message.stamp_ns), one, *position, two,
                            *velocity, three, *effort)
 
