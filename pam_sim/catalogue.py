@@ -98,8 +98,8 @@ def _entry(
 
 
 def _parameter(item: Parameter) -> dict[str, Any]:
-    return {key: getattr(item, key) for key in (
-        'name', 'unit', 'nominal', 'lower', 'upper', 'description', 'source')}
+    return {'name': item.name, 'unit': item.unit, 'nominal': item.default, 'lower': item.lower,
+            'upper': item.upper, 'description': item.description, 'source': item.source}
 
 
 def _law(law: type[MuscleLaw]) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def _law(law: type[MuscleLaw]) -> dict[str, Any]:
 def _muscle(name: str) -> dict[str, Any]:
     muscle = get_muscle(name)
     law = f'law {muscle.law.name}, set {muscle.law.law.muscle}'
-    own = [replace(item, nominal=getattr(muscle, item.name), source='') for item in DIMENSIONS]
+    own = [replace(item, default=getattr(muscle, item.name), source='') for item in DIMENSIONS]
     return _entry(
         'muscle', name, f'{1e3 * muscle.bore_m:g} mm bore, {1e3 * muscle.length_m:g} mm long; '
         f'{law}.', 'F = force_map_gain F_law(p_g, x / L0) - damping_n_s_per_m v, '

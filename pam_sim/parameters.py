@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers of the rig with unit, bounds, tolerance and source."""
+"""Declared parameters: name, unit, default, range and meaning, and the check of a given value."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 import math
 from typing import Any, SupportsFloat
@@ -22,42 +22,58 @@ from typing import Any, SupportsFloat
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import allowed_range
 
+_LONGEST_SHOWN = 60
+
 
 @dataclass(frozen=True)
 class Parameter:
     """
-    One number of a rig or an effect.
+    One parameter: of a rig, an effect, a control law, a driver, a device or a node.
 
     Parameters
     ----------
     name : str
-        Key in model files; carries its SI unit where that reads well.
+        Key in files; carries its SI unit where that reads well.
     unit : str
         SI unit, ``'-'`` for none.
-    nominal : float
+    default : float, int, str or bool
+        Value where none is given, of a rig its nominal number. Its type is that of the parameter.
     lower, upper : float
-        Inclusive bounds of what a model file may say.
+        Inclusive bounds of a number.
     tolerance : float
-        Relative standard deviation of the nominal number, 0 for exactly known.
+        Relative standard deviation of the number of a rig, 0 for exactly known.
     description : str
         One sentence.
     source : str
         Where number or equation come from.
+    choices : tuple of str
+        The texts allowed; empty: any.
 
     """
 
     name: str
     unit: str
-    nominal: float
-    lower: float
-    upper: float
+    default: Any
+    lower: float = -math.inf
+    upper: float = math.inf
     tolerance: float = 0.0
     description: str = ''
     source: str = ''
+    choices: tuple[str, ...] = ()
+
+    @property
+    def bounded(self) -> bool:
+        """Whether it is a number with a range."""
+        return math.isfinite(self.lower) and math.isfinite(self.upper)
+
+    @property
+    def allowed(self) -> str:
+        """Return the range of a number in words, in its unit: ``0.1 to 500 kg``."""
+        return allowed_range(self.lower, self.upper, self.unit, self.name)
 
     def check(self, value: object, where: str = '') -> float:
         """
-        Return ``value`` as float.
+        Return a value of a parameter that is a number, as float.
 
         Raises
         ------
@@ -65,20 +81,23 @@ class Parameter:
             Not a finite number, or out of bounds.
 
         """
-        allowed = f'allowed {allowed_range(self.lower, self.upper, self.unit, self.name)}'
         if not isinstance(value, SupportsFloat) or isinstance(value, bool):
-            raise InputError(f'`{self.name}` must be a number, not {value!r}; {allowed}', where)
-        number = float(value)
+            raise InputError(f'`{self.name}` must be a number, not {_shown(value)}; '
+                             f'allowed {self.allowed}', where)
+        try:
+            number = float(value)
+        except OverflowError:           # a whole number beyond all floats
+            number = math.inf
         if not math.isfinite(number) or not self.lower <= number <= self.upper:
-            raise InputError(f'`{self.name}` is {number:g}; {allowed}', where)
+            raise InputError(f'`{self.name}` is {number:g}; allowed {self.allowed}', where)
         return number
 
 
-def check_parameters(
+def check_given(
         parameters: Iterable[Parameter], values: Mapping[str, Any], what: str = 'parameter',
-        where: str = '') -> dict[str, float]:
+        where: str | Callable[[str], str] = '') -> dict[str, float]:
     """
-    Return the full value dict: nominal values overlaid with ``values``.
+    Return the given values as floats, checked.
 
     Parameters
     ----------
@@ -88,8 +107,9 @@ def check_parameters(
         Name to number; a ``Located`` mapping gives the line in messages.
     what : str
         Noun used in messages.
-    where : str
-        Place for messages when ``values`` does not know its own.
+    where : str or callable
+        Place for messages when ``values`` does not know its own; ``where(name)`` returns that
+        of a name.
 
     Raises
     ------
@@ -98,12 +118,31 @@ def check_parameters(
 
     """
     known = {parameter.name: parameter for parameter in parameters}
-    result = {name: parameter.nominal for name, parameter in known.items()}
+    place = getattr(values, 'where', where)
+    result = {}
     for name, value in values.items():
-        place = values.where(name) if hasattr(values, 'where') else where
         if name not in known:
             raise InputError(
                 f'unknown {what} `{name}`{did_you_mean(name, known)}; allowed: '
-                f'{", ".join(known) or "none"}', place)
-        result[name] = known[name].check(value, place)
+                f'{", ".join(known) or "none"}', place(name) if callable(place) else place)
+        result[name] = known[name].check(value, place(name) if callable(place) else place)
     return result
+
+
+def check_parameters(
+        parameters: Iterable[Parameter], values: Mapping[str, Any], what: str = 'parameter',
+        where: str | Callable[[str], str] = '') -> dict[str, float]:
+    """
+    Return the values of all parameters: the defaults overlaid with those given.
+
+    Parameters and errors are those of ``check_given``.
+    """
+    known = tuple(parameters)
+    return {**{parameter.name: parameter.default for parameter in known},
+            **check_given(known, values, what, where)}
+
+
+def _shown(value: object) -> str:
+    """Return a value of any size as a short piece of one sentence."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_SHOWN else f'{text[:_LONGEST_SHOWN]}...'

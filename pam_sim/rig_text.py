@@ -57,11 +57,11 @@ def rig_to_yaml(rig: 'Rig') -> str:
     known = rig_parameters(rig.load)
     data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}
     changed = {p.name: rig.parameters[p.name] for p in known
-               if rig.parameters[p.name] != p.nominal}
+               if rig.parameters[p.name] != p.default}
     tolerance = {p.name: rig.tolerance[p.name] for p in known
                  if rig.tolerance[p.name] != p.tolerance}
     sensors = {p.name: rig.sensors[p.name] for p in SENSOR_PARAMETERS
-               if rig.sensors[p.name] != p.nominal}
+               if rig.sensors[p.name] != p.default}
     effects = []
     for item in rig.effects:
         entry = {'name': item.name, 'parameters': dict(item.parameters)}

@@ -126,7 +126,7 @@ def controller_page():
         parts += [f'Only of `controller: {kind}`:', keys(own)]
     for kind, settings in (('sofc', SOFC_SETTINGS), ('pid', PID_SETTINGS),
                            ('lqi', LQI_SETTINGS)):
-        parts += [f'## `settings` of {kind}', _settings(settings)]
+        parts += [f'## `settings` of {kind}', parameters(settings)]
     for name, block in (
             ('force', force.KEYS), ('joint', joint_mode.KEYS), ('made_for', made_for.KEYS),
             ('static_inverse', config.INVERSE_KEYS), ('surface', force_surface.KEYS),
@@ -186,14 +186,14 @@ def hardware_page():
             'What the valve hangs on.')])]
     for name, back_end in VALVE_OUTPUTS.items():
         if back_end.PARAMETERS:
-            parts += [f'With `backend: {name}`:', _driver(back_end.PARAMETERS)]
-    parts += ['Of the driver, with any back end:', _driver(DRIVER_PARAMETERS),
+            parts += [f'With `backend: {name}`:', parameters(back_end.PARAMETERS)]
+    parts += ['Of the driver, with any back end:', parameters(DRIVER_PARAMETERS),
               '## `hardware_sensors`', _table(_HEAD, [(
                   '`backend`', 'text', '`iio_adc`', ', '.join(SENSOR_INPUTS),
                   'What the sensors hang on.')])]
     for name, back_end in SENSOR_INPUTS.items():
         if back_end.PARAMETERS:
-            parts += [f'With `backend: {name}`:', _driver(back_end.PARAMETERS)]
+            parts += [f'With `backend: {name}`:', parameters(back_end.PARAMETERS)]
     return _joined(parts)
 
 
@@ -205,27 +205,20 @@ def keys(declared):
 
 
 def parameters(declared):
-    """Return the table of Parameters of the simulator."""
-    rows = [(f'`{one.name}`', _unit(one.unit), f'`{one.nominal:g}`',
-             f'{one.lower:g} to {one.upper:g}', plain(one.description)) for one in declared]
+    """Return the table of declared Parameters."""
+    rows = [(f'`{one.name}`', _unit(one.unit) if one.bounded else _KINDS[type(one.default)],
+             _value(one.default), f'{one.lower:g} to {one.upper:g}' if one.bounded else '',
+             plain(one.description)) for one in declared]
     return _table(('key', 'unit', 'default', 'allowed', 'meaning'), rows) if rows else (
         'It has none.')
 
 
-def _settings(declared):
-    return _table(('key', 'unit', 'default', 'allowed', 'meaning'), [
-        (f'`{one.name}`', _unit(one.unit), f'`{one.default:g}`',
-         f'{one.lower:g} to {one.upper:g}', plain(one.description)) for one in declared])
-
-
-def _driver(declared):
-    rows = []
-    for one in declared:
-        allowed = '' if one.lower is None else f'{one.lower:g} to {one.upper:g}'
-        default = f'`{one.default}`'.replace('False', 'false') if one.default != '' else 'required'
-        rows.append((f'`{one.name}`', _KINDS[type(one.default)], default, allowed,
-                     plain(one.description)))
-    return _table(_HEAD, rows)
+def _value(default):
+    """Return the default of a parameter as a file has it."""
+    if default == '':
+        return 'required'
+    return f'`{default:g}`' if type(default) is float else f'`{default}`'.replace(
+        'False', 'false')
 
 
 def _default(key):

@@ -32,27 +32,28 @@ from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack, used_numbers
 from pam_actuation.control.lqi_model import LinearModel
-from pam_actuation.control.settings import checked_settings, parameter_record, Setting
+from pam_actuation.control.settings import parameter_record, setting
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.errors import InputError
+from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
-    Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
-    Setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the feed-forward'),
-    Setting('reference_feedforward', '-', 1.0, 0.0, 1.0,
+    setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
+    setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the feed-forward'),
+    setting('reference_feedforward', '-', 1.0, 0.0, 1.0,
             'share of the pressure at rest for the reference that is fed forward'),
-    Setting('integral_weight', 'mm2/(mm s)2', 30.0, 1e-6, 1e8, 'weight of the integral'),
-    Setting('command_weight', 'mm2/kPa2', 1e-2, 1e-8, 1e4, 'weight of the command'),
-    Setting('disturbance_pa', 'Pa', 1e3, 1e-2, 1e6, 'disturbance the observer expects, a tick'),
-    Setting('noise_m', 'm', 1e-5, 1e-8, 1e-2, 'sensor noise the observer expects'),
-    Setting('anti_windup_time_s', 's', 0.05, 0.01, 10.0, 'back-calculation time constant'),
-    Setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
-    Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
-    Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
-    Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+    setting('integral_weight', 'mm2/(mm s)2', 30.0, 1e-6, 1e8, 'weight of the integral'),
+    setting('command_weight', 'mm2/kPa2', 1e-2, 1e-8, 1e4, 'weight of the command'),
+    setting('disturbance_pa', 'Pa', 1e3, 1e-2, 1e6, 'disturbance the observer expects, a tick'),
+    setting('noise_m', 'm', 1e-5, 1e-8, 1e-2, 'sensor noise the observer expects'),
+    setting('anti_windup_time_s', 's', 0.05, 0.01, 10.0, 'back-calculation time constant'),
+    setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
+    setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
+    setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
 PARAMETERS = parameter_record(SETTINGS)
 STATE = record(
@@ -248,7 +249,7 @@ class LqiController(FixedLawController):
 
     def __init__(self, model: LinearModel, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
-        checked = checked_settings(SETTINGS, settings or {}, where)
+        checked = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
         if model.rate_hz != checked['rate_hz']:
             raise InputError(
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '

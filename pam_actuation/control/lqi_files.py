@@ -37,10 +37,10 @@ import numpy as np
 from pam_actuation.control.lqi import LqiController, SETTINGS
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, used_numbers
 from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
-from pam_actuation.control.settings import checked_settings
 from pam_sim.errors import InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
+from pam_sim.parameters import check_parameters
 from pam_sim.records import fields
 from pam_sim.rig import Rig
 
@@ -82,7 +82,8 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
     elif rig is None:
         raise InputError('without a rig the controller text must bring its `model`', tree.where())
     else:
-        model = identify_on_rig(rig, checked_settings(SETTINGS, settings, where)['rate_hz'])
+        checked = check_parameters(SETTINGS, settings, 'setting', where)
+        model = identify_on_rig(rig, checked['rate_hz'])
     controller = LqiController(model, settings, rig_name, where)
     if 'gains' in tree:
         used = used_numbers(controller.gains)

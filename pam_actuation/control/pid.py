@@ -27,26 +27,27 @@ from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.settings import checked_settings, parameter_record, Setting
+from pam_actuation.control.settings import parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
-    Setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
-    Setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the static inverse'),
-    Setting('use_static_inverse', '-', 0.0, 0.0, 1.0, '1 = add the static inverse'),
-    Setting('proportional_pa_per_m', 'Pa/m', 2e6, 0.0, 5e7, 'proportional gain'),
-    Setting('integral_pa_per_m_s', 'Pa/(m s)', 2.5e7, 0.0, 1e9, 'integral gain'),
-    Setting('derivative_pa_s_per_m', 'Pa s/m', 1.5e5, 0.0, 5e6, 'derivative gain'),
-    Setting('anti_windup_time_s', 's', 0.2, 0.01, 10.0, 'back-calculation time constant'),
-    Setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
-    Setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
-    Setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
-    Setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
-    Setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+    setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
+    setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the static inverse'),
+    setting('use_static_inverse', '-', 0.0, 0.0, 1.0, '1 = add the static inverse'),
+    setting('proportional_pa_per_m', 'Pa/m', 2e6, 0.0, 5e7, 'proportional gain'),
+    setting('integral_pa_per_m_s', 'Pa/(m s)', 2.5e7, 0.0, 1e9, 'integral gain'),
+    setting('derivative_pa_s_per_m', 'Pa s/m', 1.5e5, 0.0, 5e6, 'derivative gain'),
+    setting('anti_windup_time_s', 's', 0.2, 0.01, 10.0, 'back-calculation time constant'),
+    setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
+    setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
+    setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
+    setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
 
 PARAMETERS = parameter_record(SETTINGS)
@@ -188,5 +189,6 @@ class PidController(FixedLawController):
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         super().__init__(
-            pid_step, checked_settings(SETTINGS, settings or {}, where), self.static_inverse,
+            pid_step, check_parameters(SETTINGS, settings or {}, 'setting', where or ''),
+            self.static_inverse,
             PARAMETERS, STATE, rig_name)

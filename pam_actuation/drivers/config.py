@@ -21,14 +21,13 @@ parameters behind ``ppr.`` or ``hsv.``.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-import math
 
 from pam_actuation.drivers.hsv import HsvConfig
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.parameter import declared_numbers
 from pam_actuation.drivers.ppr import PprConfig
-from pam_sim.errors import did_you_mean, InputError
-from pam_sim.units import allowed_range
+from pam_sim.errors import InputError
+from pam_sim.parameters import check_given
 
 VALVE_TYPES = ('ppr', 'hsv')
 
@@ -75,8 +74,7 @@ class DriverConfig:
         """
         config = base or cls()
         changes: dict[str, dict[str, float]] = {'': {}, 'ppr': {}, 'hsv': {}}
-        for name, value in dict(values or {}).items():
-            number = _checked(name, value, where)
+        for name, number in check_given(DRIVER_PARAMETERS, values or {}, where=where).items():
             group, _, key = name.rpartition('.')
             changes[group][key] = number
         config = cls(replace(config.safety, **changes['']), replace(config.ppr, **changes['ppr']),
@@ -95,21 +93,6 @@ class DriverConfig:
                 for group, part in groups.items() for item in fields(part)}
 
 
-def _checked(name: str, value: object, where: str) -> float:
-    if name not in _BY_NAME:
-        hint = did_you_mean(name, _BY_NAME, '', ', did you mean {}?')
-        raise InputError(f'unknown parameter {name!r}{hint}', where)
-    lower, upper = _BY_NAME[name].lower, _BY_NAME[name].upper
-    assert lower is not None and upper is not None      # each is a number
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f'{name} is {value!r}, a number is needed', where)
-    if not math.isfinite(value) or not lower <= value <= upper:
-        raise InputError(
-            f'{name} is {value}, allowed are {allowed_range(lower, upper, name=name)}', where)
-    return float(value)
-
-
 DRIVER_PARAMETERS = (
     *declared_numbers(SafetyLimits), *declared_numbers(PprConfig, 'ppr.'),
     *declared_numbers(HsvConfig, 'hsv.'))
-_BY_NAME = {parameter.name: parameter for parameter in DRIVER_PARAMETERS}

@@ -12,21 +12,57 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What one parameter of the valve driver or of a hardware back end is, and how it is declared."""
+"""Parameters of nodes and of what they hold: the unit stands in description or name."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
+import math
+import re
 from typing import Any
 
+from pam_sim.parameters import Parameter
 
-@dataclass(frozen=True)
-class DriverParameter:
-    """One parameter: name, default, allowed range (None: not a number), meaning."""
+# The end of a name to its unit, as docs/reference/naming.md writes them.
+_UNITS = {'s': 's', 'pa': 'Pa', 'v': 'V', 'hz': 'Hz', 'm': 'm', 'm3': 'm³', 'n': 'N', 'kg': 'kg',
+          'k': 'K', 'rad': 'rad', 'periods': 'periods'}
 
-    name: str
-    default: object
-    lower: float | None
-    upper: float | None
-    description: str
+
+def unit_of(name: str) -> str:
+    """Return the unit at the end of a name, as ``Pa/V`` of ``ppr.gain_pa_per_v``; '' for none."""
+    above, _, below = name.rpartition('_per_')
+    if not above:
+        return _UNITS.get(below.rsplit('_', 1)[-1], '') if '_' in below else ''
+    above, units = unit_of(above), [_UNITS.get(part, '') for part in below.split('_')]
+    if not above or not all(units):
+        return ''
+    return f'{above}/{units[0]}' if len(units) == 1 else f'{above}/({"·".join(units)})'
+
+
+def node_parameter(
+        name: str, default: Any, description: str, lower: float = -math.inf,
+        upper: float = math.inf, choices: tuple[str, ...] = ()) -> Parameter:
+    """
+    Declare a parameter of a node, or of what a node holds.
+
+    Parameters
+    ----------
+    name : str
+        Of the ROS parameter; a number ends in its unit.
+    default : float, int, str, bool or list of str
+    description : str
+        One sentence; a unit in brackets counts before that of the name: ``Rate [Hz].``
+    lower, upper : float
+        Inclusive bounds of a number.
+    choices : tuple of str
+        The texts allowed; empty: any.
+
+    Returns
+    -------
+    Parameter
+
+    """
+    said = re.search(r'\[([^\]]+)\]', description)
+    unit = said[1] if said else unit_of(name) if type(default) is float else ''
+    return Parameter(name, unit, default, lower, upper, description=description, choices=choices)
 
 
 def number(default: float, lower: float, upper: float, description: str) -> Any:
@@ -35,7 +71,7 @@ def number(default: float, lower: float, upper: float, description: str) -> Any:
         'lower': lower, 'upper': upper, 'description': description})
 
 
-def declared_numbers(configuration: type[Any], prefix: str = '') -> tuple[DriverParameter, ...]:
+def declared_numbers(configuration: type[Any], prefix: str = '') -> tuple[Parameter, ...]:
     """Return the numbers that a configuration declares, ``prefix`` before their names."""
-    return tuple(DriverParameter(f'{prefix}{item.name}', item.default, **item.metadata)
+    return tuple(node_parameter(f'{prefix}{item.name}', item.default, **item.metadata)
                  for item in fields(configuration))

@@ -17,7 +17,6 @@
 from collections.abc import Callable, Mapping
 from typing import Any, TYPE_CHECKING, TypeVar
 
-from pam_actuation.drivers.parameter import DriverParameter
 
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.dummy import DummySensors, DummyValve
@@ -28,6 +27,7 @@ from pam_actuation.hardware.sim import SimulatedValve
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
 from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
 
 if TYPE_CHECKING:
     from pam_actuation.drivers.config import DriverConfig
@@ -42,7 +42,7 @@ BackEnd = type[ValveOutput] | type[DummySensors] | type[IioAdc]
 Told = TypeVar('Told')
 
 
-def parameters_of(back_ends: Mapping[str, BackEnd]) -> tuple[DriverParameter, ...]:
+def parameters_of(back_ends: Mapping[str, BackEnd]) -> tuple[Parameter, ...]:
     """Return the parameters of several back ends, each once."""
     return tuple({parameter.name: parameter for back_end in back_ends.values()
                   for parameter in back_end.PARAMETERS}.values())

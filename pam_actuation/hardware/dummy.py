@@ -16,9 +16,9 @@
 
 from typing import Any
 
-from pam_actuation.drivers.parameter import DriverParameter
 
 from pam_actuation.hardware.valve_output import check_pair, ValveOutput
+from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
 
 
@@ -42,7 +42,7 @@ class DummyValve(ValveOutput):
 class DummySensors:
     """A muscle at rest: atmospheric pressure, no contraction, no force."""
 
-    PARAMETERS: tuple[DriverParameter, ...] = ()
+    PARAMETERS: tuple[Parameter, ...] = ()
     READINGS = {'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
 
     def __init__(self, values: dict[str, Any]) -> None:

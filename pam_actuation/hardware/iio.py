@@ -22,14 +22,13 @@ offset that is not there is 0.
 
 from pathlib import Path
 
-from pam_actuation.drivers.parameter import DriverParameter
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
 
 MV_PER_V = 1000.0
 
-SYSFS_ROOT = DriverParameter(
-    'sysfs_root', '/sys', None, None, 'where the kernel shows its devices')
+SYSFS_ROOT = node_parameter('sysfs_root', '/sys', 'where the kernel shows its devices')
 
 
 class IioVoltage:

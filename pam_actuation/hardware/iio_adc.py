@@ -16,9 +16,10 @@
 
 from typing import Any
 
-from pam_actuation.drivers.parameter import DriverParameter
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
+from pam_sim.parameters import Parameter
 
 # Topic: unit in the names of its parameters, what it is, default at 0 V and per volt.
 QUANTITIES = {
@@ -30,14 +31,14 @@ QUANTITIES = {
 
 
 def _parameters(topic: str, unit: str, what: str, at_0_v: float,
-                per_v: float) -> tuple[DriverParameter, DriverParameter, DriverParameter]:
+                per_v: float) -> tuple[Parameter, Parameter, Parameter]:
     return (
-        DriverParameter(f'{topic}.channel', -1, -1, 255,
-                        f'analog input of the {what}; -1: not connected'),
-        DriverParameter(f'{topic}.{unit}_at_0_v', at_0_v, -1e9, 1e9,
-                        f'reading at 0 V: {what} [{unit}]'),
-        DriverParameter(f'{topic}.{unit}_per_v', per_v, -1e9, 1e9,
-                        f'change of the reading per volt: {what} [{unit}/V]'),
+        node_parameter(f'{topic}.channel', -1, f'analog input of the {what}; -1: not connected',
+                       -1, 255),
+        node_parameter(f'{topic}.{unit}_at_0_v', at_0_v, f'reading at 0 V: {what} [{unit}]',
+                       -1e9, 1e9),
+        node_parameter(f'{topic}.{unit}_per_v', per_v,
+                       f'change of the reading per volt: {what} [{unit}/V]', -1e9, 1e9),
     )
 
 
@@ -61,8 +62,8 @@ class IioAdc:
 
     PARAMETERS = (
         SYSFS_ROOT,
-        DriverParameter('adc.device', '', None, None,
-                        'analog input: its folder, such as iio:device0, or its name'),
+        node_parameter(
+            'adc.device', '', 'analog input: its folder, such as iio:device0, or its name'),
         *(parameter for topic, quantity in QUANTITIES.items()
           for parameter in _parameters(topic, *quantity)),
     )

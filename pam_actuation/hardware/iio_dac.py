@@ -16,24 +16,25 @@
 
 from pathlib import Path
 
-from pam_actuation.drivers.parameter import DriverParameter
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import ValveOutput
+from pam_sim.parameters import Parameter
 
 
 class IioDac(ValveOutput):
     """Drive the set-point input of a regulator; 0 V vents."""
 
     VALVE_TYPES: tuple[str, ...] = ('ppr',)
-    PARAMETERS: tuple[DriverParameter, ...] = (
+    PARAMETERS: tuple[Parameter, ...] = (
         SYSFS_ROOT,
-        DriverParameter('dac.device', '', None, None,
-                        'analog output: its folder, such as iio:device0, or its name'),
-        DriverParameter('dac.channel', 0, 0, 255, 'channel of the analog output'),
-        DriverParameter('dac.amplification', 1.0, 0.01, 100.0,
-                        'volts at the regulator per volt of the analog output'),
+        node_parameter(
+            'dac.device', '', 'analog output: its folder, such as iio:device0, or its name'),
+        node_parameter('dac.channel', 0, 'channel of the analog output', 0, 255),
+        node_parameter('dac.amplification', 1.0,
+                       'volts at the regulator per volt of the analog output', 0.01, 100.0),
     )
 
     def open(self) -> None:  # noqa: A003

@@ -17,11 +17,12 @@
 from pathlib import Path
 import time
 
-from pam_actuation.drivers.parameter import DriverParameter
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.iio import SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import check_pair, ValveOutput
+from pam_sim.parameters import Parameter
 
 EXPORT_WAIT_S = 1.0     # until the kernel shows a channel and udev hands it over
 NS_PER_S = 1e9
@@ -91,13 +92,13 @@ class PwmPair(ValveOutput):
     """Drive filling and venting valve; what shuts is written before what opens."""
 
     VALVE_TYPES: tuple[str, ...] = ('hsv',)
-    PARAMETERS: tuple[DriverParameter, ...] = (
+    PARAMETERS: tuple[Parameter, ...] = (
         SYSFS_ROOT,
-        DriverParameter('pwm.chip', 'pwmchip0', None, None, 'PWM chip of both valves'),
-        DriverParameter('pwm.fill_channel', 0, 0, 255, 'channel of the filling valve'),
-        DriverParameter('pwm.vent_channel', 1, 0, 255, 'channel of the venting valve'),
-        DriverParameter('pwm.vent_normally_open', False, None, None,
-                        'whether the venting valve is open without current'),
+        node_parameter('pwm.chip', 'pwmchip0', 'PWM chip of both valves'),
+        node_parameter('pwm.fill_channel', 0, 'channel of the filling valve', 0, 255),
+        node_parameter('pwm.vent_channel', 1, 'channel of the venting valve', 0, 255),
+        node_parameter('pwm.vent_normally_open', False,
+                       'whether the venting valve is open without current'),
     )
 
     def open(self) -> None:  # noqa: A003

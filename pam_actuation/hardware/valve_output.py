@@ -26,9 +26,9 @@ from typing import Any, TYPE_CHECKING
 import weakref
 
 from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
-from pam_actuation.drivers.parameter import DriverParameter
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
+from pam_sim.parameters import Parameter
 
 if TYPE_CHECKING:
     from pam_actuation.drivers.config import DriverConfig
@@ -55,7 +55,7 @@ class ValveOutput:
     """
 
     VALVE_TYPES: tuple[str, ...] = ('ppr', 'hsv')
-    PARAMETERS: tuple[DriverParameter, ...] = ()
+    PARAMETERS: tuple[Parameter, ...] = ()
 
     def __init__(self, values: dict[str, Any], config: 'DriverConfig') -> None:
         self.values = values

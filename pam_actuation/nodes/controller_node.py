@@ -17,15 +17,16 @@
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.tick import REASONS
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import OK, Values, WARN
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.refusals import RefusalLog
 from pam_actuation.nodes.senders import SensorEar
 from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 MOST_WRONG_STEPS = 20
-ACCEPT_OTHER_RIG = NodeParameter(
+ACCEPT_OTHER_RIG = node_parameter(
     'accept_other_rig', False, 'Take a controller file that was made for another rig.')
 MEASURED = ('pressure', 'force', 'contraction')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
@@ -49,13 +50,13 @@ class ControllerNode(ManagedNode):
     """
 
     DEFAULT_CONTROLLERS: dict[str, str] = {}            # preset by valve
-    PARAMETERS: tuple[NodeParameter, ...] = (
-        NodeParameter(
+    PARAMETERS: tuple[Parameter, ...] = (
+        node_parameter(
             'controller', '', 'Controller preset, or path of a controller file. Empty: the '
             'preset that fits the valve.'),
-        NodeParameter(
+        node_parameter(
             'rig', 'dmsp_5_300_realistic', 'Rig the controller is made for: preset or path.'),
-        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
         ACCEPT_OTHER_RIG,
     )
 

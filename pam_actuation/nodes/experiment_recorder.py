@@ -29,11 +29,11 @@ from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.recorder import RecorderCore, RecordingSummary
 from pam_actuation.bags.writer import BagWriter, check_limits
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.endpoints import PolledSubscription, Taken
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.runner import run
@@ -71,38 +71,38 @@ class ExperimentRecorder(ManagedNode):
     STUCK_AFTER_S = 30.0        # the disk may be slow
     FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (
-        NodeParameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
-        NodeParameter(
+        node_parameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
+        node_parameter(
             'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
-        NodeParameter(
+        node_parameter(
             'topics', [''], 'Topics to record, relative to the namespace (diagnostics is '
             '/diagnostics). Empty: all of a muscle; where rig is a joint, all of the joint and '
             'of both muscles.'),
-        NodeParameter(
+        node_parameter(
             'extra_topics', [''], 'Further topics, each as NAME=TYPE, for instance '
             '/bench/imu=sensor_msgs/msg/Imu.'),
-        NodeParameter(
+        node_parameter(
             'max_bagfile_size_bytes', 0, 'Go on in the next file from about this size on '
             '[bytes]; 0: never.', 0, 2**53),
-        NodeParameter(
+        node_parameter(
             'max_bagfile_duration_s', 0.0, 'Go on in the next file after this time [s]; 0: '
             'never.', 0.0, 1e9),
-        NodeParameter(
+        node_parameter(
             'await_topics', [''], 'Activation waits for the publishers of these topics.'),
-        NodeParameter(
+        node_parameter(
             'metadata_file', '', 'JSON file of texts for the record pam_experiment. Empty: '
             'made from the parameters below.'),
-        NodeParameter(
+        node_parameter(
             'notes_folder', '', 'Folder in which whoever started this node may say why the run '
             'ended (ended.json) and in which the node says what it recorded (recorded.json). '
             'Empty: none.'),
-        NodeParameter('experiment', '', 'Experiment that is played: name or path.'),
-        NodeParameter('rig', '', 'Rig or joint: preset, or path of its file.'),
-        NodeParameter('controller', '', 'Controller preset, or path of its file.'),
-        NodeParameter(
+        node_parameter('experiment', '', 'Experiment that is played: name or path.'),
+        node_parameter('rig', '', 'Rig or joint: preset, or path of its file.'),
+        node_parameter('controller', '', 'Controller preset, or path of its file.'),
+        node_parameter(
             'valve_type', UNKNOWN_VALVE, 'Valve of the rig; unknown: that of the rig, else the '
             'bag does not say it.', choices=('ppr', 'hsv', UNKNOWN_VALVE)),
-        NodeParameter(
+        node_parameter(
             'seed', UNKNOWN_SEED, 'Seed of the simulated sensors; -1: none, the bag does not '
             'say one.', UNKNOWN_SEED, MAX_SEED),
     )

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
@@ -25,8 +26,6 @@ from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import node_parameters
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
@@ -43,10 +42,10 @@ class HardwareSensors(ManagedNode):
     NAME = 'hardware_sensors'
     REALTIME_RANK = 2
     PARAMETERS = (
-        NodeParameter('backend', 'iio_adc', 'What the sensors hang on.',
-                      choices=tuple(SENSOR_INPUTS)),
-        NodeParameter('publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
-        *node_parameters(parameters_of(SENSOR_INPUTS)),
+        node_parameter('backend', 'iio_adc', 'What the sensors hang on.',
+                       choices=tuple(SENSOR_INPUTS)),
+        node_parameter('publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
+        *parameters_of(SENSOR_INPUTS),
     )
 
     sensors: Any = None         # of the back end, once configured

@@ -23,17 +23,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import importlib
 import inspect
-from typing import Any, Self, TYPE_CHECKING
+from typing import Any, Self
 
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
+from pam_sim.parameters import Parameter
 import rclpy
-from rclpy.parameter import Parameter
-
-if TYPE_CHECKING:
-    from pam_actuation.control.settings import Setting
+from rclpy import parameter as ros
 
 NAMESPACE = '/ns'       # any: what lies below it is relative
 KINDS = ('publishes', 'subscribes', 'serves')
@@ -61,16 +58,18 @@ class NodeInterface:
 
     ``publishes``, ``subscribes`` and ``serves`` map a name, relative to the node's namespace or
     with ``~/`` to the node, to its type. Those of every node are left out. ``settings`` are
-    those that its controller files know.
+    those that its controller files know, ``live`` the names of the parameters that may change
+    while it runs.
     """
 
     name: str
     description: str
-    parameters: tuple[NodeParameter, ...]
+    parameters: tuple[Parameter, ...]
     publishes: dict[str, str]
     subscribes: dict[str, str]
     serves: dict[str, str]
-    settings: 'tuple[Setting, ...]' = ()
+    settings: tuple[Parameter, ...] = ()
+    live: tuple[str, ...] = ()
 
 
 def node_class(name: str) -> type[ManagedNode]:
@@ -108,7 +107,7 @@ class Inspector:
         kind = node_class(name)
         node = kind(
             context=self._context, namespace=namespace, enable_rosout=False,
-            parameter_overrides=[Parameter(key, value=value) for key, value in {
+            parameter_overrides=[ros.Parameter(key, value=value) for key, value in {
                 **NEEDED.get(name, {}), **(parameters or {})}.items()])
         try:
             node.trigger_configure()
@@ -121,7 +120,7 @@ class Inspector:
                     (one.topic_name, one.msg_type) for one in node.subscriptions)),
                 _by_name(namespace, ((one.srv_name, one.srv_type) for one in node.services
                                      if one.srv_name.startswith('~/'))),
-                kind.controller_settings())
+                kind.controller_settings(), kind.LIVE)
         finally:
             node.destroy_node()
 

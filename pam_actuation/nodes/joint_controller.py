@@ -18,12 +18,12 @@ from collections.abc import Sequence
 import sys
 from typing import TYPE_CHECKING
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.controller_node import ACCEPT_OTHER_RIG
 from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from std_msgs.msg import String
 
@@ -43,16 +43,16 @@ class JointNode(LearningSwitch, ControllerNode):
 
     NAME = 'joint_controller'
     REALTIME_RANK = 1
+    LIVE = ('learning',)
     PARAMETERS = (
-        NodeParameter(
+        node_parameter(
             'controller', '', 'Controller preset or file with mode joint. Empty: the preset '
             'that fits the valve and the size of the joint.'),
-        NodeParameter('joint', 'joint_dmsp_5_300_realistic', 'Joint the controller is made for: '
-                      'preset or path.'),
-        NodeParameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
+        node_parameter('joint', 'joint_dmsp_5_300_realistic',
+                       'Joint the controller is made for: preset or path.'),
+        node_parameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
         ACCEPT_OTHER_RIG,
-        NodeParameter(
-            'learning', True, 'Whether the rules change while running.', live=True),
+        node_parameter('learning', True, 'Whether the rules change while running.'),
     )
 
     def load_rig(self) -> 'JointRig':

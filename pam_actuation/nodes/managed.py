@@ -28,8 +28,9 @@ from collections.abc import Callable, Iterable
 import gc
 import time
 import traceback
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes import qos
@@ -37,7 +38,7 @@ from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Valu
 from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
 from pam_actuation.nodes.loops import LoopSet, SteadyTime
-from pam_actuation.nodes.parameters import declare, NodeParameter
+from pam_actuation.nodes.parameters import declare
 from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.simulated_time import FollowedTime, leave_clock_to_node, PlantTime
@@ -46,33 +47,31 @@ from pam_actuation.topics.codec import Reader, Writer
 from pam_actuation.topics.quality import Quality
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
-
-if TYPE_CHECKING:
-    from pam_actuation.control.settings import Setting
 
 DEACTIVATED = 'deactivated'
 EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
 FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
 
 COMMON_PARAMETERS = (
-    NodeParameter('autostart', True, 'Configure and activate without being told to.'),
-    NodeParameter(
+    node_parameter('autostart', True, 'Configure and activate without being told to.'),
+    node_parameter(
         'await_subscriber', '',
         'Name of a node that must receive every message, such as the recorder; activation waits '
         'for it. Without a slash: in the namespace of this node. Empty: none.'),
-    NodeParameter(
+    node_parameter(
         'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].',
         0.1, 600.0),
-    NodeParameter(
+    node_parameter(
         'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
-    NodeParameter(
+    node_parameter(
         'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of '
         'a rig; 0: none. What must be on time comes first: watchdog and driver add 3 to it, plant '
         'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
-    NodeParameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
-    NodeParameter(
+    node_parameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
+    node_parameter(
         'lockstep', [''], 'Names of all nodes that go through the simulated time tick by tick '
         'together, this one included; needs use_sim_time. Empty: none.'),
 )
@@ -95,7 +94,8 @@ class ManagedNode(LifecycleNode):
     REALTIME_RANK = 0           # added to a real-time priority: among equals nobody gives way
     SPEAKS_AT_ONCE = True       # in /diagnostics, also before it is active
     FOLLOWS_CLOCK = True        # whether the loops run on simulated time with use_sim_time
-    PARAMETERS: tuple[NodeParameter, ...] = ()
+    PARAMETERS: tuple[Parameter, ...] = ()
+    LIVE: tuple[str, ...] = ()  # names of those that may change while it runs
 
     def __init__(self, **kwargs: Any) -> None:
         self.publishers_counted: list[CountedPublisher] = []
@@ -111,7 +111,7 @@ class ManagedNode(LifecycleNode):
         self.loops = LoopSet()
         super().__init__(self.NAME, **kwargs)
         self._refuse_impossible_transitions()
-        declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS))
+        declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS), self.LIVE)
         self.awaited = self.value('await_subscriber') and node_name_of(
             self.value('await_subscriber'), self.get_namespace().rstrip('/'),
             'parameter await_subscriber')
@@ -126,7 +126,7 @@ class ManagedNode(LifecycleNode):
     # What derived nodes override.
 
     @staticmethod
-    def controller_settings() -> 'tuple[Setting, ...]':
+    def controller_settings() -> tuple[Parameter, ...]:
         """Return the settings that its controller files know, for its page."""
         return ()
 

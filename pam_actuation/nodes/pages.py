@@ -14,18 +14,15 @@
 
 """One Markdown page per node: what it is, parameters, topics, services, an example."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from pam_actuation.models.markdown import escaped, row
 from pam_actuation.nodes.interfaces import Inspector, NEEDED, NodeInterface, VARIANTS
 from pam_actuation.nodes.managed import COMMON_PARAMETERS
-from pam_actuation.nodes.parameters import NodeParameter
+from pam_actuation.nodes.parameters import allowed
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import parameter_arguments
-
-if TYPE_CHECKING:
-    from pam_actuation.control.settings import Setting
+from pam_sim.parameters import Parameter
 
 _EXPLAINED = 'states, timing and what is common to all nodes: [Nodes](../nodes.md)'
 _MADE = 'Made from the code by `pam nodes --markdown docs/reference/nodes`; do not edit.'
@@ -49,7 +46,7 @@ def page(interface: NodeInterface, notes: Mapping[str, str]) -> str:
         f'{_MADE} More: {_EXPLAINED}.', '## Example', _example(interface),
         '## Topics and services', _endpoints(interface, notes),
         '`/diagnostics` is published by every node; with `use_sim_time` it takes `/clock`.',
-        '## Parameters', _parameters(interface.parameters),
+        '## Parameters', _parameters(interface.parameters, interface.live),
         '## Parameters of every node', _parameters(COMMON_PARAMETERS)]
     if interface.settings:
         parts += ['## Settings in its controller files',
@@ -87,19 +84,19 @@ def _endpoints(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     return '\n'.join(lines)
 
 
-def _parameters(parameters: Sequence[NodeParameter]) -> str:
+def _parameters(parameters: Sequence[Parameter], live: Collection[str] = ()) -> str:
     if not parameters:
         return 'None of its own.'
     lines = [row(('parameter', 'default', 'unit', 'allowed', 'live', 'meaning')),
              '|---|---|---|---|---|---|']
     for one in parameters:
         default = f'`{one.default!r}`' if one.default != '' else ''
-        lines.append(row((f'`{one.name}`', default, one.unit, escaped(one.allowed),
-                          'yes' if one.live else 'no', escaped(one.description))))
+        lines.append(row((f'`{one.name}`', default, one.unit, escaped(allowed(one)),
+                          'yes' if one.name in live else 'no', escaped(one.description))))
     return '\n'.join(lines)
 
 
-def _settings(settings: 'Iterable[Setting]') -> str:
+def _settings(settings: Iterable[Parameter]) -> str:
     lines = [row(('setting', 'default', 'unit', 'allowed', 'meaning')), '|---|---|---|---|---|']
     lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit.strip('-')),
                    f'{one.lower:g} to {one.upper:g}', escaped(one.description)))

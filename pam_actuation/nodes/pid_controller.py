@@ -16,13 +16,10 @@
 
 from collections.abc import Sequence
 import sys
-from typing import TYPE_CHECKING
 
 from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.runner import run
-
-if TYPE_CHECKING:
-    from pam_actuation.control.settings import Setting
+from pam_sim.parameters import Parameter
 
 
 class PidNode(ControllerNode):
@@ -33,7 +30,7 @@ class PidNode(ControllerNode):
     DEFAULT_CONTROLLERS = {'ppr': 'pid', 'hsv': 'pid_hsv'}
 
     @staticmethod
-    def controller_settings() -> 'tuple[Setting, ...]':
+    def controller_settings() -> tuple[Parameter, ...]:
         """Return the settings that its controller files know, for its page."""
         from pam_actuation.control.pid import SETTINGS
         return SETTINGS

@@ -18,11 +18,11 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.lockstep import TickInput
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
@@ -44,12 +44,12 @@ class PlantSimulator(PhysicsNode):
     NAME = 'plant_simulator'
     REALTIME_RANK = 2
     PARAMETERS = (
-        NodeParameter('rig', 'dmsp_5_300_realistic', 'Rig preset, or path of a model file.'),
-        NodeParameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
-        NodeParameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED),
-        NodeParameter(
+        node_parameter('rig', 'dmsp_5_300_realistic', 'Rig preset, or path of a model file.'),
+        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED),
+        node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
-        NodeParameter(
+        node_parameter(
             'clock_rate', 1.0, 'With use_sim_time: simulated seconds per second; 0, in lockstep '
             'only: as fast as the nodes answer.', 0.0, 1000.0),
     )

@@ -20,9 +20,9 @@ from typing import Any
 
 from pam_actuation.bags.ending import FINISHED
 from pam_actuation.bags.ending import PLAYING
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.diagnostics import OK, Values
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
 
@@ -38,18 +38,19 @@ class ReferenceGenerator(ManagedNode):
 
     NAME = 'reference_generator'
     PARAMETERS = (
-        NodeParameter(
+        node_parameter(
             'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file.'),
-        NodeParameter(
+        node_parameter(
             'valve_type', 'ppr', 'Valve of the rig, for experiments that speak to it.',
             choices=('ppr', 'hsv')),
-        NodeParameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
-        NodeParameter(
+        node_parameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
+        node_parameter(
             'await_receiver', False, 'Wait before the experiment starts until some node besides '
             'await_subscriber receives it.'),
-        NodeParameter(
+        node_parameter(
             'start_delay_s', 0.0, 'Wait after that before the experiment starts [s].', 0.0, 60.0),
-        NodeParameter('exit_when_finished', False, 'End the process when the experiment is over.'),
+        node_parameter(
+            'exit_when_finished', False, 'End the process when the experiment is over.'),
     )
 
     loop: Any = None            # a ReferenceLoop, once configured

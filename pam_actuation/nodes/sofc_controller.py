@@ -17,18 +17,16 @@
 from collections.abc import Callable, Sequence
 import os
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
+from pam_sim.parameters import Parameter
 from std_srvs.srv import Trigger
-
-if TYPE_CHECKING:
-    from pam_actuation.control.settings import Setting
 
 
 class SofcNode(LearningSwitch, ControllerNode):
@@ -37,17 +35,17 @@ class SofcNode(LearningSwitch, ControllerNode):
     NAME = 'sofc_controller'
     REALTIME_RANK = 1
     DEFAULT_CONTROLLERS = {'ppr': 'sofc_ppr', 'hsv': 'sofc_hsv'}
+    LIVE = ('learning',)
     PARAMETERS = (
         *ControllerNode.PARAMETERS,
-        NodeParameter(
+        node_parameter(
             'rules_file', '', 'File of the rules: read at configure if it exists, written by '
             'the service save_rules. Empty: start from the rules of the controller file.'),
-        NodeParameter(
-            'learning', True, 'Whether the rules change while running.', live=True),
+        node_parameter('learning', True, 'Whether the rules change while running.'),
     )
 
     @staticmethod
-    def controller_settings() -> 'tuple[Setting, ...]':
+    def controller_settings() -> tuple[Parameter, ...]:
         """Return the settings that its controller files know, for its page."""
         from pam_actuation.control.sofc.settings import SETTINGS
         return SETTINGS

@@ -19,6 +19,7 @@ import sys
 from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import open_valve
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
@@ -31,8 +32,6 @@ from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import DEACTIVATED
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import node_parameters
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.senders import ANSWER_PERIOD_S
 from pam_actuation.nodes.senders import DriverEar
@@ -59,23 +58,24 @@ class ValveDriver(ManagedNode):
     NAME = 'valve_driver'
     REALTIME_RANK = 3
     PARAMETERS = (
-        NodeParameter(
+        node_parameter(
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
             'high-speed valves.', choices=('ppr', 'hsv')),
-        NodeParameter(
+        node_parameter(
             'rig', '', 'Rig preset or model file, or JOINT/flexor and JOINT/extensor, that tells '
             'the driver valves, volume and load; numbers given beside it win. Empty: the '
             'defaults of the parameters.'),
-        NodeParameter(
+        node_parameter(
             'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
             'pressure_command; supervised alike.'),
-        NodeParameter(
+        node_parameter(
             'backend', 'sim', 'What the valve hangs on: the plant that listens to valve_signal, '
             'nothing, an analog output, two PWM channels.', choices=tuple(VALVE_OUTPUTS)),
-        NodeParameter(
+        node_parameter(
             'device_watchdog_s', 0.1, 'Silence of the driver, killed or stopped, from which a '
             'process of its own vents the device of the back end [s]; 0: none does.', 0.0, 1.0),
-        *node_parameters((*DRIVER_PARAMETERS, *parameters_of(VALVE_OUTPUTS))),
+        *DRIVER_PARAMETERS,
+        *parameters_of(VALVE_OUTPUTS),
     )
 
     loop: Any = None            # a DriverLoop, once configured

@@ -18,13 +18,13 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.drivers.watchdog import (
     CONTESTED, machine_load, SignalWatchdog, VENTS, WAITING)
 from pam_actuation.nodes.diagnostics import ERROR, OK, Values, WARN
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.lockstep import DRIVER
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.nodes.parameters import NodeParameter
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.senders import ANSWER_PERIOD_S, IDLE_PERIOD_S, WriterNames
 
@@ -44,10 +44,10 @@ class ValveWatchdog(ManagedNode):
     NAME = 'valve_watchdog'
     REALTIME_RANK = 3
     PARAMETERS = (
-        NodeParameter(
+        node_parameter(
             'valve_type', 'ppr', 'Valve of the rig, until a driver is heard: then that of its '
             'signals.', choices=('ppr', 'hsv')),
-        NodeParameter(
+        node_parameter(
             'timeout_s', 0.05, 'Silence of valve_signal from which it vents [s].', 0.02, 1.0),
     )
 

@@ -187,7 +187,7 @@ class Effect:
         """Return what is fitted with a type of valve; by default every amplitude."""
         declared = tuple(free for free in self.fitting.free if valve in free.valves)
         return declared or tuple(
-            FreeParameter(p.name, abs(p.nominal) or 1e-3 * max(abs(p.lower), abs(p.upper)),
+            FreeParameter(p.name, abs(p.default) or 1e-3 * max(abs(p.lower), abs(p.upper)),
                           p.lower, p.upper)
             for p in self.parameters if p.name in self.amplitude)
 

@@ -29,7 +29,7 @@ def joint_to_yaml(joint: 'JointRig') -> str:
     for side in SIDES:
         data[side] = load_yaml(getattr(joint, side).to_yaml()).plain()
     changed = {p.name: joint.parameters[p.name] for p in PARAMETERS
-               if joint.parameters[p.name] != p.nominal}
+               if joint.parameters[p.name] != p.default}
     if changed:
         data['parameters'] = changed
     return dump_yaml(data)

@@ -48,7 +48,7 @@ def test_text_of_a_controller_rebuilds_it_to_the_bit(name):
 
 @pytest.mark.parametrize('text, line, words', [
     ('controller: sofc\nsettings:\n  lead_sec: 0.1\n', 3, 'lead_s'),
-    ('controller: sofc\nsettings:\n  lead_s: 7.0\n', 3, '0...0.5'),
+    ('controller: sofc\nsettings:\n  lead_s: 7.0\n', 3, 'allowed 0 to 0.5 s'),
     ('controller: sofc\nsettings:\n  lead_s: soon\n', 3, 'number'),
     ('controller: sofc\nsettings:\n  index_form: round\n', 3, 'linear'),
     ('controller: fuzzy\nsettings: {}\n', 1, 'sofc'),

@@ -24,7 +24,7 @@ import sys
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LINE = "    Setting('extra_gain_pa_per_m', 'Pa/m', 25.0, 0.0, 100.0, 'gain of the test'),\n"
+LINE = "    setting('extra_gain_pa_per_m', 'Pa/m', 25.0, 0.0, 100.0, 'gain of the test'),\n"
 LAWS = {'sofc': 'pam_actuation.control.sofc.settings', 'pid': 'pam_actuation.control.pid'}
 # What a controller makes of the setting: values, its compiled array, text in a bag, a mistake.
 LOAD = """
@@ -110,7 +110,7 @@ def test_it_is_read_checked_compiled_and_written(house, tmp_path, kind):
     found = json.loads(run(house, '-c', LOAD, kind, LAWS[kind], tmp_path))
     assert found['values'] == found['compiled'] == [25.0, 42.0, 42.0]
     assert found['mistake'].endswith(
-        'own.yaml:3: extra_gain_pa_per_m = 100.5 Pa/m is outside 0...100 Pa/m')
+        'own.yaml:3: `extra_gain_pa_per_m` is 100.5; allowed 0 to 100 Pa/m')
 
 
 @pytest.mark.ros

@@ -18,9 +18,10 @@ import numpy as np
 from pam_actuation.control import lqi, pid
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.inputs import INPUT, write_inputs
-from pam_actuation.control.settings import checked_settings, parameter_record, Setting
+from pam_actuation.control.settings import parameter_record, setting
 from pam_actuation.control.sofc import records, settings, step
 from pam_sim.compiled import sources
+from pam_sim.parameters import check_parameters
 from pam_sim.records import fields, values_of, zeros
 import pytest
 
@@ -99,13 +100,13 @@ def test_a_changed_record_is_another_program(law):
 
 def test_a_declared_setting_is_read_checked_and_compiled_without_more():
     """One line: name, unit, default, range, sentence."""
-    added = Setting('damping_pa_s_per_m', 'Pa s/m', 2.0, 0.0, 9.0, 'damping, for this test')
+    added = setting('damping_pa_s_per_m', 'Pa s/m', 2.0, 0.0, 9.0, 'damping, for this test')
     first, *others = pid.SETTINGS
     specification = (first, added, *others)
     parameters = parameter_record(specification)
-    read = checked_settings(specification, {'damping_pa_s_per_m': 3.0})
+    read = check_parameters(specification, {'damping_pa_s_per_m': 3.0})
     compiled = fields(values_of(parameters, read), parameters)
     assert compiled.damping_pa_s_per_m == 3.0
-    assert fields(values_of(parameters, checked_settings(specification, {})),
+    assert fields(values_of(parameters, check_parameters(specification, {})),
                   parameters).damping_pa_s_per_m == 2.0
     assert np.isclose(compiled.start_time_s, read['start_time_s'])

@@ -199,10 +199,11 @@ def test_safe_signal():
 
 @pytest.mark.parametrize('valve, config, words', [
     ('xyz', None, "unknown valve type 'xyz', choose ppr or hsv"),
-    ('hsv', {'hsv.dead_tme_s': 0.03}, 'did you mean hsv.dead_time_s'),
-    ('hsv', {'hsv.gain': 3.0}, 'hsv.gain is 3.0, allowed are 0.05 to 1'),
-    ('ppr', {'max_pressure_gauge_pa': 'high'}, 'a number is needed'),
-    ('ppr', {'max_pressure_gauge_pa': math.nan}, 'allowed are 1000 to'),
+    ('hsv', {'hsv.dead_tme_s': 0.03}, 'did you mean `hsv.dead_time_s`'),
+    ('hsv', {'hsv.gain': 3.0}, '`hsv.gain` is 3; allowed 0.05 to 1'),
+    ('ppr', {'max_pressure_gauge_pa': 'high'},
+     'must be a number, not .high.; allowed 1000 to 1e.06 Pa gauge'),
+    ('ppr', {'max_pressure_gauge_pa': math.nan}, 'is nan; allowed 1000 to'),
     ('ppr', {'ppr.lowest_v': 5.0, 'ppr.highest_v': 4.0}, 'is not below')])
 def test_bad_configuration(valve, config, words):
     """One sentence with place, value and allowed range."""

@@ -21,6 +21,7 @@ pytest.importorskip('rclpy')
 from pam_actuation import resources                                         # noqa: E402, I100
 from pam_actuation.hardware.back_ends import VALVE_OUTPUTS                  # noqa: E402
 from pam_actuation.nodes.hardware_sensors import HardwareSensors            # noqa: E402
+from pam_actuation.nodes.parameters import problem                          # noqa: E402
 from pam_actuation.nodes.valve_driver import ValveDriver                    # noqa: E402
 import yaml                                                                 # noqa: E402
 
@@ -34,7 +35,7 @@ def test_every_value_is_a_parameter_and_allowed(name):
     for node, content in given.items():
         table = {parameter.name: parameter for parameter in NODES[node].PARAMETERS}
         for parameter, value in content['ros__parameters'].items():
-            assert table[parameter].problem(value) == '', parameter
+            assert problem(table[parameter], value) == '', parameter
 
 
 def test_there_is_a_file_for_every_back_end():

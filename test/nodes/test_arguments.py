@@ -20,6 +20,7 @@ import re
 import subprocess
 import sys
 
+from pam_actuation.drivers.parameter import node_parameter, unit_of
 from pam_actuation.nodes.arguments import help_text
 from pam_actuation.resources import node_page
 import pytest
@@ -120,10 +121,8 @@ def test_an_executable_answers_as_a_process(tmp_path):
 
 
 def test_units_are_read_from_description_or_name():
-    pytest.importorskip('rclpy')
-    from pam_actuation.nodes.parameters import NodeParameter, unit_of
-    assert NodeParameter('publish_rate_hz', 250.0, 'Rate [Hz].').unit == 'Hz'
-    assert NodeParameter('max_bagfile_size_bytes', 0, 'Size [bytes].').unit == 'bytes'
+    assert node_parameter('publish_rate_hz', 250.0, 'Rate [Hz].').unit == 'Hz'
+    assert node_parameter('max_bagfile_size_bytes', 0, 'Size [bytes].').unit == 'bytes'
     assert [unit_of(name) for name in (
         'hsv.conductance_m3_per_s_pa', 'ppr.gain_pa_per_v', 'hsv.volume_m3', 'pause_s', 'hsv.gain',
         'hsv.correct_volume', 's', 'flow_per_period')] == [

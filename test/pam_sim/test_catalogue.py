@@ -56,7 +56,7 @@ def test_every_effect_says_what_it_is(name):
         assert parameter.unit and parameter.description.endswith('.'), parameter.name
         assert math.isfinite(parameter.lower) and math.isfinite(parameter.upper)
         assert parameter.lower < parameter.upper
-        assert parameter.lower <= parameter.nominal <= parameter.upper
+        assert parameter.lower <= parameter.default <= parameter.upper
 
 
 @pytest.mark.parametrize('entry', ENTRIES, ids=lambda entry: f'{entry["kind"]}-{entry["name"]}')

@@ -85,7 +85,7 @@ def test_named_as_results_name_it(line):
         assert reported == stated
     for parameter in effect.parameters:
         assert parameter.unit and parameter.description
-        assert parameter.lower <= parameter.nominal <= parameter.upper
+        assert parameter.lower <= parameter.default <= parameter.upper
     hsv_only = ('supply_droop', 'dead_volume', 'thermal', 'valve_dead_zone_two_ramps')
     ppr_only = ('valve_hysteresis', 'flow_limit')
     expected = ('hsv',) if name in hsv_only else ('ppr',) if name in ppr_only else ('ppr', 'hsv')

@@ -35,7 +35,7 @@ def random_law(name, muscle, data):
     kind = get_law(name)
     values = {}
     for parameter in kind.PARAMETERS:
-        middle = kind.SETS[muscle].values.get(parameter.name, parameter.nominal)
+        middle = kind.SETS[muscle].values.get(parameter.name, parameter.default)
         moved = middle * data.draw(st.floats(0.8, 1.2), label=parameter.name)
         values[parameter.name] = min(max(moved, parameter.lower), parameter.upper)
     try:

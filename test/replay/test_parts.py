@@ -128,8 +128,9 @@ def test_single_settings_change_the_recorded_controller(runs):
     assert both.settings['learning_rate'] == 0.5
     assert both.settings['lead_s'] != changed_controller(
         run, ['learning_rate=0.5']).settings['lead_s']
-    for wanted, words in ((['lead=1'], 'did you mean lead_s'), (['lead_s=fast'], 'a number'),
-                          (['lead_s=99'], 'outside'), (['sofc_ppr', 'pid'], 'two controllers')):
+    for wanted, words in ((['lead=1'], 'did you mean `lead_s`'), (['lead_s=fast'], 'a number'),
+                          (['lead_s=99'], 'allowed 0 to 0.5'),
+                          (['sofc_ppr', 'pid'], 'two controllers')):
         with pytest.raises(InputError, match=words):
             changed_controller(run, wanted)
     with pytest.raises(InputError, match='does not say which controller'):

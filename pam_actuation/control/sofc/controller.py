@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
@@ -30,6 +29,7 @@ from pam_actuation.control.sofc.settings import parameter_array, PARAMETERS, SCA
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.parameters import check_parameters
 from pam_sim.records import fields, size_of
 
 
@@ -64,7 +64,7 @@ class SelfOrganizingFuzzyController(CompiledController):
     def __init__(self, static_inverse: FloatArray, settings: dict[str, Any] | None = None,
                  rules: RuleBase | None = None, rig_name: str = '',
                  where: Callable[[str], str] | None = None) -> None:
-        settings = checked_settings(SETTINGS, settings or {}, where)
+        settings = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
         super().__init__(settings, STATE, rig_name)
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
             self.settings[name] = float(round(self.settings[name]))

@@ -27,7 +27,6 @@ import os
 from typing import Any
 
 import numpy as np
-from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.rule_text import ARRAYS, digest_of, SCHEMA
@@ -36,6 +35,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
 from pam_sim.keys import Key, names_of
+from pam_sim.parameters import check_parameters
 
 VALVES = ('ppr', 'hsv')
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
@@ -133,7 +133,7 @@ def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     foreign = [_short(name) for name in numbers if name not in SCALING]
     if foreign:
         raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
-    checked_settings(SETTINGS, numbers, lambda name: where)
+    check_parameters(SETTINGS, numbers, 'setting', where)
     if scaling['reference_upper_m'] <= scaling['reference_lower_m']:
         raise InputError('reference_upper_m is not larger than reference_lower_m', where)
     return dict(scaling)
