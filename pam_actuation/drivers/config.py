@@ -22,7 +22,7 @@ parameters behind ``ppr.`` or ``hsv.``.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 
-from pam_actuation.drivers.hsv import HsvConfig
+from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.parameter import declared_numbers
 from pam_actuation.drivers.ppr import PprConfig

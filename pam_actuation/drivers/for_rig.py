@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.drivers.config import DriverConfig
-from pam_actuation.drivers.hsv import HsvConfig
+from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 if TYPE_CHECKING:

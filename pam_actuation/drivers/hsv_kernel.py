@@ -29,8 +29,8 @@ from collections.abc import Callable
 import math
 
 import numpy as np
-from pam_actuation.drivers.hsv_model import (
-    advance, full_rate, observe, PARAMETERS, predict, SENT_SIZE, STATE)
+from pam_actuation.drivers.hsv_config import PARAMETERS, SENT_SIZE
+from pam_actuation.drivers.hsv_model import advance, full_rate, observe, predict, STATE
 from pam_actuation.drivers.hsv_pulses import (
     duty_of_opening, joined_opening, LONGEST_OF_A_PAIR, opening_of_duty, pair_openings,
     shortest_opening)

@@ -27,57 +27,17 @@ import math
 
 import numpy as np
 
+from pam_actuation.drivers.hsv_config import SENT_SIZE
 from pam_sim.compiled import compiled
 from pam_sim.records import record
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
-SENT_SIZE = 32                        # periods a command may be under way
 _DELAY_MEAN = 0.3       # of the running mean of what a wrong dead time does, per period
 _LEARN_PAIR = 0.06      # of a pair's error taken over, per period
 _PAIR_LIMIT = 0.5
 
-# A period is one of the PWM, a part is a part of a period.
-PARAMETERS = record(
-    'period_s',
-    'dead_time_periods',              # as told
-    'dead_time_range_periods',        # the learned dead time stays within +- this of it
-    # Valves and supply.
-    'conductance_kg_per_s_pa',        # C rho0 sqrt(T0/T)
-    'critical_ratio',
-    'supply_pa',                      # nominal, absolute
-    'supply_margin_pa',               # the target stays this far below the supply
-    'open_part',                      # opening time
-    'close_part',                     # closing time
-    'pulse_margin_part',              # shortest pulse beyond the opening time
-    # Volume of the muscle, dead volume included.
-    'volume_m3',                      # at atmospheric pressure
-    'volume_slope_m3_per_pa',         # dV/dp where the load lifts off
-    'volume_curve_m3_per_pa2',        # half of d2V/dp2
-    'lift_off_gauge_pa',              # gauge pressure where the load lifts off
-    # Load on the muscle.
-    'swing_rad_per_period',           # natural frequency at lift-off
-    'swing_slope_rad_per_period_pa',  # its change with pressure
-    'swing_lowest_rad_per_period',    # its lowest value
-    'swing_damping',                  # damping ratio
-    # Choice of the pulse.
-    'gain',                           # share of the predicted error removed per period
-    'slope_share',                    # share of the command's slope fed forward
-    'look_ahead_periods',             # the error is looked ahead so far without the valves
-    'band_pa',                        # set-point band: the valves start beyond this error
-    'fine_band_pa',                   # they rest within this one, 0 = no pairs of pulses
-    'rest_share',                     # errors below this share of the shortest pulse rest
-    # Observer, per period: corrections and learning.
-    'correct',                        # of the pressure
-    'correct_volume',                 # of the volume, in pressure
-    'correct_rate',                   # of the volume's rate, in pressure
-    'learn_drift',
-    'learn_gain',                     # of the flows
-    'learn_dead_time',
-    'flow_scale_pa',                  # change per period from which errors are gain errors
-    'gain_limit',                     # flow gains stay within 1/limit..limit
-    'drift_limit_pa_per_period',      # drift stays within +- this
-)
+# A period is one of the PWM.
 STATE = record(
     'started',                        # 1 after the first measurement
     'age_s',                          # of the measurement, set by the caller

@@ -30,6 +30,9 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point
 from pam_sim.records import cells, record, values_of, zeros
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import MAX_VOLTAGE_V, PARAMETERS as OF_THE_RIG
+
+_RIG = {parameter.name: parameter.default for parameter in OF_THE_RIG}
 
 PARAMETERS = record(
     'v_per_pa',             # volts per pascal gauge
@@ -97,12 +100,13 @@ class PprConfig:
     slow rise.
     """
 
-    gain_pa_per_v: float = number(100_000.0, 1e3, 1e7, 'static gain K_m of the regulator')
+    gain_pa_per_v: float = number(
+        _RIG['K_m'], 1e3, 1e7, 'static gain K_m of the regulator')
     lowest_v: float = number(0.0, -10.0, 10.0, 'lowest input of the regulator')
-    highest_v: float = number(6.0, 0.1, 24.0, 'highest input of the regulator')
+    highest_v: float = number(MAX_VOLTAGE_V, 0.1, 24.0, 'highest input of the regulator')
     slew_v_per_s: float = number(0.0, 0.0, 1e6, 'limit of the input change, 0 = none')
     period_s: float = number(0.005, 0.001, 0.01, 'time between two signals')
-    time_constant_s: float = number(0.060, 0.001, 10.0, 'lag of the regulator')
+    time_constant_s: float = number(_RIG['T_m'], 0.001, 10.0, 'lag of the regulator')
     dead_time_s: float = number(0.030, 0.0, 1.0, 'time from voltage to pressure')
 
     def par(self) -> FloatArray:

@@ -34,10 +34,12 @@ from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve import hsv
 from pam_sim.valve.flow import mass_flow_kg_per_s
 
 CRITICAL_RATIO = 0.3
-_GAUGE_PA, _CONTRACTION_M, _NOMINAL_SUPPLY_PA = 400e3, 0.010, 801_325.0
+_GAUGE_PA, _CONTRACTION_M = 400e3, 0.010
+_NOMINAL_SUPPLY_PA = next(p.default for p in hsv.PARAMETERS if p.name == 'supply_pa')
 _NO_LIMIT = 1e30
 _RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
 

@@ -14,16 +14,18 @@
 
 """The HSV law against the simulated rig: tracking, steps, rest, limits, compiled form."""
 
+from dataclasses import asdict, replace
 import math
 
 import numba
 import numpy as np
 from pam_actuation.drivers import hsv_kernel as kernel, hsv_pulses as pulses
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.drivers.hsv import HsvConfig, HsvLaw, initial_state
+from pam_actuation.drivers.hsv import HsvLaw, initial_state
+from pam_actuation.drivers.hsv_config import HsvConfig, PARAMETERS
 import pam_sim
 from pam_sim.errors import InputError
-from pam_sim.records import size_of
+from pam_sim.records import fields, size_of
 from pam_sim.rollout.kernel import step as plant_step
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -257,3 +259,21 @@ def test_compiled_closed_loop(rig):
             plant.step(duty)
         assert plant.pressure_pa == pressures[k]
     assert pressures[-1] - P_ATM_PA == pytest.approx(350e3, abs=3e3)
+
+
+def test_a_driver_that_is_told_of_no_rig_assumes_the_realistic_one():
+    """Valves and supply to the digit, what the load makes of them within a tenth."""
+    told = driver_config(pam_sim.load_rig('dmsp_5_300_realistic', valve='hsv')).hsv
+    usual = HsvConfig()
+    for name in ('period_s', 'conductance_m3_per_s_pa', 'critical_ratio', 'supply_pa',
+                 'open_time_s', 'close_time_s', 'gain'):
+        assert getattr(usual, name) == getattr(told, name), name
+    for name, value in asdict(told).items():
+        assert getattr(usual, name) == pytest.approx(value, rel=0.1), name
+
+
+def test_every_number_of_the_configuration_is_read_by_the_law_by_its_name():
+    config = replace(HsvConfig(), gain=0.5, dead_time_s=0.042)
+    read = fields(config.par(), PARAMETERS)
+    assert {name: read[name] for name in asdict(config)} == asdict(config)
+    assert read.dead_time_periods == 4.2
