@@ -21,19 +21,23 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.loops.bus import Bus, every
+from pam_actuation.loops.wiring import attach_plant, controller_tick, driver_tick
 from pam_actuation.messages import Reference, START_NS
 from pam_actuation.plant_loop import PlantLoop
 from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 
 MS_NS = 1_000_000
+SENSOR_HZ = 250.0
+BETWEEN = 'pressure_command', 'followed_pressure'      # controller and driver
 HELD_M = 0.0089
 FIELD = {'contraction': 'contraction_m', 'force': 'force_n'}
 
 
 class FaultyRig:
     """
-    Controller, driver and the realistic rig, millisecond by millisecond.
+    Controller, driver and the realistic rig on one bus.
 
     Attributes
     ----------
@@ -48,14 +52,23 @@ class FaultyRig:
 
     def __init__(self, valve, controller, tells=True, seed=1):
         rig = load_rig('dmsp_5_300_realistic', valve=valve)
-        self.plant = PlantLoop(rig, seed=seed)
-        self.driver = DriverLoop(valve, driver_config(rig))
-        self.control = ControllerLoop(load_controller(controller, rig))
         self.contraction_m, self.gauge_pa, self.reference_m = [], [], []
         self.reasons = set()
+        self._control = ControllerLoop(load_controller(controller, rig))
         self._tells = tells
         self._sound = {}            # newest readings by topic
-        self._ms = 0
+        self._fault, self._topics, self._reference = '', (), None
+        self._now_ns = START_NS
+        self._bus = bus = Bus(on_sent=self._heard)
+        driver = DriverLoop(valve, driver_config(rig))
+        self._measure = attach_plant(bus, PlantLoop(rig, seed=seed))
+        self._decide = controller_tick(bus, self._control)
+        for loop in (driver, self._control):
+            for topic, take in loop.takes().items():
+                bus.connect(topic, self._spoiled(topic, take))
+        bus.add(self._sample, every(SENSOR_HZ))
+        bus.add(self._tick, every(200.0))
+        bus.add(driver_tick(bus, driver), every(driver.rate_hz))
 
     def run(self, duration_s, reference, fault='', topics=()):
         """
@@ -74,52 +87,58 @@ class FaultyRig:
             Which readings.
 
         """
-        for _ in range(round(duration_s * 1e3)):
-            now_ns = START_NS + self._ms * MS_NS
-            wanted = reference(self._ms * 1e-3)
-            self.plant.advance_to(now_ns)
-            if self._ms % 4 == 0:
-                self._measure(now_ns, fault if topics else '', topics)
-                self.reference_m.append(wanted[0])
-            if self._ms % 5 == 0 and fault != 'stopped':
-                self.control.take('reference', Reference(now_ns, *wanted))
-                (command,), state = self.control.tick(now_ns)
-                self.internals = dict(zip(state.names, state.values))
-                if fault != 'apart':
-                    self.driver.on_command(command)
-                self.reasons.add(self.control.reason)
-            if self._ms % round(self.driver.period_s * 1e3) == 0:
-                self.plant.set_signal(self.driver.tick(now_ns)[0])
-                if self._tells and fault != 'apart':
-                    self.control.take('followed_pressure', self.driver.followed())
-            self._ms += 1
+        self._fault, self._topics, self._reference = fault, topics, reference
+        self._now_ns += round(duration_s * 1e9)
+        self._bus.run_until(self._now_ns - 1)
+        self._bus.deliver(self._now_ns - 1)     # before another fault may begin
         return self
 
-    def _measure(self, now_ns, fault, topics):
-        for topic, message in self.plant.sample(now_ns).items():
+    def _heard(self, topic, message, now_ns):
+        """Note what a loop sends, before anything is spoiled."""
+        if topic == 'contraction':
+            self.contraction_m.append(message.contraction_m)
+        elif topic == 'pressure':
+            self.gauge_pa.append(message.pressure_pa - P_ATM_PA)
+        elif topic == 'controller_state':
+            self.internals = dict(zip(message.names, message.values))
+
+    def _wanted(self, now_ns):
+        return self._reference((now_ns - START_NS) // MS_NS * 1e-3)
+
+    def _sample(self, now_ns):
+        self._measure(now_ns)
+        self.reference_m.append(self._wanted(now_ns)[0])
+
+    def _tick(self, now_ns):
+        if self._fault != 'stopped':
+            self._control.take('reference', Reference(now_ns, *self._wanted(now_ns)))
+            self._decide(now_ns)
+            self.reasons.add(self._control.reason)
+
+    def _spoiled(self, topic, take):
+        """Return what takes a topic the way it arrives with the fault of the moment."""
+        def taken(message):
+            if topic in BETWEEN:
+                if self._fault != 'apart' and (self._tells or topic != 'followed_pressure'):
+                    take(message)
+                return
             field = FIELD.get(topic, 'pressure_pa')
-            if topic == 'contraction':
-                self.contraction_m.append(message.contraction_m)
-            elif topic == 'pressure':
-                self.gauge_pa.append(message.pressure_pa - P_ATM_PA)
-            if fault and topic in topics:
-                message = _spoiled(message, field, fault, self._sound[topic])
+            if topic in self._topics:
+                message = _spoiled(message, field, self._fault, self._sound[topic])
             else:
                 self._sound[topic] = getattr(message, field)
-            if message is None:
-                continue
-            for loop in (self.driver, self.control):
-                if topic in loop.takes():
-                    loop.takes()[topic](message)
+            if message is not None:
+                take(message)
+        return taken
 
     def excursion_m(self, since_s):
         """Return how far it went beyond all that was wanted since a time."""
-        first = round(since_s * 250.0)
+        first = round(since_s * SENSOR_HZ)
         return max(self.contraction_m[first:]) - max(self.reference_m[first:])
 
     def error_m(self, last_s):
         """Return the largest error of the last seconds."""
-        count = round(last_s * 250.0)
+        count = round(last_s * SENSOR_HZ)
         return np.abs(np.subtract(self.contraction_m, self.reference_m)[-count:]).max()
 
 

@@ -22,6 +22,8 @@ from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.loops.bus import Bus
+from pam_actuation.loops.wiring import attach_plant, driver_tick
 from pam_actuation.messages import Pressure
 from pam_actuation.plant_loop import PlantLoop
 import pam_sim
@@ -35,7 +37,7 @@ SAFE = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 
 
 class Chain:
-    """Driver and simulated rig on one clock; the command can be switched off."""
+    """Driver and simulated rig on one bus; command and sensor can be switched off."""
 
     def __init__(self, valve, **changes):
         """Start at rest with a 5 ms sensor and command raster."""
@@ -47,26 +49,39 @@ class Chain:
         self.command_kpa = 300.0
         self.sensor = True
         self.signals, self.statuses, self.pressures_kpa = [], [], []
+        self._bus = bus = Bus(on_sent=self._heard)
+        self._measure, self._act = attach_plant(bus, self.plant), driver_tick(
+            bus, self.loop, done=lambda now_ns: self.statuses.append(self.loop.status()))
+        for topic, take in self.loop.takes().items():
+            bus.connect(topic, self._while_measured(take) if topic == 'pressure' else take)
+
+    def _heard(self, topic, message, now_ns):
+        if topic == 'valve_signal':
+            self.signals.append(message)
+
+    def _while_measured(self, take):
+        return lambda message: take(message) if self.sensor else None
+
+    def _sample(self, now_ns):
+        self._measure(now_ns)
+        self.pressures_kpa.append((self.plant.plant.pressure_pa - P_ATM_PA) * 1e-3)
+
+    def _command(self, now_ns):
+        if self.command_kpa is not None:
+            self._bus.send('pressure_command', Pressure(
+                now_ns, P_ATM_PA + 1e3 * self.command_kpa), now_ns)
 
     def run(self, ms):
         """Go on for some ms; return the last status."""
-        every = round(200 / self.loop.rate_hz)
-        for k in range(ms // 5):
-            self.now += 5 * MS
-            self.plant.advance_to(self.now)
-            sample = self.plant.sample(self.now)
-            if self.sensor:
-                self.loop.on_pressure(sample['pressure'])
-            if 'supply_pressure' in sample:
-                self.loop.on_supply(sample['supply_pressure'])
-            if self.command_kpa is not None:
-                self.loop.on_command(Pressure(self.now, P_ATM_PA + 1e3 * self.command_kpa))
-            self.pressures_kpa.append((self.plant.plant.pressure_pa - P_ATM_PA) * 1e-3)
-            if k % every == 0:
-                signal, status = self.loop.tick(self.now)
-                self.plant.set_signal(signal)
-                self.signals.append(signal)
-                self.statuses.append(status)
+        times = range(self.now + 5 * MS, self.now + ms * MS + 1, 5 * MS)
+        return self.at(times, times[::round(200 / self.loop.rate_hz)])
+
+    def at(self, times, ticks):
+        """Measure and command at some times, tick at others; return the last status."""
+        for tick, when in ((self._sample, times), (self._command, times), (self._act, ticks)):
+            self._bus.add(tick, when)
+        self._bus.run_until()
+        self.now = times[-1]
         return self.statuses[-1]
 
 
@@ -229,15 +244,10 @@ def scatter_kpa_with_ticks_up_to_3_ms_late():
     for k in range(1, 1000):
         tick = begin + k * 10 * MS + draw.randint(-3, 3) * MS
         turn = math.pi * (tick - begin) * 1e-9
-        wanted_kpa = 300.0 + 100.0 * math.sin(turn)
-        chain.now = tick
-        chain.plant.advance_to(tick)
-        chain.loop.on_pressure(chain.plant.sample(tick)['pressure'])
-        chain.loop.on_command(Pressure(tick, P_ATM_PA + 1e3 * wanted_kpa))
-        signal, _ = chain.loop.tick(tick)
-        chain.plant.set_signal(signal)
+        chain.command_kpa = 300.0 + 100.0 * math.sin(turn)
+        chain.at([tick], [tick])
         waves = [f(n * turn) for n in (1, 2, 3, 4) for f in (math.sin, math.cos)]
-        rows.append([(chain.plant.plant.pressure_pa - P_ATM_PA) * 1e-3, 1.0, *waves])
+        rows.append([chain.pressures_kpa[-1], 1.0, *waves])
     rows = np.array(rows[400:])
     smooth = np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0]
     return np.std(rows[:, 0] - rows[:, 1:] @ smooth)

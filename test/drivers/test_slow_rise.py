@@ -21,6 +21,8 @@ import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.safety import SafetyLimits
+from pam_actuation.loops.bus import Bus, every
+from pam_actuation.loops.wiring import attach, attach_plant
 from pam_actuation.messages import Pressure, START_NS
 from pam_actuation.plant_loop import PlantLoop
 from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA, WAITS_LONG_S
@@ -31,6 +33,7 @@ from test_safety import Bench
 
 FULL_PA = P_ATM_PA + 600e3
 PERIOD_S = 0.005
+MS_NS = 1_000_000
 
 
 def rises(targets):
@@ -128,22 +131,27 @@ def largest_rise(valve, rig_name, blocked, duration_s=2.5):
     vents the muscle, of whom the driver does not know.
     """
     rig = load_rig(rig_name, valve=valve)
-    plant, driver = PlantLoop(rig, seed=1), DriverLoop(valve, driver_config(rig))
-    period_ms, gauge_pa = round(driver.period_s * 1e3), []
-    for ms in range(round(duration_s * 1e3)):
-        now_ns = START_NS + ms * 1_000_000
-        plant.advance_to(now_ns)
-        if ms % 4 == 0:
-            readings = plant.sample(now_ns)
-            driver.on_pressure(readings['pressure'])
-            if 'supply_pressure' in readings:
-                driver.on_supply(readings['supply_pressure'])
-            gauge_pa.append(readings['pressure'].pressure_pa - P_ATM_PA)
-        if ms % 5 == 0 and ms >= 300:
-            driver.on_command(Pressure(now_ns, P_ATM_PA + 300e3))
-        if ms % period_ms == 0:
-            signal = driver.tick(now_ns)[0]
-            plant.set_signal(driver.safe_signal(now_ns) if blocked(ms * 1e-3) else signal)
+    plant, driver, gauge_pa = PlantLoop(rig, seed=1), DriverLoop(valve, driver_config(rig)), []
+
+    def heard(topic, message, now_ns):
+        if topic == 'pressure':
+            gauge_pa.append(message.pressure_pa - P_ATM_PA)
+
+    def command(now_ns):
+        bus.send('pressure_command', Pressure(now_ns, P_ATM_PA + 300e3), now_ns)
+
+    def act(now_ns):
+        signal = driver.act(now_ns)
+        if blocked((now_ns - START_NS) // MS_NS * 1e-3):
+            signal = driver.safe_signal(now_ns)
+        bus.send('valve_signal', signal, now_ns)
+
+    bus = Bus(on_sent=heard)
+    attach(bus, driver)
+    bus.add(attach_plant(bus, plant), every(250.0))
+    bus.add(command, every(200.0, START_NS + 300 * MS_NS))
+    bus.add(act, every(driver.rate_hz))
+    bus.run_until(START_NS + round(duration_s * 1e9) - 1)
     smooth = np.convolve(gauge_pa, np.full(5, 0.2), 'valid')
     return (smooth[50:] - smooth[:-50]).max() / 0.2, gauge_pa[-1]
 
