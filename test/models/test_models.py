@@ -102,6 +102,14 @@ seen = rig.simulate(np.load('volts.npy').repeat(5), initial_pressure_pa=501325.0
 np.savez('seen.npz', pressure_pa=seen.pressure_pa, contraction_m=seen.contraction_m)
 """
 
+# The page on the keys of a rig file, as the documentation site has it.
+REFERENCE = f"""
+import sys
+sys.path.insert(0, {str(ROOT / 'docs')!r})
+from generate import yaml_files
+print(yaml_files.rig_page())
+"""
+
 RANKING = """
 from pam_sim import load_rig
 from pam_sim.gap.select.candidates import candidates, is_limit
@@ -160,6 +168,9 @@ def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
     assert 'force\\_n 0 to 9.5, typically 0.4' in (tmp_path / 'models.md').read_text()
     run(*verb, '--html', 'models.html')
     assert 'id="effect-notched_rail"' in (tmp_path / 'models.html').read_text()
+    row = '| `force_n` | N | `1` | 0 to 10 | Depth of a notch. |'
+    _, _, section = run('-c', REFERENCE).partition('### `notched_rail`')
+    assert row in section.partition('###')[0]
     assert run('-c', ROLLOUT).strip() == 'True'
     # To compile the equations it ranks by is quick; to compile a rollout is not.
     assert run('-c', RANKING, interpreted='0').split() == ['notched_rail', 'True']
