@@ -16,6 +16,7 @@
 
 import ast
 from pathlib import Path
+import re
 
 import pytest
 
@@ -144,3 +145,46 @@ def test_the_physics_does_not_know_what_studies_it(anywhere):
              if name.startswith('pam_sim.') and not name.startswith(above)
              and other.startswith(above)}
     assert sorted(found) == []
+
+
+def walks():
+    """Return {title: (number of files it states, names of their modules)} of the architecture."""
+    text = (ROOT / 'docs/architecture.md').read_text(encoding='utf-8')
+    text = text.partition('## Three walks')[2].partition('\n## ')[0]
+    found = {}
+    for walk in re.split(r'^\*\*(?=From )', text, flags=re.M)[1:]:
+        title, count = re.match(r'(.*)\*\* \((\d+) files\)', walk).groups()
+        places = ('', 'pam_actuation/', 'pam_sim/gap/' if 'verdict' in title else 'pam_actuation/')
+        files = {next(path for place in places if (path := ROOT / f'{place}{name}').is_file())
+                 for name in re.findall(r'`([\w/]+\.py)`', walk)}
+        found[title] = int(count), {
+            '.'.join(path.relative_to(ROOT).with_suffix('').parts) for path in files}
+    return found
+
+
+def test_a_walk_states_how_many_files_it_passes():
+    assert len(walks()) == 3
+    for title, (count, names) in walks().items():
+        assert count == len(names), title
+
+
+def test_the_files_of_a_walk_are_joined_by_imports(anywhere):
+    """A file that the others no longer import, nor it them, has left the walk."""
+    def all_of(name):       # what a package hands on counts as imported
+        return set().union(*(anywhere[other] if f'{other}.py' not in files else {other}
+                             for other in anywhere[name])) | anywhere[name]
+
+    files = {f'{name}.py' for name in anywhere
+             if (ROOT / f'{name.replace(".", "/")}.py').is_file()}
+    for title, (_, names) in walks().items():
+        joined = {name: set() for name in names}
+        for name in names:
+            for other in all_of(name) & names:
+                joined[name].add(other)
+                joined[other].add(name)
+        seen, waiting = set(), [min(names)]
+        while waiting:
+            name = waiting.pop()
+            waiting += joined[name] - seen
+            seen.add(name)
+        assert names - seen == set(), title

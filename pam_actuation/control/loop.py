@@ -68,9 +68,11 @@ from pam_actuation.control.setpoint import MuscleSetpoint, Setpoint
 from pam_actuation.control.tick import Law, MuscleLaw, TickCore, TickInputs
 from pam_actuation.messages import ControllerState, Message, Pressure
 from pam_sim.errors import InputError
+from pam_sim.joint.rig import JointRig
 
 if TYPE_CHECKING:
-    from pam_sim.joint.rig import JointRig
+    from pam_actuation.control.config import Controller
+    from pam_sim.rig import Rig
 
 STALL_NS = 250_000_000
 _CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle
@@ -88,8 +90,8 @@ class ControllerLoop:
     ----------
     controller : SelfOrganizingFuzzyController, PidController, ForceController, JointController
         As ``load_controller`` gives it.
-    joint : pam_sim.joint.JointRig, optional
-        The joint that the controller is of; None: it is of one muscle.
+    rig : pam_sim.rig.Rig or pam_sim.joint.JointRig, optional
+        What the controller is of: a joint, or one muscle as without it.
     name : str
         Of the joint, by which it is found in messages to several joints.
 
@@ -117,12 +119,12 @@ class ControllerLoop:
 
     """
 
-    def __init__(self, controller: Any, joint: 'JointRig | None' = None,
+    def __init__(self, controller: 'Controller', rig: 'Rig | JointRig | None' = None,
                  name: str = 'muscle') -> None:
-        self.controller = controller
+        self.controller: Any = controller       # of a muscle or a joint, as found below
         self._newest: dict[str, Message] = {}       # by topic
         law, self.measurement, self.setpoint = (
-            self._of_muscle() if joint is None else self._of_joint(joint, name))
+            self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle())
         self._core = TickCore(law)
         self.muscles = tuple(
             MuscleChannel(place, rise) for place, rise in zip(law.places, self._core.rises))
@@ -151,7 +153,7 @@ class ControllerLoop:
                 Measurement(tracked, self._newest, plausible, (resting, math.inf)),
                 MuscleSetpoint(tracked, plausible))
 
-    def _of_joint(self, joint: 'JointRig', name: str) -> tuple[Law, Measurement, Setpoint]:
+    def _of_joint(self, joint: JointRig, name: str) -> tuple[Law, Measurement, Setpoint]:
         from pam_actuation.control.joint_law import JointLaw
         from pam_actuation.control.joint_setpoint import JointSetpoint
         controller = self.controller

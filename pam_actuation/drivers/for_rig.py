@@ -27,9 +27,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
+from pam_actuation.drivers.loop import DriverLoop
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 if TYPE_CHECKING:
+    from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 _UNKNOWN_SWING_HZ = 5.9
@@ -77,6 +79,12 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     told.update(_load(rig))
     config = DriverConfig.from_parameters(told, where=f'rig {rig.name}')
     return DriverConfig.from_parameters(changes, config, where)
+
+
+def driver_loops(rig: 'Rig | JointRig') -> dict[str, DriverLoop]:
+    """Return the driver of each muscle of a rig, by the place of the muscle (``Rig.muscles``)."""
+    return {place: DriverLoop(muscle.valve, driver_config(muscle))
+            for place, muscle in rig.muscles.items()}
 
 
 def _effect(rig: 'Rig', name: str, parameter: str) -> float:

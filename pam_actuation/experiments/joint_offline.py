@@ -21,7 +21,7 @@ The loops are the ones the nodes call, joined by messages that take no time.
 from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.loops.assembly import driver_loops
+from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
 from pam_actuation.messages import ControllerState, Message, Pressure, START_NS

@@ -32,10 +32,11 @@ from pam_actuation import interrupts
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
-from pam_actuation.loops.assembly import controller_loop, driver_loops
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
@@ -113,7 +114,7 @@ class _Loops:
         add('plant', attach_plant(bus, plant), PUBLISH_RATE_HZ)
         add('reference', reference_tick(bus, reference), reference.rate_hz, 0)
         if experiment.asks_for_motion and controller is not None:
-            control = controller_loop(controller, rig, recorder.name)
+            control = ControllerLoop(controller, rig, recorder.name)
             attach(bus, control)
             decide = controller_tick(bus, control)
             add('controller', lambda now_ns: decide(now_ns, learning), controller.rate_hz)

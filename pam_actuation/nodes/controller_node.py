@@ -82,7 +82,7 @@ class ControllerNode(ManagedNode):
     def build(self, rig: 'Rig | JointRig') -> None:
         """Load the controller of a rig."""
         from pam_actuation.control.config import load_controller
-        from pam_actuation.loops.assembly import controller_loop
+        from pam_actuation.control.loop import ControllerLoop
         name = self.value('controller') or self.preset_for(rig)
         accept = self.value('accept_other_rig')
         spare = load_controller(name, rig, accept_other_rig=accept)
@@ -90,7 +90,7 @@ class ControllerNode(ManagedNode):
         self.controller = load_controller(name, rig, accept_other_rig=accept)
         if self.controller.other_rig:
             self.get_logger().warning(f'the controller was {self.controller.other_rig}')
-        self.loop = controller_loop(self.controller, rig, self.value('muscle'))
+        self.loop = ControllerLoop(self.controller, rig, self.value('muscle'))
 
     def create_topics(self) -> None:
         """Create what the loop sends and takes."""

@@ -32,7 +32,8 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
-from pam_actuation.loops.assembly import controller_loop, driver_loops
+from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, send_followed, signal_tick)
@@ -151,7 +152,7 @@ class RepeatedLoops:
                        for place, driver in self._drivers.items()}
         self._decide: Callable[[int, bool], None] | None = None
         if controller is not None and 'controller' in parts:
-            control = controller_loop(controller, rig, name)
+            control = ControllerLoop(controller, rig, name)
             attach(self.bus, control)
             self._decide = controller_tick(self.bus, control)
         self._sensors = tuple(f'{place}{topic}' for place in rig.muscles for topic in SENSORS)
