@@ -29,6 +29,7 @@ import math
 import re
 from typing import TypeVar
 
+from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
@@ -40,8 +41,6 @@ VENTED = 'vented'
 EMERGENCY_STOP = 'emergency_stop'
 
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
-
-LATCHING = ('emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses')
 
 _NS = 1_000_000_000
 _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause
@@ -384,7 +383,7 @@ class SafetySupervisor:
             self._fault = fault
         self._rise.begin()
         key, text = self._fault
-        if key in LATCHING:
+        if FAULTS[key].latched:
             return Decision(EMERGENCY_STOP, None, LEVEL_ERROR, text, key)
         if key in ('no_command', 'no_pressure'):
             return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)

@@ -14,8 +14,11 @@
 
 """The safety supervisor: each row of the fault table the driver can notice."""
 
+import ast
 import math
+from pathlib import Path
 
+from pam_actuation.drivers import safety
 from pam_actuation.drivers.faults import FAULT_TABLE, fault_table_markdown, FAULTS
 from pam_actuation.drivers.safety import (
     EMERGENCY_STOP, OK, SafetyLimits, SafetySupervisor, VENTED, WAITING)
@@ -371,8 +374,32 @@ def test_a_device_that_refuses_latches_and_reset_waits_for_it():
     assert bench.last(50).state == OK
 
 
+def named_in(source):
+    """Return (keys of faults, all strings) of a module: keys are returned, warned of, latched."""
+    keys, strings = set(), set()
+    for node in ast.walk(ast.parse(source)):
+        first = []
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
+            first = node.value.elts[:1]
+        elif isinstance(node, ast.Call) and getattr(node.func, 'attr', '') in ('_warn', '_latch'):
+            first = node.args[:1]
+        keys |= {one.value for one in first if isinstance(getattr(one, 'value', 0), str)}
+        if isinstance(node, ast.Constant):
+            strings.add(node.value)
+    return keys, strings
+
+
+def test_every_fault_that_the_driver_names_is_a_row_and_every_row_is_named():
+    folder = Path(safety.__file__).parent
+    keys, strings = (set().union(*found) for found in zip(*(
+        named_in((folder / name).read_text(encoding='utf-8'))
+        for name in ('safety.py', 'senders.py'))))
+    assert len(keys) > 15 and keys <= set(FAULTS)
+    assert set(FAULTS) - strings == {'driver_ends', 'driver_killed', 'reference_lost'}
+
+
 def test_fault_table_is_complete():
-    """Every key the supervisor uses is a row; the Markdown has every row."""
+    """The Markdown has every row, and the table says which faults are latched."""
     text = fault_table_markdown()
     assert len(FAULTS) == len(FAULT_TABLE)
     assert all(fault.title in text for fault in FAULT_TABLE)
