@@ -47,6 +47,19 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
         if key >= 0:
             steps.joint_look_body(joint, flexor, extensor)
 
+    return joint_step, joint_look
+
+
+joint_step, joint_look = _entries(source_key(steps))
+
+
+def _rollout_entry(key: int) -> Callable[..., Any]:
+    """
+    Return the rollout, stored under ``key``.
+
+    It calls the two above as names of this module: numba takes what a function closes over as
+    part of what it is stored under, and a compiled function differs from process to process.
+    """
     @allocating_entry_point
     def joint_rollout(inputs: FloatArray, joint: Arrays, flexor: Arrays, extensor: Arrays,
                       joint_rows: FloatArray, flexor_rows: FloatArray,
@@ -67,7 +80,7 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
             flexor_rows[i] = flexor_out
             extensor_rows[i] = extensor_out
 
-    return joint_step, joint_look, joint_rollout
+    return joint_rollout
 
 
-joint_step, joint_look, joint_rollout = _entries(source_key(steps))
+joint_rollout = _rollout_entry(source_key(steps))
