@@ -15,35 +15,114 @@
 """
 Compile the numerical code before it is needed: ``python -m pam_actuation.warm_up``.
 
-The first use of the physics and of the control laws compiles them. That takes up to a minute on a
-small machine. numba keeps the result beside the installed files. Nodes that start at the same time
-would each compile the same, and wait for one another meanwhile.
+The first use of the physics and of the control laws compiles them, rig and joint, each control law
+and its rollouts. On a small machine that takes about two minutes. numba keeps the result beside
+the installed files. Nodes that start at the same time would each compile the same, and wait for
+one another meanwhile.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 import sys
 import tempfile
+from typing import Any
 
+import joblib
+import numpy as np
 from pam_actuation.control.config import load_controller
-from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments import Experiment, load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.parallel import in_processes
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.force_loop import ForceLoop
+from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
+from pam_sim.joint import load_joint
 
 RIG = 'dmsp_5_300_realistic'
 NOMINAL_RIG = 'dmsp_5_300_hanging_mass'
-EXPERIMENT = 'short_sine'
+FORCE_RIG = 'dmsp_5_300_isometric_realistic'
+JOINT = 'joint_dmsp_5_300'
+VALVES = ('ppr', 'hsv')
+LAWS = ('sofc_ppr', 'pid', 'lqi')
+ROWS = 10       # of a rollout: it is compiled before the first one
 
 
-def warm_up() -> None:
-    """Run a short experiment with each valve, so that everything a rig needs is compiled."""
-    experiment = load_experiment(EXPERIMENT)
-    with tempfile.TemporaryDirectory() as folder:
-        for rig_name in (RIG, NOMINAL_RIG):
-            for valve in ('ppr', 'hsv'):
-                rig = load_rig(rig_name, valve=valve)
-                simulate_experiment(
-                    experiment, rig, load_controller(f'sofc_{valve}', rig),
-                    str(Path(folder) / f'{rig_name}_{valve}'))
+def short(domain: str, values: str) -> Experiment:
+    """Return a short experiment: a ramp to ``values``, a YAML entry, in a domain."""
+    return load_experiment(
+        f'name: short\ndomain: {domain}\nsegments:\n  - rest: {{duration_s: 0.1}}\n'
+        f'  - ramp: {{{values}, duration_s: 0.2}}\n')
+
+
+def muscle() -> None:
+    """Run a short experiment with each rig, valve and law, as live nodes step through it."""
+    experiment = short('contraction', 'to_m: 0.002')
+    for name in (NOMINAL_RIG, RIG):
+        for valve in VALVES:
+            rig = load_rig(name, valve=valve)
+            for law in ('sofc', 'pid', 'lqi') if name == NOMINAL_RIG else ('sofc',):
+                suffix = '_hsv' if valve == 'hsv' else '_ppr' if law == 'sofc' else ''
+                with tempfile.TemporaryDirectory() as folder:
+                    simulate_experiment(experiment, rig, load_controller(f'{law}{suffix}', rig),
+                                        str(Path(folder) / 'bag'))
+
+
+def rollouts() -> None:
+    """Simulate rig and joint over whole arrays, and a joint as live nodes step through it."""
+    load_rig(NOMINAL_RIG).simulate(np.zeros(ROWS))
+    joint = load_joint(JOINT)
+    joint.simulate(np.zeros(ROWS), np.zeros(ROWS), np.zeros(ROWS))
+    experiment = short('joint_angle', 'to_rad: 0.05')
+    for valve in VALVES:
+        joint = load_joint(JOINT, valve=valve)
+        with tempfile.TemporaryDirectory() as folder:
+            simulate_experiment(experiment, joint, load_controller(f'sofc_joint_{valve}', joint),
+                                str(Path(folder) / 'bag'))
+
+
+def _law(name: str, rig: Any) -> Any:
+    return load_controller(name, rig)
+
+
+def tracked(law: str) -> None:
+    """Track a contraction with a law as ``pam tune`` does."""
+    rig = load_rig(NOMINAL_RIG)
+    ClosedLoop(rig, short('contraction', 'to_m: 0.002')).run(_law(law, rig))
+
+
+def tracked_force() -> None:
+    """Track a force as ``pam tune`` does."""
+    rig = load_rig(FORCE_RIG)
+    ForceLoop(rig, short('force', 'to_n: 5.0')).run(_law('sofc_force_ppr', rig))
+
+
+def tracked_angle() -> None:
+    """Track the angle of a joint as ``pam tune`` does."""
+    joint = load_joint(JOINT)
+    JointLoop(joint, short('joint_angle', 'to_rad: 0.05')).run(_law('sofc_joint_ppr', joint))
+
+
+def warm_up(jobs: int = -1) -> None:
+    """
+    Use everything shortly, so that all that a rig, a joint or a verb needs is compiled.
+
+    Parameters
+    ----------
+    jobs : int
+        Processes; -1 for as many as there are cores.
+
+    """
+    # What is compiled in the first round is part of all that the second one compiles.
+    for uses in ([joblib.delayed(rollouts)(), joblib.delayed(muscle)()],
+                 [joblib.delayed(tracked_angle)(), joblib.delayed(tracked_force)(),
+                  *(joblib.delayed(tracked)(law) for law in LAWS)]):
+        _all(in_processes(jobs, uses))
+
+
+def _all(results: Iterable[None]) -> None:
+    for _ in results:
+        pass
 
 
 def main() -> int:
