@@ -14,45 +14,12 @@
 
 """The contraction sensor is slower than the others: tau dy/dt = x - y."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect, Numbers, Reported
-from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
-from pam_sim.effects.lag import advance_sampled, pack_sampled, READING, SAMPLED
-from pam_sim.parameters import Parameter
+from pam_sim.effects.lag import advance_sampled, lag_of_sensor
 
-
-def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
-    return {'reading': numbers.contraction_m, 'true': numbers.contraction_m}
-
-
-EFFECT = Effect(
-    name='contraction_lag',
-    family='sensor',
-    subsystem='sensor',
-    sentence='The contraction sensor follows its signal with a lag of its own.',
-    source='First order filter of a sensor; size: design choice.',
-    equation='x_read = y, tau dy/dt = x - y',
-    parameters=(
-        Parameter('time_constant_s', 's', 0.010, 0.0, 1.0, description='Lag of the sensor.'),
-    ),
-    amplitude=('time_constant_s',),
-    reported=(Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
-    packed=SAMPLED,
-    pack=pack_sampled,
-    states=READING,
-    initial=_initial,
-    active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
-    order=30,               # before scale and offset
-    fitting=Fitting(
-        free=(FreeParameter('time_constant_s', 0.01, 0.0, 0.2, starts=DELAY_STARTS_S),),
-        delay='time_constant_s',
-        sensor_signal='contraction', sensor_change='lag'),
-)
+EFFECT = lag_of_sensor('contraction', 'x', lambda numbers: numbers.contraction_m)
 
 
 @compiled

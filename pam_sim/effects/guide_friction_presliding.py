@@ -14,39 +14,20 @@
 
 """Dry friction of rail or joint that bends before it slips; the load cell carries it."""
 
-from functools import partial
-
 import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
-from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.fitting import FreeParameter
 from pam_sim.effects.guide_friction import EFFECT as _SIBLING
-from pam_sim.effects.presliding import (
-    advance_bending, BENDING, pack_presliding, PACKED, PARAMETERS, PRESLIDING_FREE,
-    share_of_sliding, SOURCE)
-from pam_sim.records import record
+from pam_sim.effects.presliding import advance_bending, presliding_of, share_of_sliding
 
-EFFECT = Effect(
-    name='guide_friction_presliding',
-    family=_SIBLING.family,
-    subsystem=_SIBLING.subsystem,
-    variant_of='guide_friction',
+EFFECT = presliding_of(
+    _SIBLING,
     sentence='Dry friction of rail or joint gives way by micrometres before it slides.',
-    source=SOURCE,
     equation='m dv/dt = F - c v - m g - F_ext - F_guide, F_guide = F_c (z + tau w dz/dt) / z_s, '
              'dz/dt = v - |v| z / (z_s (1 + e w)), w = exp(-(v / v_s)^2); '
              'F_cell -> F_cell + F_guide',
-    parameters=(*_SIBLING.parameters, *PARAMETERS),
-    amplitude=_SIBLING.amplitude,
-    reported=_SIBLING.reported,
-    packed=record(*PACKED, *(_SIBLING.packed.names or ())),
-    states=BENDING,
-    pack=partial(pack_presliding, _SIBLING),
-    fitting=Fitting(
-        free=(FreeParameter('force_n', 1.0, 0.0, 50.0), *PRESLIDING_FREE),
-        refinement=True),
-)
+    free=FreeParameter('force_n', 1.0, 0.0, 50.0))
 
 
 @compiled

@@ -19,14 +19,16 @@ Two exact steps, for what is known of u within a step: a sensor's signal is take
 as linear between its samples, a command as held.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import math
 from typing import Any
 
 import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Numbers
+from pam_sim.effects.effect import Effect, Numbers, Reported
+from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
+from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
 SAMPLED = record('decay', 'steps')          # of samples: exp(-dt / tau); tau / dt
@@ -47,6 +49,47 @@ def pack_held(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     ratio = numbers.substep_s / values['time_constant_s']
     decay = math.exp(-ratio)
     return {'decay': decay, 'mean_share': -math.expm1(-ratio) / ratio}
+
+
+def lag_of_sensor(
+        signal: str, symbol: str, start: Callable[[Numbers], float]) -> Effect:
+    """
+    Declare a sensor that is slower than the others.
+
+    Parameters
+    ----------
+    signal : {'pressure', 'contraction'}
+        What it measures.
+    symbol : str
+        Of that in the equation.
+    start : callable
+        ``start(numbers) -> float``: its reading at the start.
+
+    Returns
+    -------
+    Effect
+        ``SIGNAL_lag``; its hooks stand in its own file.
+
+    """
+    def initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
+        return {'reading': start(numbers), 'true': start(numbers)}
+
+    return Effect(
+        name=f'{signal}_lag', family='sensor', subsystem='sensor',
+        sentence=f'The {signal} sensor follows its signal with a lag of its own.',
+        source='First order filter of a sensor; size: design choice.',
+        equation=f'{symbol}_read = y, tau dy/dt = {symbol} - y',
+        parameters=(
+            Parameter('time_constant_s', 's', 0.010, 0.0, 1.0, description='Lag of the sensor.'),),
+        amplitude=('time_constant_s',),
+        reported=(
+            Reported('time_constant_s', 's', lambda values, rig: values['time_constant_s']),),
+        packed=SAMPLED, pack=pack_sampled, states=READING, initial=initial,
+        active=lambda values, numbers: values['time_constant_s'] >= 1e-9,
+        order=30,               # before scale and offset
+        fitting=Fitting(
+            free=(FreeParameter('time_constant_s', 0.01, 0.0, 0.2, starts=DELAY_STARTS_S),),
+            delay='time_constant_s', sensor_signal=signal, sensor_change='lag'))
 
 
 @compiled

@@ -27,6 +27,7 @@ short the way.
 """
 
 from collections.abc import Mapping
+from functools import partial
 import math
 from typing import Any
 
@@ -34,7 +35,7 @@ import numpy as np
 
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Numbers
-from pam_sim.effects.fitting import FreeParameter
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
@@ -66,6 +67,34 @@ def pack_presliding(plain: Effect, values: Mapping[str, float],
             'static_excess': values['static_excess'],
             'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s'],
             **plain.pack({p.name: values[p.name] for p in plain.parameters}, numbers)}
+
+
+def presliding_of(sibling: Effect, sentence: str, equation: str, free: FreeParameter) -> Effect:
+    """
+    Declare dry friction that bends before it slips, a refinement of one that does not.
+
+    Parameters
+    ----------
+    sibling : Effect
+        The same friction without presliding. Its amplitude is that of this effect.
+    sentence, equation : str
+        As of ``Effect``.
+    free : FreeParameter
+        Range of the amplitude in a fit.
+
+    Returns
+    -------
+    Effect
+        ``NAME_presliding``; its hooks stand in its own file.
+
+    """
+    return Effect(
+        name=f'{sibling.name}_presliding', family=sibling.family, subsystem=sibling.subsystem,
+        variant_of=sibling.name, sentence=sentence, source=SOURCE, equation=equation,
+        parameters=(*sibling.parameters, *PARAMETERS), amplitude=sibling.amplitude,
+        reported=sibling.reported, packed=record(*PACKED, *(sibling.packed.names or ())),
+        states=BENDING, pack=partial(pack_presliding, sibling),
+        fitting=Fitting(free=(free, *PRESLIDING_FREE), refinement=True))
 
 
 @compiled

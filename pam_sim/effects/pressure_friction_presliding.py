@@ -14,39 +14,20 @@
 
 """Dry friction that grows with gauge pressure and bends before it slips."""
 
-from functools import partial
-
 import numpy as np
 
 from pam_sim.compiled import compiled
-from pam_sim.effects.effect import Effect
-from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.effects.presliding import (
-    advance_bending, BENDING, pack_presliding, PACKED, PARAMETERS, PRESLIDING_FREE,
-    share_of_sliding, SOURCE)
+from pam_sim.effects.fitting import FreeParameter
+from pam_sim.effects.presliding import advance_bending, presliding_of, share_of_sliding
 from pam_sim.effects.pressure_friction import EFFECT as _SIBLING
-from pam_sim.records import record
 
-EFFECT = Effect(
-    name='pressure_friction_presliding',
-    family=_SIBLING.family,
-    subsystem=_SIBLING.subsystem,
-    variant_of='pressure_friction',
+EFFECT = presliding_of(
+    _SIBLING,
     sentence='Dry friction inside the muscle grows with pressure and gives way a little before '
              'it slides.',
-    source=SOURCE,
     equation='F -= F400 p_g / 400 kPa (z + tau w dz/dt) / z_s, '
              'dz/dt = v - |v| z / (z_s (1 + e w)), w = exp(-(v / v_s)^2)',
-    parameters=(*_SIBLING.parameters, *PARAMETERS),
-    amplitude=_SIBLING.amplitude,
-    reported=_SIBLING.reported,
-    packed=record(*PACKED, *(_SIBLING.packed.names or ())),
-    states=BENDING,
-    pack=partial(pack_presliding, _SIBLING),
-    fitting=Fitting(
-        free=(FreeParameter('force_at_400kpa_n', 1.0, 0.0, 100.0), *PRESLIDING_FREE),
-        refinement=True),
-)
+    free=FreeParameter('force_at_400kpa_n', 1.0, 0.0, 100.0))
 
 
 @compiled
