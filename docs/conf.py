@@ -14,7 +14,8 @@
 
 """Settings of the documentation: ``make docs`` builds it with Sphinx into build/docs."""
 
-from functools import lru_cache
+from collections import defaultdict
+from functools import cached_property, lru_cache
 import importlib.util
 from pathlib import Path
 import sys
@@ -31,6 +32,7 @@ from generate import pages                      # noqa: E402
 from generate.mathml import add_mathml          # noqa: E402
 from pam_actuation import __version__           # noqa: E402
 from sphinx.domains.python import PythonDomain  # noqa: E402
+from sphinx.search.en import SearchEnglish      # noqa: E402
 
 project = 'pam_actuation'
 author = 'pam_actuation developers'
@@ -65,10 +67,38 @@ maximum_signature_line_length = 80
 
 
 class RememberingDomain(PythonDomain):
-    """Python's domain that looks a name up once: a type stands in hundreds of signatures."""
+    """Python's domain that looks a name up once, and only among those that end like it."""
+
+    _alike = None
+
+    @property
+    def objects(self):
+        """Return all objects by full name; while a name is looked up, those that end like it."""
+        return super().objects if self._alike is None else self._alike
+
+    @cached_property
+    def _by_last_part(self):
+        """Return the objects by the last part of their names, in the order of all."""
+        found = defaultdict(dict)
+        for name, entry in self.objects.items():
+            found[name.rpartition('.')[2]][name] = entry
+        return found
 
     # One domain per build, whose names are complete before the first is looked up.
-    find_obj = lru_cache(maxsize=None)(PythonDomain.find_obj)
+    @lru_cache(maxsize=None)    # noqa: B019
+    def find_obj(self, env, modname, classname, name, *more):
+        """Return the objects that a name may mean: a type stands in hundreds of signatures."""
+        self._alike = self._by_last_part.get(name.removesuffix('()').rpartition('.')[2], {})
+        try:
+            return super().find_obj(env, modname, classname, name, *more)
+        finally:
+            self._alike = None
+
+
+class RememberingEnglish(SearchEnglish):
+    """The English of the search index: the stem of a word is found once, not for each page."""
+
+    stem = lru_cache(maxsize=None)(SearchEnglish.stem)
 
 
 def setup(app):
@@ -78,3 +108,4 @@ def setup(app):
     app.srcdir = target
     add_mathml(app)
     app.add_domain(RememberingDomain, override=True)
+    app.add_search_language(RememberingEnglish)
