@@ -32,6 +32,7 @@ import sys
 import tempfile
 import time
 
+from pam_actuation.messages import START_NS
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.ros_messages import class_of
@@ -45,6 +46,8 @@ NODES = ('plant_simulator', 'valve_driver', CONTROLLER, 'reference_generator')
 NAMESPACE = '/muscle'
 START_TIMEOUT_S = 120.0
 STALLED_S = 10.0
+# A sender keeps what the listener has not got yet: a busy machine delivers seconds late.
+KEPT = 20_000
 
 
 def parameters_of(valve, experiment, rig):
@@ -57,7 +60,8 @@ def parameters_of(valve, experiment, rig):
         'valve_driver': {'valve_type': valve, 'rig': rig},
         CONTROLLER: {'valve_type': valve, 'rig': rig},
         'reference_generator': {'experiment': experiment, 'valve_type': valve}}
-    return {name: {**common, **own[name]} for name in NODES}
+    kept = {f'qos_overrides.{NAMESPACE}/{topic}.publisher.depth': KEPT for topic in OF_A_RUN}
+    return {name: {**common, **kept, **own[name]} for name in NODES}
 
 
 class Listener:
@@ -66,7 +70,7 @@ class Listener:
     def __init__(self, node, silent):
         self.sources = {} if silent else {
             topic: PolledSubscription(
-                node, class_of(topic), f'{NAMESPACE}/{topic}', qos.reliable(20_000), raw=True)
+                node, class_of(topic), f'{NAMESPACE}/{topic}', qos.reliable(KEPT), raw=True)
             for topic in OF_A_RUN}
         self.messages = {topic: [] for topic in self.sources}
 
@@ -74,6 +78,16 @@ class Listener:
         """Fetch what has arrived."""
         for topic, source in self.sources.items():
             self.messages[topic] += [bytes(data) for data, _ in source.take(100_000)]
+
+    @property
+    def count(self):
+        """Return the number of all messages so far."""
+        return sum(map(len, self.messages.values()))
+
+    def has_all(self, topics, until_ns):
+        """Tell whether all up to a time [ns] has come: what is later comes after it."""
+        return all(messages and stamp_of(messages[-1]) > until_ns
+                   for topic, messages in self.messages.items() if topic in topics)
 
     def digests(self, until_ns):
         """Return topic to (number of messages, digest) of those stamped up to a time [ns]."""
@@ -108,7 +122,6 @@ def run_once(arguments):
         Topic to (number of messages, digest of their bytes).
 
     """
-    from pam_actuation.messages import START_NS
     lock = DomainLock()
     client = None
     with tempfile.TemporaryDirectory() as folder:
@@ -128,30 +141,38 @@ def run_once(arguments):
                     names, transition, START_TIMEOUT_S, lambda name: names[name].running)
                 if refused:
                     raise SystemExit(f'{refused[0]}: {names[refused[0]].last_line()}')
-            rate = follow(client, listener, arguments.simulated_seconds)
+            until_ns = START_NS + round(arguments.simulated_seconds * 1e9)
+            rate = follow(client, listener, until_ns)
         finally:
             end_all(nodes.values())
             if client is not None:
-                listener.take()
                 client.close()
             lock.release()
-    return rate, listener.digests(START_NS + round(arguments.simulated_seconds * 1e9))
+    return rate, listener.digests(until_ns)
 
 
-def follow(client, listener, simulated_s):
-    """Wait until the plant has simulated enough; return simulated seconds per second."""
+def follow(client, listener, until_ns):
+    """Wait until all up to a time has been simulated and heard; return simulated s per second."""
     plant = f'{NAMESPACE}/plant_simulator'
-    steps, moved_s = 0, time.monotonic()
+    before, moved_s = None, time.monotonic()
     while True:
         client.spin(0.02)
         listener.take()
         values = client.statuses.get(plant, (0, '', {}))[2]
-        if int(values.get('physics.steps', 0)) > steps:
-            steps, moved_s = int(values['physics.steps']), time.monotonic()
-        if steps * 1e-3 > simulated_s:
+        steps = int(values.get('physics.steps', 0))
+        if (steps, listener.count) != before:
+            before, moved_s = (steps, listener.count), time.monotonic()
+        if START_NS + steps * 1_000_000 > until_ns and listener.has_all(sent(client), until_ns):
             return float(values['clock.rate'])
         if time.monotonic() - moved_s > STALLED_S:
             raise SystemExit(f'the rig stands still after {steps * 1e-3:.3f} simulated seconds')
+
+
+def sent(client):
+    """Return the topics that the nodes say they have sent something on."""
+    prefix = f'published.{NAMESPACE}/'
+    return {key.removeprefix(prefix) for _, _, values in client.statuses.values()
+            for key, count in values.items() if key.startswith(prefix) and int(count) > 0}
 
 
 def main(args=None):
