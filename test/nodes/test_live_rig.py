@@ -96,6 +96,9 @@ def test_every_node_tells_how_it_is(rig):
         assert times[-1] - times[0] < 4 * 0.7
         assert int(last.values['loop.ticks']) > 100
         assert any(key.startswith('published./muscle/') for key in last.values)
+    # It tells how old commands are once it has used one, and its status comes twice a second.
+    wait_for(lambda: 'command.latency.p99_ms' in rig.health['valve_driver'][-1].values, 10.0,
+             'the first status since the first command')
     driver = rig.health['valve_driver'][-1].values
     for name in ('command.latency.p99_ms', 'pressure.latency.p99_ms'):
         assert 0.0 < float(driver[name]) < 100.0
