@@ -49,6 +49,7 @@ class LiveRig:
         self.domain_id = self._lock.domain_id
         self.environment = node_environment(self.domain_id, log_dir)
         self.processes = {}
+        self._started = []
         self.heard = {topic: [] for topic in OF_A_RUN}
         self.health = collections.defaultdict(list)
         self._context = None
@@ -63,9 +64,12 @@ class LiveRig:
         parameters = {'realtime_priority': 1, **parameters}
         log_dir = self._log_dir / below
         log_dir.mkdir(exist_ok=True)
-        self.processes[f'{below}/{name}' if below else name] = NodeProcess(
+        process = NodeProcess(
             name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
             log_dir)
+        # Also those that others replace by name: after a failed test they may still run.
+        self._started.append(process)
+        self.processes[f'{below}/{name}' if below else name] = process
 
     def listen(self, topics=tuple(OF_A_RUN)):
         """
@@ -140,7 +144,7 @@ class LiveRig:
 
     def close(self):
         """End everything."""
-        end_all(self.processes.values())
+        end_all(self._started)
         if self._context is not None:
             self._ending.set()
             self._executor.shutdown(timeout_sec=1.0)
