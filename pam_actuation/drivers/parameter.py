@@ -48,6 +48,7 @@ def node_parameter(
     name : str
         Of the ROS parameter; a number ends in its unit.
     default : float, int, str, bool or list of str
+        Value where none is given; its type is that of the parameter.
     description : str
         One sentence; a unit in brackets counts before that of the name: ``Rate [Hz].``
     lower, upper : float
