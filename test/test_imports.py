@@ -61,7 +61,7 @@ def imported(tree, known):
         elif isinstance(node, ast.ImportFrom):
             names = [full if (full := f'{node.module}.{alias.name}') in known else node.module
                      for alias in node.names]
-        found.update(set(names) & set(known))
+        found.update(name for name in names if name in known)
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             found = within
         waiting += [(child, found) for child in ast.iter_child_nodes(node)]
