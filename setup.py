@@ -36,6 +36,7 @@ RUN_REQUIRES = [
     'mcap-ros2-support>=0.5',
     'lz4>=4.3',
     'zstandard>=0.22',
+    'pandas>=2.1',
     'rosbags>=0.11.0',   # messages of Jazzy from 0.10.8 on, sqlite3 bags from here on
     'plotly>=5.15',
     'matplotlib>=3.6',
@@ -62,8 +63,15 @@ DOCS_REQUIRES = [
     'myst-nb>=1.1',      # tutorials that are notebooks; brings nbclient and ipykernel
 ]
 
+# Tables of `pam import` and `pam export` that pandas reads with another library.
+TABLE_REQUIRES = [
+    'pyarrow>=14.0',     # Parquet
+    'h5py>=3.10',        # HDF5, and MAT files of version 7.3
+]
+
 TEST_REQUIRES = [
     *DOCS_REQUIRES,
+    *TABLE_REQUIRES,
     'pytest>=7.4',
     'pytest-timeout>=2.1',
     'pytest-xdist>=3.7',
@@ -137,6 +145,7 @@ setup(
     install_requires=RUN_REQUIRES,
     extras_require={
         'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES,
+        'tables': TABLE_REQUIRES,
         'cluster': CLUSTER_REQUIRES, 'ray': RAY_REQUIRES, 'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',

@@ -48,13 +48,14 @@ ROSDEP_KEYS = {
     'joblib': 'python3-joblib', 'lz4': 'mcap-ros2-support', 'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support',
     'matplotlib': 'python3-matplotlib', 'numba': 'python3-numba', 'numpy': 'python3-numpy',
+    'pandas': 'python3-pandas',
     'rosbags': 'python3-rosbags-pip', 'scipy': 'python3-scipy',
     'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml', 'zstandard': 'mcap-ros2-support',
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
 # Only where a cluster is named; tuning/workers.py says what to install.
-OPTIONAL = {'dask', 'ray'}
+OPTIONAL = {'dask', 'ray', 'h5py'}
 
 
 @pytest.fixture(scope='module')

@@ -29,6 +29,8 @@ from pam_actuation.experiments import experiment
 from pam_actuation.experiments.chain import DOMAINS, FORCE
 from pam_actuation.experiments.primitives.make import keys_of, PRIMITIVES, range_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS, VALVE_OUTPUTS
+from pam_actuation.tables import mapping, units
+from pam_actuation.tables.signals import SIGNALS
 from pam_sim import model_file
 from pam_sim.effects.registry import effects
 from pam_sim.joint import model_file as joint_file, parameters as joint
@@ -55,6 +57,7 @@ does not say `gauge`. A mistake in a file is told in one sentence with file and 
 | [controller](controller.md) | control law, settings, rules | `--controller`, `load_controller` |
 | [experiment](experiment.md) | what is asked of the rig over time | `pam run`, `pam simulate` |
 | [hardware](hardware.md) | parameters of driver and sensors | `--hardware`, launch files |
+| [mapping](mapping.md) | columns of a foreign table, with their units | `pam import --mapping` |
 
 ```{{toctree}}
 :hidden:
@@ -64,6 +67,7 @@ joint
 controller
 experiment
 hardware
+mapping
 ```
 """
 
@@ -72,7 +76,7 @@ def pages():
     """Return the path below docs/ and the text of each page."""
     made = {'index': INDEX, 'rig': rig_page(), 'joint': joint_page(),
             'controller': controller_page(), 'experiment': experiment_page(),
-            'hardware': hardware_page()}
+            'hardware': hardware_page(), 'mapping': mapping_page()}
     return {f'reference/files/{name}.md': text for name, text in made.items()}
 
 
@@ -167,6 +171,24 @@ def experiment_page():
         remark = f'Only in the domains {", ".join(cls.DOMAINS)}.' if cls.DOMAINS else ''
         parts += [f'### `{name}`', _words(cls.__doc__), plain(remark), _table(_HEAD, rows)]
     return _joined(parts)
+
+
+def mapping_page():
+    """Return the page on a mapping file of ``pam import``."""
+    return _joined([
+        '# File of a mapping', _MADE,
+        'What it is for: [Import and export tables](../../guides/tables.md). '
+        '`pam import --save-mapping` writes one.',
+        _yaml('time: {column: t_ms, unit: ms}', 'signals:',
+              '  pressure: {column: p_bar, unit: bar_gauge}',
+              '  contraction: {column: length, unit: mm, zero: 300.0, gain: -1.0}'),
+        '## Keys', keys(mapping.KEYS), '## `time`', keys(mapping.TIME_KEYS),
+        '## `signals`', 'The key of each entry is one of these:',
+        _table(('signal', 'topic', 'units', 'meaning'), [
+            (f'`{one.name}`', f'`{one.topic}`',
+             ', '.join(f'`{unit}`' for unit in units.names_of(one.quantity)), one.meaning)
+            for one in SIGNALS]),
+        'Each entry holds:', keys(mapping.COLUMN_KEYS)])
 
 
 def hardware_page():

@@ -27,12 +27,14 @@ GROUPS = {
         'simulate': 'simulate an experiment without ROS, faster than real time',
         'run': 'run an experiment on live nodes and record it',
         'up': 'bring up the nodes of a rig, a joint or both knees',
+        'import': 'make a bag of a table measured elsewhere: CSV, Parquet, MAT, HDF5',
         'demo': 'see everything once with live nodes, in about three minutes'},
     'Look at a recording': {
         'info': 'topics, rates, losses and plausibility',
         'report': 'one HTML page with plots and metrics',
         'replay': 'step controller, driver and plant again on what was recorded',
-        'rules': 'what the rules of a controller say, and what learning changed'},
+        'rules': 'what the rules of a controller say, and what learning changed',
+        'export': 'write a bag as a table: CSV, Parquet, MAT, HDF5'},
     'Make a controller or a model better': {
         'tune': 'tune a controller on a model',
         'gap': 'find what a model misses, name it and add it',

@@ -1,0 +1,59 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam export``: a bag as a table for other programs."""
+
+import argparse
+
+from pam_actuation.cli.common import (
+    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
+from pam_actuation.cli.options import number, out_path, Parser, source
+
+HELP = 'Write a bag as a table: CSV, TSV, Parquet, MAT or HDF5. Values are SI, pressures absolute.'
+EXAMPLE = 'pam export runs/first --out first.csv --rate 500'
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
+    parser.add_argument('--out', type=out_path, required=True, metavar='FILE',
+                        help='the table; its ending says the kind: .csv .tsv .parquet .mat .h5')
+    parser.add_argument(
+        '--rate', type=number(0.1, 1e5, 'Hz'), default=None, metavar='HZ',
+        help='rows at equal distances; default: one row for each stamp of any topic')
+    parser.add_argument('--topics', type=source, default=None, metavar='A,B',
+                        help='short names of topics (default: all that have messages)')
+    parser.add_argument('--namespace', type=source, default=None, metavar='NS',
+                        help='which muscle, if the bag has several')
+    add_recover_option(parser)
+    add_overwrite_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the table and say what is in it."""
+    from pam_actuation.bags.data_frame import data_frame
+    from pam_actuation.bags.load import load_run
+    from pam_actuation.tables.export import check_ending, write_table
+    check_ending(args.out)
+    check_outputs(args, args.out)
+    loaded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
+    note_implausible(args, [loaded])
+    topics = [name.strip() for name in args.topics.split(',')] if args.topics else None
+    frame = data_frame(loaded, args.rate, topics)
+    write_table(frame, args.out)
+    columns = [str(name) for name in frame.columns]
+    emit(args, {'table': args.out, 'rows': len(frame), 'columns': columns},
+         f'wrote {len(frame)} rows and {len(columns)} columns\ntable: {args.out}\n'
+         f'columns: {", ".join(columns)}')
+    return EXIT_DONE

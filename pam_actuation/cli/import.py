@@ -1,0 +1,180 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam import``: a table that another program wrote, as a bag."""
+
+import argparse
+from functools import partial
+import sys
+from typing import Any, TYPE_CHECKING
+
+from pam_actuation.cli.common import (
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress)
+from pam_actuation.cli.options import count, number, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.tables.guess import Guess
+    from pam_actuation.tables.importer import Recording
+    from pam_actuation.tables.table import Table
+
+HELP = """Make a bag of a table measured elsewhere: CSV, TSV, Parquet, MAT, HDF5, or a foreign bag.
+
+Without --map the columns are found by name, unit and range; --preview shows how. What the file
+cannot tell is asked for. Several files are one recording: the next part, or other signals."""
+EXAMPLE = 'pam import run7.csv --map pressure="p_bar:bar_gauge" --out runs/run7'
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('files', type=source, nargs='+', metavar='FILE',
+                        help='table, or the folder of a bag; several files are one recording')
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
+                        help='bag directory (default: runs/NAME of the first file)')
+    parser.add_argument(
+        '--map', action='append', default=[], metavar='SIGNAL=COLUMN:UNIT', dest='maps',
+        help='what a column is, such as pressure="p_bar:bar_gauge", time="t:ms" or '
+             'contraction="length:mm:zero=250:gain=-1"; a column is named, or numbered as #3; '
+             'may be repeated')
+    parser.add_argument('--mapping', type=source, default=None, metavar='FILE',
+                        help='mapping file, as --save-mapping writes it; --map goes before it')
+    parser.add_argument('--save-mapping', type=out_path, default=None, metavar='FILE',
+                        help='write down how the columns were read, for the next file')
+    parser.add_argument('--rate', type=number(0.1, 1e6, 'Hz'), default=None, metavar='HZ',
+                        help='rows a second, where no column is the time')
+    parser.add_argument('--preview', action='store_true',
+                        help='show columns and what they are read as; write nothing')
+    parser.add_argument('--every', type=count(1, 10**6), default=1, metavar='N',
+                        help='keep one row of N')
+    parser.add_argument('--from', type=number(0.0, None, 's'), default=0.0, metavar='S',
+                        dest='begin_s', help='leave out what was before, in s after the start')
+    parser.add_argument('--to', type=number(0.0, None, 's'), default=float('inf'), metavar='S',
+                        dest='end_s', help='leave out what comes later, in s after the start')
+    parser.add_argument('--sort', action='store_true',
+                        help='put rows in order whose time runs back')
+    parser.add_argument('--missing', action='append', default=[], metavar='TEXT',
+                        help='text that stands for a missing value; may be repeated')
+    parser.add_argument('--accept', action='store_true',
+                        help='take values that cannot be in the unit stated')
+    parser.add_argument('--rig', type=source, default=None, metavar='NAME|FILE',
+                        help='model of the rig that was measured, kept in the bag')
+    parser.add_argument('--namespace', type=source, default='/muscle', metavar='NS',
+                        help='namespace of the muscle in the bag (default: %(default)s)')
+    add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, ask, check, write; say what to do next."""
+    import os
+    from pathlib import Path
+    from pam_actuation.bags.plausibility import MUSCLE_LENGTH_M
+    from pam_actuation.bags.place import check_bag_target
+    from pam_actuation.cli.common import check_outputs
+    from pam_actuation.tables.importer import digest_of, recording_of, write_bag
+    from pam_sim import load_rig
+    from pam_sim.files import write_text
+    rig = load_rig(args.rig) if args.rig else None
+    out = args.out or os.path.join('runs', Path(args.files[0]).name.partition('.')[0])
+    if not args.preview:
+        check_bag_target(out, args.overwrite)
+        check_outputs(args, args.save_mapping)
+    tables, found = _understood(args)
+    if args.preview:
+        return _show(args, tables, found)
+    recording = recording_of(
+        tables, found.mapping, sort=args.sort, missing=args.missing, accept=args.accept,
+        length_m=MUSCLE_LENGTH_M if rig is None else rig.muscle.length_m)
+    if args.begin_s > 0.0 or args.end_s < float('inf'):
+        recording = recording.between(args.begin_s, args.end_s)
+    recording.sources = {Path(file).name: digest_of(file) for file in args.files}
+    with progress(args, 1.0, '', 'writing') as bar:
+        counts = write_bag(recording, out, rig=rig, namespace=args.namespace,
+                           overwrite=args.overwrite, progress=lambda s: bar.update(s - bar.n))
+        bar.update(1.0 - bar.n)
+    if args.save_mapping:
+        write_text(args.save_mapping, found.mapping.to_yaml())
+    _tell(args, recording, found, counts, out)
+    return EXIT_FINDING if recording.found else EXIT_DONE
+
+
+def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
+    """Return the tables and how they are read; InputError where that stays open."""
+    from pam_actuation.tables.formats import read_tables
+    from pam_actuation.tables.guess import ask, guess
+    from pam_actuation.tables.mapping import load_mapping, TableMapping
+    from pam_actuation.tables.preview import question_sentence
+    from pam_sim.errors import InputError
+    mapping = (load_mapping(args.mapping) if args.mapping else TableMapping()).with_options(
+        args.maps, args.rate)
+    # Who says what the signals are means these; otherwise all columns are looked at.
+    wanted = [one.column for one in mapping.signals.values()] or None
+    tables = []
+    with progress(args, float(len(args.files)), '', 'reading') as bar:
+        for done, file in enumerate(args.files):
+            tables += read_tables(file, args.every, wanted, partial(_move, bar, done))
+    found = guess(tables, mapping, args.missing)
+    if args.mapping:                    # a file that is kept says everything
+        found.mapping, found.questions = mapping, []
+    if found.questions and not args.preview:
+        if sys.stdin.isatty() and sys.stdout.isatty() and not args.json:
+            found = ask(found, _asked)
+        else:
+            raise InputError(question_sentence(found), args.files[0])
+    return tables, found
+
+
+def _move(bar: Any, done: int, share: float) -> None:
+    bar.update(done + share - bar.n)
+
+
+def _asked(text: str, answers: tuple[str, ...]) -> str | None:
+    """Ask a person; return the answer, None to leave the column out."""
+    print(f'{text}\n  one of: {", ".join(answers)}; Enter leaves the column out')
+    while True:
+        said = input('> ').strip()
+        if not said:
+            return None
+        if said in answers:
+            return said
+        print(f'  {said!r} is not one of them')
+
+
+def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
+    from pam_actuation.tables.preview import preview, questions_text
+    lines = [preview(tables, found, args.missing)]
+    if found.questions:
+        lines += ['', 'the file does not tell:', questions_text(found)]
+    lines += ['', 'mapping:', found.mapping.to_yaml().rstrip()]
+    emit(args, {
+        'files': args.files, 'mapping': found.mapping.to_yaml(),
+        'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
+                       'answers': list(one.answers)} for one in found.questions],
+        'columns': [list(table.columns) for table in tables]}, '\n'.join(lines))
+    return EXIT_DONE
+
+
+def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
+          counts: dict[str, int], out: str) -> None:
+    remarks = [one.sentence for one in recording.found]
+    lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
+    lines += [f'  {text}' for text in recording.told]
+    for name, one in found.mapping.signals.items():
+        stamps, _ = recording.signals.get(name, ((), ()))
+        lines.append(f'  {name}: column "{one.column}" in {one.unit.name} '
+                     f'({found.told.get(name, "as stated")}), {len(stamps)} values')
+    lines += [f'remark: {text}' for text in remarks]
+    lines += [f'bag: {out}', f'next: pam report {out}']
+    payload: dict[str, Any] = {
+        'bag': out, 'duration_s': recording.duration_s, 'messages': counts,
+        'valve': recording.valve, 'remarks': remarks, 'mapping': found.mapping.to_yaml()}
+    emit(args, payload, '\n'.join(lines))

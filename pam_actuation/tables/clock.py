@@ -1,0 +1,259 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The time of every row, in nanoseconds: from a column, a rate, or the file itself."""
+
+from dataclasses import dataclass
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pam_actuation.messages import START_NS
+from pam_actuation.tables.mapping import TableMapping, TimeMap
+from pam_actuation.tables.signals import TIME_WORDS
+from pam_actuation.tables.table import Table
+from pam_actuation.tables.units import DATE, FACTORS, TIME, unit_of_text
+from pam_actuation.tables.words import unit_in, words_of
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SLOWEST_HZ, FASTEST_HZ = 0.1, 50_000.0
+SLOW_HZ = 10.0                              # below: another unit may be meant
+EPOCH_S = 9e8                               # seconds that can only count from 1970
+MOST_REPEATED = 0.01                        # share of rows that may repeat a time as they are
+_COARSE = 1e-3                              # of a step: what counts as a whole number of them
+
+
+@dataclass(frozen=True)
+class Clock:
+    """
+    The times of the rows of a table.
+
+    Parameters
+    ----------
+    stamp_ns : ndarray of int64, shape (rows,)
+        Growing strictly.
+    rows : ndarray of int64, shape (rows,)
+        Rows of the table that they belong to.
+    told : str
+        Where the time came from, for the preview.
+    remarks : tuple of str
+        What was mended.
+
+    """
+
+    stamp_ns: IntArray
+    rows: IntArray
+    told: str
+    remarks: tuple[str, ...] = ()
+
+
+def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
+    """Return the column of the time: the one named, else the one whose name says so."""
+    if mapping.time is not None or mapping.rate_hz is not None or table.stamp_ns is not None:
+        return mapping.time
+    found = [name for name in table.columns if re.fullmatch(TIME_WORDS, words_of(name))]
+    exact = [name for name in found if name.endswith('stamp_ns')]
+    return TimeMap((exact or found)[0]) if found else None
+
+
+def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
+             sort: bool = False) -> Clock:
+    """
+    Return the times of the rows.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    mapping : TableMapping
+        What the user said of its time.
+    start_ns : int
+        Stamp of time 0, where the times do not count from 1970.
+    sort : bool
+        Put the rows in order of time.
+
+    Raises
+    ------
+    InputError
+        No time; times that are missing, run back or repeat; a rate that no unit explains.
+
+    """
+    count = len(table)
+    every_row = np.arange(count, dtype=np.int64)
+    if mapping.rate_hz is not None:
+        stamps = start_ns + np.round(every_row * (1e9 / mapping.rate_hz)).astype(np.int64)
+        return Clock(stamps, every_row, f'{mapping.rate_hz:g} rows a second')
+    column = time_column(table, mapping)
+    if column is None:
+        if table.stamp_ns is None:
+            raise InputError(
+                'no column is the time; add --map time="COLUMN:s", or --rate HZ for rows at '
+                'equal distances', table.source)
+        stamps, told, step_ns = table.stamp_ns, 'times of the messages', 0
+    else:
+        stamps, told, step_ns = _from_column(table, column, start_ns)
+    return _in_order(table, stamps, every_row, told, sort, step_ns)
+
+
+def _from_column(table: Table, column: TimeMap, start_ns: int) -> tuple[IntArray, str, int]:
+    """Return the stamps in a column, what they are read as, and the column's resolution [ns]."""
+    import pandas as pd
+    name = table.require(column.column, column.where)
+    values = table.columns[name]
+    is_date = pd.api.types.is_datetime64_any_dtype(values)
+    is_text = not is_date and not pd.api.types.is_numeric_dtype(values) and column.unit in (
+        '', DATE)
+    if is_date or is_text and _is_date(values):
+        return _dates(table, name), f'column "{name}", dates', 0
+    unit = column.unit or _unit_of_name(table, name)
+    if pd.api.types.is_integer_dtype(values) and unit == 'ns':
+        stamps = values.to_numpy(dtype=np.int64)
+        start = 0 if len(stamps) and abs(int(stamps[0])) > EPOCH_S * 1e9 else start_ns
+        return start + stamps, f'column "{name}" in ns', 0
+    numbers = table.numbers(name)
+    missing = np.flatnonzero(~np.isfinite(numbers))
+    if len(missing):
+        raise InputError(
+            f'column "{name}" has no time here ({len(missing)} such rows); delete the rows, or '
+            'give --rate HZ', table.place(int(missing[0])))
+    unit = unit or _unit_by_rate(table, name, numbers)
+    factor = FACTORS[TIME][unit]
+    start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else start_ns
+    # Whole numbers of the unit first: their product with a power of ten is exact.
+    stamps = start + np.round(numbers * (factor * 1e9)).astype(np.int64)
+    remark = _rate_remark(table, name, unit, stamps)
+    if remark:
+        table.remarks.append(remark)
+    return stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start)
+
+
+def _is_date(values: 'pd.Series') -> bool:
+    first = next((str(one) for one in values if isinstance(one, str)), '')
+    return bool(re.search(r'\d[-/:.]\d', first)) and not re.fullmatch(r'[+-]?[\d.]+', first)
+
+
+def _dates(table: Table, name: str) -> IntArray:
+    import pandas as pd
+    values = table.columns[name]
+    dates = pd.to_datetime(values, errors='coerce', utc=True, format=(
+        None if pd.api.types.is_datetime64_any_dtype(values) else 'ISO8601'))
+    wrong = np.flatnonzero(dates.isna().to_numpy())
+    if len(wrong):
+        raise InputError(
+            f'column "{name}" holds {str(values.iloc[wrong[0]])!r}, which is no date and time '
+            'as in 2026-11-25T09:30:00.125', table.place(int(wrong[0])))
+    return dates.dt.as_unit('ns').astype('int64').to_numpy()
+
+
+def _unit_of_name(table: Table, name: str) -> str:
+    """Return the unit that the row of units or the name of the column says, '' without one."""
+    for text in (table.units.get(name, ''), unit_in(name)):
+        unit = unit_of_text(text, TIME) if text else None
+        if unit is not None:
+            return unit.name
+    return ''
+
+
+def _unit_by_rate(table: Table, name: str, numbers: FloatArray) -> str:
+    """Return the one unit in which the rows come at a rate that recorders have."""
+    steps = np.diff(numbers)
+    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    fitting = [unit for unit in ('s', 'ms', 'us', 'ns') if step and (
+        20.0 <= 1.0 / (step * FACTORS[TIME][unit]) <= 5000.0)]
+    if len(fitting) != 1:
+        raise InputError(
+            f'column "{name}" does not say its unit, and steps of {step:g} fit '
+            f'{" and ".join(fitting) or "none"}; add --map time="{name}:s" (or ms, us, ns)',
+            table.source)
+    return fitting[0]
+
+
+def _rate_remark(table: Table, name: str, unit: str, stamps: IntArray) -> str:
+    """Return a sentence on a rate that few recorders have, '' without; InputError beyond."""
+    steps = np.diff(stamps)
+    steps = steps[steps > 0]
+    if not len(steps):
+        return ''
+    rate_hz = 1e9 / float(np.median(steps))
+    if SLOW_HZ <= rate_hz <= FASTEST_HZ:
+        return ''
+    other = next((one for one in ('s', 'ms', 'us', 'ns') if one != unit and
+                  20.0 <= rate_hz * FACTORS[TIME][unit] / FACTORS[TIME][one] <= 5000.0), '')
+    hint = f'; in {other} they would be plausible: --map time="{name}:{other}"' if other else ''
+    said = f'column "{name}" in {unit} means {rate_hz:.4g} rows a second'
+    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        return said + hint
+    raise InputError(f'{said}, allowed are {SLOWEST_HZ:g} to {FASTEST_HZ:g}'
+                     f'{hint or "; is this the time?"}', table.source)
+
+
+def _resolution_ns(times_ns: IntArray) -> int:
+    """Return the step of which all times are whole numbers, 0 where the times have none."""
+    for step_ns in (10**9, 10**8, 10**7, 10**6, 10**5, 10**4, 1000):
+        if not (times_ns % step_ns).any():
+            return step_ns
+    return 0
+
+
+def _in_order(table: Table, stamps: IntArray, rows: IntArray, told: str, sort: bool,
+              step_ns: int) -> Clock:
+    """Return the clock with its rows in order, each with a time of its own."""
+    remarks = []
+    back = np.flatnonzero(np.diff(stamps) < 0)
+    if len(back):
+        if not sort:
+            row = int(back[0]) + 1
+            raise InputError(
+                f'the time runs back by {(stamps[row - 1] - stamps[row]) * 1e-9:g} s '
+                f'({len(back)} times in all); two recordings in one file? Split it here, or add '
+                '--sort to put the rows in order', table.place(row))
+        order = np.argsort(stamps, kind='stable')
+        stamps, rows = stamps[order], rows[order]
+        remarks.append(f'the rows were put in order of time ({len(back)} steps back)')
+    repeated = np.flatnonzero(np.diff(stamps) == 0) + 1
+    if not len(repeated):
+        return Clock(stamps, rows, told, tuple(remarks))
+    same = [row for row in repeated if _equal_rows(table, int(rows[row - 1]), int(rows[row]))]
+    if len(same) == len(repeated):
+        kept = np.ones(len(stamps), dtype=bool)
+        kept[same] = False
+        remarks.append(f'rows that stand twice, taken once: {len(same)}')
+        return Clock(stamps[kept], rows[kept], told, tuple(remarks))
+    steps = np.diff(np.unique(stamps))
+    if step_ns and len(steps) and float(np.median(steps)) <= 3.0 * step_ns:
+        remarks.append(
+            f'rows that repeat a time: {len(repeated)}. Times are written to {1e-6 * step_ns:g} '
+            'ms; rows of one time were spread over that')
+        return Clock(_spread(stamps, step_ns), rows, told, tuple(remarks))
+    raise InputError(
+        f'the row has the time of the row before, with other values ({len(repeated)} such rows); '
+        'two recordings in one file, or a time that is too coarse? Then give --rate HZ',
+        table.place(int(rows[repeated[0]])))
+
+
+def _equal_rows(table: Table, one: int, other: int) -> bool:
+    return all(column.iloc[one] == column.iloc[other] or (
+        column.iloc[one] != column.iloc[one] and column.iloc[other] != column.iloc[other])
+        for column in table.columns.values())
+
+
+def _spread(stamps: IntArray, step_ns: int) -> IntArray:
+    """Return stamps with those that are equal at equal distances within one step."""
+    _, first, count = np.unique(stamps, return_index=True, return_counts=True)
+    number = np.arange(len(stamps)) - np.repeat(first, count)
+    return stamps + number * step_ns // np.repeat(count, count)

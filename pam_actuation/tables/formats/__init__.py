@@ -1,0 +1,97 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Kinds of files that hold tables, one module each: found by the ending of a file's name."""
+
+from collections.abc import Callable, Collection
+import importlib
+import os
+from pathlib import Path
+from typing import Any
+
+from pam_actuation.tables.table import Table
+from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe, shown, StrPath
+
+# Ending to the module that reads and writes it.
+ENDINGS = {
+    '.csv': 'delimited', '.tsv': 'delimited', '.txt': 'delimited', '.dat': 'delimited',
+    '.asc': 'delimited', '.log': 'delimited', '.parquet': 'parquet', '.pq': 'parquet',
+    '.mat': 'mat', '.h5': 'hdf5', '.hdf5': 'hdf5', '.hdf': 'hdf5', '.mcap': 'bag', '.db3': 'bag'}
+COMPRESSED = ('.gz', '.bz2', '.xz')
+
+
+def read_tables(path: StrPath, every: int = 1, wanted: Collection[str] | None = None,
+                progress: Callable[[float], object] | None = None) -> list[Table]:
+    """
+    Return the tables of a file.
+
+    Parameters
+    ----------
+    path : path
+        A file, or the folder of a bag.
+    every : int
+        Keep one row of so many; the others are not held in memory.
+    wanted : collection of str, optional
+        Columns that will be asked for; of a bag only their topics are read.
+    progress : callable, optional
+        Called with the share that is read, 0 to 1.
+
+    Returns
+    -------
+    list of Table
+        One for a text file; one for each topic of a bag, and for each length of the arrays of
+        a MAT or HDF5 file.
+
+    Raises
+    ------
+    InputError
+        No such file, one of another kind, or one that cannot be read.
+
+    """
+    place = Path(path)
+    if not place.exists():
+        raise InputError('there is no such file', shown(path))
+    refuse_pipe(path)
+    module = importlib.import_module(f'{__name__}.{kind_of(place)}')
+    try:
+        tables: list[Table] = module.read(str(path), every, wanted, progress or (lambda _: None))
+    except (OSError, MemoryError) as error:
+        raise InputError(f'cannot be read: {error}', shown(path)) from None
+    if not any(len(table) for table in tables):
+        raise InputError('holds no rows of numbers', shown(path))
+    return tables
+
+
+def kind_of(place: Path) -> str:
+    """Return the module of a file by its name; InputError where no module fits."""
+    if place.is_dir():
+        return 'bag'
+    endings = [ending.lower() for ending in place.suffixes]
+    if endings and endings[-1] in COMPRESSED:
+        endings.pop()
+    kind = ENDINGS.get(endings[-1] if endings else '')
+    if kind is None:
+        raise InputError(
+            f'the ending {os.path.splitext(place.name)[1]!r} is unknown; allowed: '
+            f'{", ".join(ENDINGS)}, or the folder of a bag', shown(place))
+    return kind
+
+
+def needs(module: str, package: str, what: str) -> Any:
+    """Return an optional library; InputError with the command that installs it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise InputError(f'{what} needs {package}; run: pip install {package}') from None

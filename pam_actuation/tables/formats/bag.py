@@ -1,0 +1,104 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bags of other programs: every topic is a table, every number in its messages a column."""
+
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pam_actuation.tables.table import MOST_ROWS, Table
+from pam_sim.errors import InputError
+
+_MOST_ITEMS = 32                 # of an array in a message
+_PREVIEWED = 1000                # messages of a topic
+
+
+def read(path: str, every: int, wanted: Collection[str] | None,
+         progress: Callable[[float], object]) -> list[Table]:
+    """
+    Return a table for each topic; see ``formats.read_tables``.
+
+    A column is called ``/topic.field``. Times are header stamps, or receive times for messages
+    without header. Of topics that are not ``wanted`` only the first messages are read.
+    """
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.typesys import get_typestore, Stores
+    place = Path(path)
+    try:
+        with AnyReader([place], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            total = sum(one.msgcount for one in reader.connections) or 1
+            tables, done = [], 0
+            for connection in reader.connections:
+                used = wanted is None or any(_is_of(name, connection.topic) for name in wanted)
+                rows, stamps = _rows(reader, connection, every, None if used else _PREVIEWED)
+                done += connection.msgcount
+                progress(done / total)
+                if rows:
+                    tables.append(_table(path, connection.topic, rows, stamps))
+            return tables
+    except (AnyReaderError, KeyError, ValueError, AssertionError, OSError) as error:
+        raise InputError(f'is no readable bag: {error}', path) from None
+
+
+def _is_of(column: str, topic: str) -> bool:
+    return column == topic or column.startswith(f'{topic}.') or column.startswith('#')
+
+
+def _rows(reader: Any, connection: Any, every: int, most: int | None
+          ) -> tuple[list[dict[str, float]], list[int]]:
+    """Return the numbers of every message of a topic, and its times [ns]."""
+    rows: list[dict[str, float]] = []
+    stamps: list[int] = []
+    for count, (_, log_time_ns, raw) in enumerate(reader.messages(connections=[connection])):
+        if most is not None and count >= most or len(rows) >= MOST_ROWS:
+            break
+        if count % every:
+            continue
+        message = reader.deserialize(raw, connection.msgtype)
+        values = dict(_numbers(message, ''))
+        if not values:
+            break
+        rows.append(values)
+        stamps.append(_stamp_ns(message) or log_time_ns)
+    return rows, stamps
+
+
+def _table(path: str, topic: str, rows: list[dict[str, float]], stamps: list[int]) -> Table:
+    import pandas as pd
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = {f'{topic}{name}': pd.Series([row.get(name, np.nan) for row in rows], dtype=float)
+               for name in names}
+    return Table(path, columns, stamp_ns=np.array(stamps, dtype=np.int64))
+
+
+def _stamp_ns(message: Any) -> int:
+    stamp = getattr(getattr(message, 'header', None), 'stamp', None)
+    return 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def _numbers(message: Any, name: str) -> Iterator[tuple[str, float]]:
+    """Return path and value of every number in a message, but those of its header."""
+    fields = getattr(message, '__dataclass_fields__', None)
+    if fields is not None:
+        for field in fields:
+            if field != 'header' and not field.startswith('__'):
+                yield from _numbers(getattr(message, field), f'{name}.{field}')
+    elif isinstance(message, (bool, int, float, np.number)):
+        yield name, float(message)
+    elif isinstance(message, (np.ndarray, list, tuple)):
+        for place, item in enumerate(message[:_MOST_ITEMS]):
+            if not isinstance(item, str):
+                yield from _numbers(item, f'{name}[{place}]')

@@ -1,0 +1,118 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Text files with separators: CSV and its relatives."""
+
+import bz2
+from collections.abc import Callable, Collection
+import gzip
+import lzma
+import os
+import re
+from typing import Any, TYPE_CHECKING
+import zlib
+
+import numpy as np
+from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES
+from pam_actuation.tables.table import MOST_ROWS, Table
+from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_OPEN: dict[str, Callable[..., Any]] = {'.gz': gzip.open, '.bz2': bz2.open, '.xz': lzma.open}
+_CHUNK_ROWS = 250_000
+_PACKED_FACTOR = 6                       # how much longer a packed text may be
+
+
+def read(path: str, every: int, wanted: Collection[str] | None,
+         progress: Callable[[float], object]) -> list[Table]:
+    """Return the table of a text file; see ``formats.read_tables``."""
+    import pandas as pd
+    try:
+        with _OPEN.get(os.path.splitext(path)[1].lower(), open)(path, 'rb') as stream:
+            head = stream.read(SAMPLE_BYTES)
+    except (EOFError, lzma.LZMAError, OSError, zlib.error) as error:
+        raise InputError(f'cannot be unpacked: {error}', path) from None
+    if not head.strip():
+        raise InputError('is empty', path)
+    layout = layout_of(head, path)
+    size = os.path.getsize(path)
+    is_packed = os.path.splitext(path)[1].lower() in _OPEN
+    rows = size / layout.line_bytes * (_PACKED_FACTOR if is_packed else 1) / every
+    if rows > MOST_ROWS and not is_packed:
+        raise InputError(
+            f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
+            f'million; keep one of several, with --every {int(rows * every / MOST_ROWS) + 1}',
+            path)
+    pieces, done = [], 0
+    try:
+        with pd.read_csv(
+                path, sep=layout.separator, decimal=layout.decimal, encoding=layout.encoding,
+                header=None, names=list(range(len(layout.names))), index_col=False,
+                skiprows=layout.first_line - 1, skipinitialspace=True, low_memory=False,
+                **_exact_numbers(pd.__version__),
+                skip_blank_lines=False, chunksize=_CHUNK_ROWS,
+                on_bad_lines='error') as reader:
+            for piece in reader:
+                pieces.append(piece.iloc[-done % every::every])
+                done += len(piece)
+                progress(min(done / max(rows * every, 1.0), 1.0))
+                if sum(map(len, pieces)) > MOST_ROWS:
+                    raise InputError(
+                        f'has more than {MOST_ROWS // 10**6} million rows; keep one of several, '
+                        'with --every 10', path)
+    except pd.errors.ParserError as error:
+        raise _row_error(str(error), path, layout.first_line, len(layout.names)) from None
+    except UnicodeError as error:
+        raise InputError(
+            f'is no text in {layout.encoding} throughout: {error}; save it as UTF-8', path
+        ) from None
+    frame = pd.concat(pieces, ignore_index=True)
+    lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
+    remarks = []
+    if every == 1 and not is_packed and len(frame) > 1 and not _ends_with_line(path):
+        frame = frame.iloc[:-1]
+        remarks.append('the last line has no end, so it may be incomplete: it was left out')
+    kept = ~frame.isna().all(axis=1).to_numpy()
+    frame, lines = frame[kept], lines[:len(frame)][kept]
+    columns = {name: frame[place] for place, name in enumerate(layout.names)}
+    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines, remarks=remarks)]
+
+
+def _exact_numbers(version: str) -> dict[str, Any]:
+    """Return what makes pandas read a number to its last bit; new versions always do."""
+    major, minor, *_ = (int(one) for one in re.findall(r'\d+', version))
+    return {} if (major, minor) >= (3, 1) else {'float_precision': 'round_trip'}
+
+
+def _ends_with_line(path: str) -> bool:
+    with open(path, 'rb') as stream:
+        stream.seek(-1, os.SEEK_END)
+        return stream.read(1) in (b'\n', b'\r', b'\0')
+
+
+def _row_error(text: str, path: str, first_line: int, count: int) -> InputError:
+    """Return the error of a row with too many fields, with its line in the file."""
+    found = re.search(r'in line (\d+), saw (\d+)', text)
+    if not found:
+        return InputError(f'cannot be read as a table: {text}', path)
+    return InputError(
+        f'the row has {found[2]} fields, those above have {count}; is it damaged, or does '
+        f'another table begin here?', f'{path}:{int(found[1])}')
+
+
+def write(frame: 'pd.DataFrame', path: str) -> None:
+    """Write a data frame as CSV, or with tabs for ``.tsv``; every number to its last bit."""
+    frame.to_csv(path, index=False, sep='\t' if path.lower().endswith('.tsv') else ',')

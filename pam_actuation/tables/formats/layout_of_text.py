@@ -1,0 +1,203 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How a text file with numbers is laid out: encoding, separator, decimal sign, header."""
+
+from collections import Counter
+import csv
+from dataclasses import dataclass
+import re
+
+from pam_sim.errors import InputError
+
+SAMPLE_BYTES = 256 * 1024
+_BOMS = ((b'\xef\xbb\xbf', 'utf-8-sig'), (b'\xff\xfe', 'utf-16'), (b'\xfe\xff', 'utf-16'))
+# Separator as pandas takes it; of equally good ones the first.
+_SEPARATORS = (';', '\t', ',', '|', r'\s+')
+_NUMBER = r'[+-]?(\d+{0}?\d*|{0}\d+)([eEdD][+-]?\d+)?'
+_DATE = re.compile(
+    r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}.*)?|\d{1,2}:\d{2}(:[\d.,]+)?')
+_EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-', 'inf', '+inf', '-inf', '#n/a'}
+_COMMENTS = ('#', '%', '//')
+_LOOKED_AT = 200                     # lines
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """
+    How to read a text file.
+
+    Parameters
+    ----------
+    encoding, separator, decimal : str
+        As ``pandas.read_csv`` takes them.
+    names : tuple of str
+        Of the columns; ``#1``, ``#2``, … where the file has none.
+    units : tuple of str
+        Of a row of units below the names; empty without one.
+    first_line : int
+        Line of the first row, counted from 1.
+    line_bytes : float
+        Usual length of a row.
+
+    """
+
+    encoding: str
+    separator: str
+    decimal: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    first_line: int
+    line_bytes: float
+
+
+def layout_of(head: bytes, source: str) -> TextLayout:
+    """
+    Return the layout of a text file.
+
+    Parameters
+    ----------
+    head : bytes
+        Its beginning, up to SAMPLE_BYTES.
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        No text, no rows of numbers, or a header with another number of columns.
+
+    """
+    encoding = encoding_of(head, source)
+    lines = head.decode(encoding, errors='ignore').splitlines()
+    if len(head) >= SAMPLE_BYTES:
+        lines = lines[:-1]               # the last one ends early
+    said = None
+    if lines and re.fullmatch(r'sep=.', lines[0].strip()):
+        said = lines[0].strip()[4:]
+    best: tuple[int, int, str, str, int] | None = None
+    for separator in (said,) if said else _SEPARATORS:
+        for decimal in '.,':
+            if decimal == separator:
+                continue
+            begin, count = _first_row(lines, separator, decimal)
+            if count and (best is None or (len(lines) - begin, count) > best[:2]):
+                best = (len(lines) - begin, count, separator, decimal, begin)
+    if best is None:
+        raise InputError(
+            'holds no rows of numbers with a separator that is ; , | a tab or spaces', source)
+    _, count, separator, decimal, begin = best
+    names, units = _header(lines[:begin], separator, count, begin, source, decimal)
+    rows = lines[begin:begin + _LOOKED_AT]
+    line_bytes = sum(len(line) + 1 for line in rows) / len(rows)
+    return TextLayout(encoding, separator, decimal, names, units, begin + 1,
+                      line_bytes * (2 if encoding == 'utf-16' else 1))
+
+
+def encoding_of(head: bytes, source: str) -> str:
+    """Return the encoding of a text by its first bytes; InputError for what is no text."""
+    for mark, encoding in _BOMS:
+        if head.startswith(mark):
+            return encoding
+    if b'\0' in head:
+        raise InputError('is no text file: it holds zero bytes', source)
+    try:
+        # The sample may end within a character.
+        head[:-4].decode('utf-8') if len(head) >= SAMPLE_BYTES else head.decode('utf-8')
+    except UnicodeDecodeError:
+        return 'cp1252' if not {0x81, 0x8d, 0x8f, 0x90, 0x9d} & {*head} else 'latin-1'
+    return 'utf-8'
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Return the fields of a line, without quotes and spaces around them."""
+    if separator == r'\s+':
+        return line.split()
+    if '"' in line:
+        return [one.strip() for one in next(csv.reader([line.strip()], delimiter=separator,
+                                                       skipinitialspace=True))]
+    return [one.strip() for one in line.strip(' \r\n').split(separator)]
+
+
+def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, int]:
+    """Return where the rows begin and their number of fields; (0, 0) where there are none."""
+    number = re.compile(_NUMBER.format(re.escape(decimal)))
+
+    def kind(line: str) -> int:
+        fields = split(line, separator)
+        numeric = sum(bool(number.fullmatch(one)) for one in fields)
+        dates = sum(bool(_DATE.fullmatch(one)) for one in fields)
+        empty = sum(one.lower() in _EMPTY for one in fields)
+        # A text in a row of numbers is a flag, or a value that the import will name.
+        return len(fields) if numeric and 2 * (numeric + dates + empty) >= len(fields) else 0
+
+    looked_at = [kind(line) for line in lines[:_LOOKED_AT]]
+    counts = Counter(count for count in looked_at if count)
+    if not counts:
+        return 0, 0
+    usual = max(counts, key=lambda count: (counts[count], count))
+    if 2 * counts[usual] < sum(1 for line in lines[:_LOOKED_AT] if line.strip()) and (
+            counts[usual] < 3):
+        return 0, 0
+    return looked_at.index(usual), usual
+
+
+def _header(above: list[str], separator: str, count: int, begin: int, source: str,
+            decimal: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units from the lines above the rows."""
+    numbered = tuple(f'#{place + 1}' for place in range(count))
+    rows = []
+    for line in above:
+        text = line.strip().lstrip('\ufeff')
+        for mark in _COMMENTS:
+            text = text.removeprefix(mark).strip() if text.startswith(mark) else text
+        if text and not re.fullmatch(r'sep=.', text):
+            rows.append(split(text, separator))
+    if not rows:
+        return numbered, ()
+    while rows and rows[-1] and not any(rows[-1]):
+        rows.pop()
+    last = rows[-1] if rows else []
+    if len(last) == count + 1 and not last[-1]:
+        last = rows[-1] = last[:-1]
+    if len(last) != count:
+        likely = [row for row in rows if len(row) > 1]
+        if last and likely and last == likely[-1] and begin:
+            raise InputError(
+                f'the line above the numbers names {len(last)} columns, but the rows have '
+                f'{count} (separator {_told(separator)}, decimal sign "{decimal}"); correct '
+                'the header, or write decimal points', f'{source}:{begin}')
+        return numbered, ()
+    previous = rows[-2] if len(rows) > 1 else []
+    if len(previous) == count and all(previous) and _are_units(last):
+        return _unique(previous), tuple(last)
+    return _unique(last), ()
+
+
+def _are_units(fields: list[str]) -> bool:
+    from pam_actuation.tables.units import FACTORS, unit_of_text
+    known = sum(not one or any(unit_of_text(one, quantity) for quantity in FACTORS)
+                for one in fields)
+    return any(fields) and 2 * known > len(fields)
+
+
+def _unique(names: list[str]) -> tuple[str, ...]:
+    """Return names, each once; one that is empty or stands twice is called by its number."""
+    counts = Counter(names)
+    return tuple(name if name and counts[name] == 1 else f'#{place + 1}'
+                 for place, name in enumerate(names))
+
+
+def _told(separator: str) -> str:
+    return {'\t': 'tab', r'\s+': 'spaces'}.get(separator, f'"{separator}"')

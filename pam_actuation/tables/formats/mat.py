@@ -1,0 +1,63 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""MAT files of MATLAB and GNU Octave, up to version 7; 7.3 is HDF5."""
+
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+from pam_actuation.tables.formats import hdf5
+from pam_actuation.tables.formats.arrays import tables_of
+from pam_actuation.tables.table import Table
+from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DEEPEST = 6
+
+
+def read(path: str, every: int, wanted: Collection[str] | None,
+         progress: Callable[[float], object]) -> list[Table]:
+    """Return the tables of a MAT file; see ``formats.read_tables``."""
+    from scipy.io import loadmat, matlab
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except NotImplementedError:
+        return hdf5.read(path, every, wanted, progress)
+    except (matlab.MatReadError, ValueError, TypeError, IndexError, OSError, KeyError) as error:
+        raise InputError(f'is no readable MAT file: {error}', path) from None
+    return tables_of(path, _arrays({name: value for name, value in content.items()
+                                    if not name.startswith('__')}), every)
+
+
+def _arrays(content: dict[str, Any], prefix: str = '', depth: int = 0
+            ) -> Iterator[tuple[str, Any]]:
+    """Return name and value of every array, those within structs by ``struct.field``."""
+    for name, value in content.items():
+        fields = getattr(value, '_fieldnames', None)
+        if fields is not None and depth < _DEEPEST:
+            yield from _arrays({field: getattr(value, field) for field in fields},
+                               f'{prefix}{name}.', depth + 1)
+        elif isinstance(value, np.ndarray):
+            yield f'{prefix}{name}', value
+
+
+def write(frame: 'pd.DataFrame', path: str) -> None:
+    """Write a data frame as a MAT file, one array a column; a dot in a name becomes ``_``."""
+    from scipy.io import savemat
+    with open(path, 'wb') as stream:
+        savemat(stream, {str(name).replace('.', '_'): frame[name].to_numpy()
+                         for name in frame.columns}, long_field_names=True, oned_as='column')

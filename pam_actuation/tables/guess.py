@@ -1,0 +1,201 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a column is, by its name, its unit and its range: certain, or a question."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
+import re
+
+import numpy as np
+from pam_actuation.tables.mapping import ColumnMap, TableMapping
+from pam_actuation.tables.signals import BY_NAME, Signal, SIGNALS, TIME_WORDS
+from pam_actuation.tables.table import Table
+from pam_actuation.tables.units import (
+    ABSOLUTE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, Unit, unit_of_text, VOLTAGE)
+from pam_actuation.tables.words import unit_in, words_of
+from pam_sim.units import P_ATM_PA
+
+BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
+
+
+@dataclass(frozen=True)
+class Question:
+    """
+    What the file does not say of a column that seems to be a signal.
+
+    Parameters
+    ----------
+    signal, column : str
+        Which is meant.
+    text : str
+        The question, in one sentence.
+    answers : tuple of str
+        Units among which to choose.
+
+    """
+
+    signal: str
+    column: str
+    text: str
+    answers: tuple[str, ...]
+
+    def options(self) -> str:
+        """Return the words of the command line that answer it, one of them for each answer."""
+        return ' or '.join(f'--map {self.signal}="{self.column}:{unit}"' for unit in self.answers)
+
+
+@dataclass
+class Guess:
+    """
+    A mapping that was completed, and what is still open.
+
+    Parameters
+    ----------
+    mapping : TableMapping
+        What is known, by the user's words and by the file.
+    told : dict of str to str
+        Why a signal is taken to be a column, by name of the signal.
+    questions : list of Question
+        What only the user knows.
+
+    """
+
+    mapping: TableMapping
+    told: dict[str, str] = field(default_factory=dict)
+    questions: list[Question] = field(default_factory=list)
+
+
+def guess(tables: Collection[Table], mapping: TableMapping,
+          missing: Collection[str] = ()) -> Guess:
+    """
+    Complete a mapping from names, units and ranges.
+
+    What the user said stays. A column that the user mapped is not mapped again.
+
+    Parameters
+    ----------
+    tables : list of Table
+        Of one recording.
+    mapping : TableMapping
+        What the user said.
+    missing : collection of str
+        Texts that stand for missing values.
+
+    """
+    found = Guess(mapping, dict.fromkeys(mapping.signals, 'as stated'))
+    signals = dict(mapping.signals)
+    for table in tables:
+        used = {table.name_of(one.column) for one in mapping.signals.values()}
+        used |= {table.name_of(mapping.time.column)} if mapping.time is not None else set()
+        for column in table.columns:
+            if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
+                continue
+            signal = _signal_of(column)
+            if signal is None or signal.name in signals or any(
+                    question.signal == signal.name for question in found.questions):
+                continue
+            answer = _of_column(table, column, signal, missing)
+            if isinstance(answer, Question):
+                found.questions.append(answer)
+            elif answer is not None:
+                signals[signal.name], found.told[signal.name] = answer
+    found.mapping = replace(mapping, signals=signals)
+    return found
+
+
+def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> Guess:
+    """
+    Return the guess with the questions answered; None as an answer leaves the signal out.
+
+    Parameters
+    ----------
+    found : Guess
+        With questions.
+    answer : callable
+        Returns one of the answers to a question's text, or None.
+
+    """
+    signals, told = dict(found.mapping.signals), dict(found.told)
+    for question in found.questions:
+        unit = answer(question.text, question.answers)
+        chosen = unit_of_text(unit, BY_NAME[question.signal].quantity) if unit else None
+        if chosen is not None:
+            signals[question.signal] = ColumnMap(question.column, chosen, where='the answer')
+            told[question.signal] = 'as answered'
+    return Guess(replace(found.mapping, signals=signals), told)
+
+
+def _signal_of(column: str) -> Signal | None:
+    """Return the signal that the name of a column means."""
+    words = words_of(column.rpartition('/')[2])
+    return next((signal for signal in SIGNALS if _is_exported(column, signal)), None) or next(
+        (signal for signal in SIGNALS if signal.is_named(words)), None)
+
+
+def _is_exported(column: str, signal: Signal) -> bool:
+    """Return whether a column has the name that ``pam export`` gives a signal; it is in SI."""
+    return column in (f'{signal.topic}.{signal.field}', f'{signal.topic}_{signal.field}')
+
+
+def _of_column(table: Table, column: str, signal: Signal, missing: Collection[str]
+               ) -> tuple[ColumnMap, str] | Question | None:
+    """Return what a column is and why, a question, or None for one that is another quantity."""
+    if _is_exported(column, signal):
+        si = next(iter(FACTORS[signal.quantity]))
+        name = f'{si}_{ABSOLUTE}' if signal.quantity == PRESSURE else si
+        unit = unit_of_text(name, signal.quantity)
+        return None if unit is None else (ColumnMap(column, unit), f'unit {unit.name} by name')
+    text = table.units.get(column, '') or unit_in(column)
+    unit = unit_of_text(text, signal.quantity) if text else None
+    if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
+        return None                                     # such as a pressure sensor's volts
+    values = table.numbers(column, missing)
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    shown = f'column "{column}", {low:.4g} to {high:.4g}, seems to be the {signal.meaning}'
+    if unit is None:
+        return Question(signal.name, column, f'{shown}: in which unit?',
+                        tuple(_plausible(signal, low, high)))
+    if unit.is_complete:
+        return ColumnMap(column, unit), f'unit {unit.name} by name'
+    if low * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA:
+        chosen = unit_of_text(f'{unit.name}_{GAUGE}', PRESSURE)
+        assert chosen is not None
+        return ColumnMap(column, chosen), f'gauge, since it falls to {low:.3g} {unit.name}'
+    return Question(signal.name, column,
+                    f'{shown}: gauge (0 when vented) or absolute?',
+                    (f'{unit.name}_{GAUGE}', f'{unit.name}_{ABSOLUTE}'))
+
+
+# The largest value that a rig of this kind has, SI; a tenth to a hundredth of it is usual.
+_LARGEST = {PRESSURE: 1e6, LENGTH: 0.12, 'force': 2000.0, VOLTAGE: 10.5, 'duty': 1.0}
+
+
+def _plausible(signal: Signal, low: float, high: float) -> list[str]:
+    """Return the units in which a range fits a rig; all of them where none does."""
+    largest = max(abs(low), abs(high))
+    fitting = []
+    for name in names_of(signal.quantity):
+        unit: Unit | None = unit_of_text(name, signal.quantity)
+        if unit is None or name.startswith(('hPa', 'atm', 'mmHg', 'kgf/cm2', 'gf', 'cm')):
+            continue
+        size = largest * unit.factor
+        limit = _LARGEST[signal.quantity]
+        if limit / 300.0 <= size <= limit and not (
+                name.endswith(ABSOLUTE) and low * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA):
+            fitting.append(name)
+    return fitting or names_of(signal.quantity)

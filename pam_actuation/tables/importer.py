@@ -1,0 +1,290 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables to a bag: read, map, check, write."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pam_actuation import messages
+from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.messages import START_NS, VALVE_NAMES
+from pam_actuation.namespaces import MUSCLE, namespace_of
+from pam_actuation.tables.clock import clock_of
+from pam_actuation.tables.mapping import TableMapping
+from pam_actuation.tables.plausible import Doubt, doubts
+from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.table import no_column, Table
+from pam_actuation.topics.table import BY_NAME as TOPICS
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.errors import InputError
+from pam_sim.files import StrPath
+
+_PROGRESS_EVERY = 20_000
+
+
+@dataclass
+class Recording:
+    """
+    Signals in SI, ready to be written.
+
+    Parameters
+    ----------
+    signals : dict of str to tuple of ndarray
+        Name of the signal to its stamps [ns] and its values, both of shape (rows,).
+    mapping : TableMapping
+        How they were read.
+    sources : dict of str to str
+        File to its SHA-256 digest.
+    told : list of str
+        How the time was read, one sentence a table.
+    found : list of Doubt
+        What is doubtful.
+
+    """
+
+    signals: dict[str, tuple[IntArray, FloatArray]]
+    mapping: TableMapping
+    sources: dict[str, str] = field(default_factory=dict)
+    told: list[str] = field(default_factory=list)
+    found: list[Doubt] = field(default_factory=list)
+
+    @property
+    def valve(self) -> str:
+        """Return 'ppr' or 'hsv' by the valve signals, '' without any."""
+        return messages.valve_of(self.signals)
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time from the first to the last stamp [s]."""
+        first = min(int(stamps[0]) for stamps, _ in self.signals.values())
+        return (max(int(stamps[-1]) for stamps, _ in self.signals.values()) - first) * 1e-9
+
+    def between(self, begin_s: float, end_s: float) -> 'Recording':
+        """Return what lies between two times after the start; InputError if that is nothing."""
+        first = min(int(stamps[0]) for stamps, _ in self.signals.values())
+        signals = {}
+        for name, (stamps, values) in self.signals.items():
+            after_s = (stamps - first) * 1e-9
+            kept = (after_s >= begin_s) & (after_s <= end_s)
+            if kept.any():
+                signals[name] = stamps[kept], values[kept]
+        if not signals:
+            raise InputError(f'no row lies between {begin_s:g} and {end_s:g} s; the recording '
+                             f'has {self.duration_s:.6g} s', '--from and --to')
+        return Recording(signals, self.mapping, self.sources, self.told, self.found)
+
+
+def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: float,
+                 start_ns: int = START_NS, sort: bool = False, missing: Collection[str] = (),
+                 accept: bool = False) -> Recording:
+    """
+    Return the signals in tables.
+
+    A signal that several tables hold goes on from one to the next; their times must not overlap.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+        Of one recording.
+    mapping : TableMapping
+        Columns and units of the signals.
+    length_m : float
+        Length of the muscle at rest.
+    start_ns, sort
+        As ``clock_of``.
+    missing : collection of str
+        Texts that stand for missing values.
+    accept : bool
+        Take values that cannot be what the mapping says.
+
+    Raises
+    ------
+    InputError
+        A column that no table has, a time or number that cannot be read, tables that overlap,
+        or values that cannot be what the mapping says.
+
+    """
+    pieces: dict[str, list[tuple[IntArray, FloatArray, str]]] = {}
+    result = Recording({}, mapping)
+    for table in tables:
+        held = {name: column for name, one in mapping.signals.items()
+                if (column := table.name_of(one.column)) is not None}
+        if not held:
+            continue
+        clock = clock_of(table, mapping, start_ns, sort)
+        result.told.append(f'{Path(table.source).name}: time from {clock.told}')
+        result.found += [Doubt(f'{Path(table.source).name}: {text}')
+                         for text in (*table.remarks, *clock.remarks)]
+        for name, column in held.items():
+            values = mapping.signals[name].to_si(table.numbers(column, missing)[clock.rows])
+            pieces.setdefault(name, []).append((clock.stamp_ns, values, table.source))
+    for name, one in mapping.signals.items():
+        if name not in pieces:
+            known = dict.fromkeys(column for table in tables for column in table.columns)
+            raise InputError(no_column(one.column, list(known)), one.where or name)
+        result.signals[name] = _joined(name, pieces[name])
+    _check(result, length_m, accept)
+    return result
+
+
+def _joined(name: str, pieces: list[tuple[IntArray, FloatArray, str]]
+            ) -> tuple[IntArray, FloatArray]:
+    """Return the pieces of a signal one after the other, in order of time."""
+    pieces = sorted(pieces, key=lambda piece: int(piece[0][0]))
+    for (before, _, first), (after, _, second) in zip(pieces, pieces[1:]):
+        if after[0] <= before[-1]:
+            raise InputError(
+                f'{name} is in both {first} and {second}, at overlapping times; import them one '
+                'by one, or map a column that only one of them has', '--map')
+    return (np.concatenate([stamps for stamps, _, _ in pieces]),
+            np.concatenate([values for _, values, _ in pieces]))
+
+
+def _check(result: Recording, length_m: float, accept: bool) -> None:
+    if not result.signals:
+        raise InputError('no column is mapped to a signal; add --map pressure="COLUMN:bar_gauge" '
+                         'and others', '--map')
+    duties = {*VALVE_NAMES['hsv']} & {*result.signals}
+    if len(duties) == 1:
+        other, = {*VALVE_NAMES['hsv']} - duties
+        raise InputError(f'{duties.pop()} is mapped, {other} is not; a valve signal has both',
+                         '--map')
+    found = doubts({name: values for name, (_, values) in result.signals.items()},
+                   result.mapping.signals, length_m)
+    wrong = next((one for one in found if one.is_wrong), None)
+    if wrong is not None and not accept:
+        raise InputError(f'{wrong.sentence}. (--accept takes the values as they are)')
+    result.found += found
+
+
+def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace: str = MUSCLE,
+              overwrite: bool = False, progress: Callable[[float], object] | None = None
+              ) -> dict[str, int]:
+    """
+    Write the signals as a bag; return the number of messages of each topic.
+
+    Parameters
+    ----------
+    recording : Recording
+        The signals.
+    path : path
+        Folder of the bag.
+    rig : object, optional
+        Model of the rig that was measured, kept in the bag.
+    namespace : str
+        Of the muscle.
+    overwrite : bool
+        Replace a bag that is there.
+    progress : callable, optional
+        Called with the share that is written, 0 to 1.
+
+    Raises
+    ------
+    InputError, OSError
+        As ``BagWriter``.
+
+    """
+    metadata = experiment_metadata(
+        rig=rig, valve=recording.valve, origin='imported',
+        experiment_name=Path(next(iter(recording.sources), 'table')).stem,
+        mapping=recording.mapping.to_yaml(),
+        sources='\n'.join(f'{name} sha256 {digest}'
+                          for name, digest in recording.sources.items()))
+    space = namespace_of(namespace)
+    streams = _streams(recording.signals)
+    order, total = _by_time(streams), sum(len(one.stamp_ns) for one in streams)
+    writer = BagWriter(path, metadata, overwrite)
+    try:
+        for stream in streams:
+            row = TOPICS[stream.topic]
+            writer.add_topic(row.full_name(space), row.type_name)
+            stream.full, stream.encode = row.full_name(space), row.content.encoder(
+                space.rpartition('/')[2])
+        for done, (place, number) in enumerate(order):
+            stream = streams[place]
+            stamp_ns = int(stream.stamp_ns[number])
+            writer.write(stream.full, stream.encode(stream.message(stamp_ns, number)),
+                         stamp_ns, stamp_ns)
+            if progress is not None and done % _PROGRESS_EVERY == 0:
+                progress(done / total)
+        counts = dict(writer.counts)
+        writer.close()
+    finally:
+        writer.discard()
+    return counts
+
+
+@dataclass
+class _Stream:
+    """The messages of one topic: ``values`` by name of the message's fields."""
+
+    topic: str
+    stamp_ns: IntArray
+    values: dict[str, FloatArray]
+    full: str = ''
+    encode: Callable[[Any], bytes] = bytes
+
+    def message(self, stamp_ns: int, number: int) -> Any:
+        """Return the plain message number ``number``."""
+        if self.topic == 'valve_signal':
+            return messages.ValveSignal(stamp_ns, tuple(self.values), tuple(
+                float(one[number]) for one in self.values.values()))
+        kind = {'contraction': messages.Contraction, 'reference': messages.Reference,
+                'force': messages.Force, 'external_force': messages.Force}.get(
+                    self.topic, messages.Pressure)
+        return kind(stamp_ns, **{name: float(one[number]) for name, one in self.values.items()})
+
+
+def _streams(signals: Mapping[str, tuple[IntArray, FloatArray]]) -> list[_Stream]:
+    """Return one stream a topic: without rows that say nothing, fields of one time together."""
+    by_topic: dict[str, dict[str, tuple[IntArray, FloatArray]]] = {}
+    for name, (stamps, values) in signals.items():
+        finite = np.isfinite(values)
+        by_topic.setdefault(BY_NAME[name].topic, {})[BY_NAME[name].field] = (
+            stamps[finite], values[finite])
+    streams = []
+    for topic in (name for name in TOPICS if name in by_topic):
+        fields = by_topic[topic]
+        stamps = np.unique(np.concatenate([own for own, _ in fields.values()]))
+        columns = {}
+        for name in sorted(fields, key=lambda one: one != 'fill_duty'):
+            column = np.full(len(stamps), np.nan)
+            column[np.searchsorted(stamps, fields[name][0])] = fields[name][1]
+            columns[name] = column
+        streams.append(_Stream(topic, stamps, columns))
+    return streams
+
+
+def _by_time(streams: list[_Stream]) -> list[tuple[int, int]]:
+    """Return (stream, number) of every message in order of time, equal ones by topic."""
+    stamps = np.concatenate([one.stamp_ns for one in streams])
+    place = np.concatenate([np.full(len(one.stamp_ns), index)
+                            for index, one in enumerate(streams)])
+    number = np.concatenate([np.arange(len(one.stamp_ns)) for one in streams])
+    order = np.lexsort((place, stamps))
+    return list(zip(place[order].tolist(), number[order].tolist()))
+
+
+def digest_of(path: StrPath) -> str:
+    """Return the SHA-256 digest of a file, '' for a folder."""
+    if Path(path).is_dir():
+        return ''
+    with open(path, 'rb') as stream:
+        return hashlib.file_digest(stream, 'sha256').hexdigest()

@@ -1,0 +1,96 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a table holds and how it would be read, as lines for people."""
+
+from collections.abc import Collection
+
+import numpy as np
+from pam_actuation.tables.clock import time_column
+from pam_actuation.tables.guess import Guess
+from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.table import Table
+from pam_sim.errors import InputError
+
+_MOST_COLUMNS = 60
+
+
+def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = ()) -> str:
+    """
+    Return a line for each column: number, name, range, first values, and the signal it is.
+
+    Parameters
+    ----------
+    tables : collection of Table
+        Of one recording.
+    found : Guess
+        How they are read.
+    missing : collection of str
+        Texts that stand for missing values.
+
+    """
+    lines = []
+    for table in tables:
+        meant = _meaning(table, found)
+        lines.append(f'{table.source}: {len(table)} rows, {len(table.columns)} columns')
+        rows = [('', 'column', 'lowest', 'highest', 'first', 'read as')]
+        for number, name in enumerate(table.columns):
+            if number == _MOST_COLUMNS:
+                rows.append(('', f'and {len(table.columns) - number} more', '', '', '', ''))
+                break
+            rows.append((f'#{number + 1}', name, *_facts(table, name, missing),
+                         meant.get(name, '–')))
+        widths = [max(len(row[place]) for row in rows) for place in range(5)]
+        lines += ['  ' + '  '.join(f'{cell:{width}}' for cell, width in zip(row, widths))
+                  + f'  {row[5]}' for row in rows]
+    return '\n'.join(lines)
+
+
+def questions_text(found: Guess) -> str:
+    """Return what only the user knows, a line for each question."""
+    return '\n'.join(f'? {one.text}\n    {one.options()}' for one in found.questions)
+
+
+def question_sentence(found: Guess) -> str:
+    """Return the questions as one sentence, for the end of a call that cannot ask."""
+    return ' '.join(f'{one.text} Add {one.options()}.' for one in found.questions)
+
+
+def _meaning(table: Table, found: Guess) -> dict[str, str]:
+    """Return column to what it is read as."""
+    meant = {}
+    time = time_column(table, found.mapping)
+    if time is not None and table.name_of(time.column) is not None:
+        meant[table.require(time.column)] = 'time' + (f' in {time.unit}' if time.unit else '')
+    for name, one in found.mapping.signals.items():
+        column = table.name_of(one.column)
+        if column is not None:
+            meant[column] = f'{name} in {one.unit.name} ({found.told.get(name, "as stated")})'
+    for question in found.questions:
+        if table.name_of(question.column) is not None:
+            meant[question.column] = f'{question.signal}? ({BY_NAME[question.signal].meaning})'
+    return meant
+
+
+def _facts(table: Table, name: str, missing: Collection[str]) -> tuple[str, str, str]:
+    """Return lowest, highest and first value of a column; '' for those of texts."""
+    first = str(table.columns[name].iloc[0])[:23] if len(table) else ''
+    try:
+        values = table.numbers(name, missing)
+    except InputError:
+        return '', '', first
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return 'no number', '', first
+    return f'{finite.min():.6g}', f'{finite.max():.6g}', first

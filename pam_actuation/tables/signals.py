@@ -1,0 +1,108 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a column of a table can be: a signal of the rig, with its topic and quantity."""
+
+from dataclasses import dataclass
+import re
+
+from pam_actuation.tables.units import DUTY, FORCE, LENGTH, PRESSURE, VOLTAGE
+from pam_sim.errors import did_you_mean, InputError
+
+
+@dataclass(frozen=True)
+class Signal:
+    """
+    One signal that a recording can hold.
+
+    Parameters
+    ----------
+    name : str
+        As it is written in ``--map`` and in a mapping file.
+    topic, field : str
+        Where its values go: short name of the topic, and name of the value.
+    quantity : str
+        What it measures (``tables/units.py``).
+    words : str
+        Regular expression of the names that other programs give such a column.
+    meaning : str
+        In a few words.
+
+    """
+
+    name: str
+    topic: str
+    field: str
+    quantity: str
+    words: str
+    meaning: str
+
+    def is_named(self, words: str) -> bool:
+        """Return whether the words of a column's name, in lower case, are those of the signal."""
+        return re.fullmatch(self.words, words) is not None
+
+
+# Of two that fit a name the first counts.
+SIGNALS = (
+    Signal('supply_pressure', 'supply_pressure', 'pressure_pa', PRESSURE,
+           r'(p |pressure )?supply( pressure)?|p ?s(upply)?|p(ressure)? (in|line)',
+           'pressure of the supply'),
+    Signal('pressure_command', 'pressure_command', 'pressure_pa', PRESSURE,
+           r'(p|pressure) ?(ref|reference|set|setpoint|set point|cmd|command|des|desired|soll|'
+           r'target)|(set|target|desired|ref|reference|command(ed)?) ?(p|pressure)',
+           'wanted pressure of the muscle'),
+    Signal('pressure', 'pressure', 'pressure_pa', PRESSURE,
+           r'p|p(ressure)? ?(1|m|is|ist|act|actual|meas|measured|muscle|pam|sensor)?|press|druck|'
+           r'(muscle|measured|actual|pam) pressure|fluid pressure', 'pressure in the muscle'),
+    Signal('reference', 'reference', 'contraction_m', LENGTH,
+           r'(x|s|y|pos|position|contraction|stroke|displacement) ?(ref|reference|set|setpoint|'
+           r'des|desired|soll|target|d)|reference|setpoint|ref|'
+           r'(desired|target|reference) (position|contraction|displacement)',
+           'wanted contraction'),
+    Signal('contraction', 'contraction', 'contraction_m', LENGTH,
+           r'(x|s|y|pos|position|contraction|stroke|displacement|disp|shortening|weg|encoder)'
+           r' ?(1|is|ist|act|actual|meas|measured|muscle|pam)?|'
+           r'(measured|actual) (position|contraction|displacement)',
+           'shortening of the muscle'),
+    Signal('external_force', 'external_force', 'force_n', FORCE,
+           r'(f ?ext|external force|disturbance( force)?)', 'disturbance on the load'),
+    Signal('reference_force', 'reference', 'force_n', FORCE,
+           r'(f|force) ?(ref|reference|set|setpoint|des|desired|target)', 'wanted force'),
+    Signal('force', 'force', 'force_n', FORCE,
+           r'f|f ?(1|x|z|m|meas|measured|is|ist)|force ?(1|x|z|is|act|actual|meas|measured)?|'
+           r'load ?cell|load|tension|kraft|(measured|muscle|pam|actual) force',
+           'force along the muscle'),
+    Signal('fill_duty', 'valve_signal', 'fill_duty', DUTY,
+           r'(duty |d |pwm )?(fill|in|inlet|charge|supply)( duty| pwm| valve)?|fill duty',
+           'duty of the fill valve'),
+    Signal('vent_duty', 'valve_signal', 'vent_duty', DUTY,
+           r'(duty |d |pwm )?(vent|out|outlet|exhaust|discharge)( duty| pwm| valve)?|vent duty',
+           'duty of the vent valve'),
+    Signal('ppr_voltage', 'valve_signal', 'ppr_voltage', VOLTAGE,
+           r'u|u ?(ppr|valve|cmd|command|ctrl|control|soll)|v|v ?(ppr|valve|cmd|command|out)|'
+           r'(ppr|valve|regulator|command|control|analog out) ?(voltage|volt|v|signal|u)|'
+           r'voltage ?(ppr|valve|cmd|command|out)?|spannung', 'voltage to the regulator'),
+)
+BY_NAME = {signal.name: signal for signal in SIGNALS}
+TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|zeit|elapsed( time)?|timer|clock|'
+              r'seconds|sec|date ?time|date')
+
+
+def signal_of(name: str, where: str) -> Signal:
+    """Return a signal by its name; InputError names those there are."""
+    if name not in BY_NAME:
+        raise InputError(
+            f'{name!r} is no signal of a rig{did_you_mean(name, BY_NAME)}; allowed: '
+            f'{", ".join(BY_NAME)}', where)
+    return BY_NAME[name]

@@ -1,0 +1,138 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Units in which other programs write pressures, lengths, forces, signals and times."""
+
+from dataclasses import dataclass
+
+from pam_sim.annotations import FloatArray
+from pam_sim.errors import did_you_mean, InputError
+from pam_sim.units import P_ATM_PA
+
+PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, TIME = (
+    'pressure', 'length', 'force', 'voltage', 'duty', 'time')
+# Size of one unit in SI, by quantity. psi, lbf, kgf, mmHg, in: exact or as NIST SP 811 has them.
+FACTORS: dict[str, dict[str, float]] = {
+    PRESSURE: {'Pa': 1.0, 'hPa': 1e2, 'mbar': 1e2, 'kPa': 1e3, 'bar': 1e5, 'MPa': 1e6,
+               'psi': 6894.757293168361, 'atm': P_ATM_PA, 'mmHg': 133.322387415,
+               'kgf/cm2': 98066.5},
+    LENGTH: {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'in': 0.0254},
+    FORCE: {'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'lbf': 4.4482216152605, 'kgf': 9.80665,
+            'gf': 9.80665e-3},
+    VOLTAGE: {'V': 1.0, 'mV': 1e-3},
+    DUTY: {'1': 1.0, '%': 1e-2},
+    TIME: {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0}}
+GAUGE, ABSOLUTE = 'gauge', 'abs'
+DATE = 'date'                       # of a time: text such as 2026-11-25T09:30:00.125
+_KINDS = {'gauge': GAUGE, 'g': GAUGE, 'gage': GAUGE, 'rel': GAUGE, 'relative': GAUGE,
+          'abs': ABSOLUTE, 'a': ABSOLUTE, 'absolute': ABSOLUTE}
+_OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 'secs': 's',
+                'seconds': 's', 'second': 's', 'msec': 'ms', 'usec': 'us', 'nsec': 'ns',
+                'inch': 'in', 'volt': 'V', 'volts': 'V', 'newton': 'N', 'percent': '%',
+                'lb': 'lbf', 'kg': 'kgf', 'g': 'gf', '-': '1', 'kgf/cm²': 'kgf/cm2',
+                'at': 'kgf/cm2', 'torr': 'mmHg'}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """
+    A unit as the user wrote it: SI value = ``factor`` × value + ``offset``.
+
+    Parameters
+    ----------
+    name : str
+        Its usual spelling, such as ``bar_gauge``.
+    factor, offset : float
+        The offset is the atmospheric pressure for a gauge pressure.
+    is_complete : bool
+        False for a pressure that does not say whether it is gauge or absolute.
+
+    """
+
+    name: str
+    factor: float
+    offset: float = 0.0
+    is_complete: bool = True
+
+    def to_si(self, values: FloatArray) -> FloatArray:
+        """Return values of this unit in SI, pressures absolute."""
+        return values * self.factor + self.offset
+
+
+def unit_of_text(text: str, quantity: str) -> Unit | None:
+    """
+    Return the unit that a text names, None where it names none of the quantity.
+
+    ``bar_gauge``, ``barg``, ``bar(g)``, ``bar abs`` and ``psia`` say gauge or absolute;
+    ``bar`` alone gives a unit that is not complete.
+    """
+    wanted = text.strip().strip('[]()').strip()
+    if quantity != PRESSURE:
+        name = _spelled(wanted, quantity)
+        return None if name is None else Unit(name, FACTORS[quantity][name])
+    flat = wanted.replace('(', '_').replace(')', '').replace(' ', '_').replace('-', '_')
+    base, _, ending = flat.partition('_')
+    kind = _KINDS.get(ending.lower().strip('_')) if ending else None
+    if ending and kind is None:
+        return None
+    name = _spelled(base, quantity)
+    if name is None and not ending and base[-1:].lower() in ('g', 'a'):      # barg, psia
+        name, kind = _spelled(base[:-1], quantity), _KINDS[base[-1].lower()]
+    if name is None:
+        return None
+    factor = FACTORS[quantity][name]
+    if kind is None:
+        return Unit(name, factor, is_complete=False)
+    return Unit(f'{name}_{kind}', factor, P_ATM_PA if kind == GAUGE else 0.0)
+
+
+def checked_unit(text: str, quantity: str, where: str) -> Unit:
+    """
+    Return the unit that a text names.
+
+    Raises
+    ------
+    InputError
+        It is no unit of the quantity, or a pressure that says neither gauge nor absolute.
+
+    """
+    unit = unit_of_text(text, quantity)
+    if unit is None:
+        names = names_of(quantity)
+        raise InputError(
+            f'{text!r} is no unit of a {quantity}{did_you_mean(text, names)}; allowed: '
+            + ', '.join(names), where)
+    if not unit.is_complete:
+        raise InputError(
+            f'{text!r} does not say whether the pressure is gauge or absolute; write '
+            f'{unit.name}_gauge (0 for a vented muscle) or {unit.name}_abs', where)
+    return unit
+
+
+def names_of(quantity: str) -> list[str]:
+    """Return the units of a quantity as they are to be written."""
+    names = list(FACTORS[quantity])
+    if quantity == PRESSURE:
+        return [f'{name}_{kind}' for name in names for kind in (GAUGE, ABSOLUTE)]
+    return names
+
+
+def _spelled(text: str, quantity: str) -> str | None:
+    """Return the usual spelling of a unit; capitals matter only where they mean a prefix."""
+    text = _OTHER_NAMES.get(text, _OTHER_NAMES.get(text.lower(), text))
+    known = FACTORS[quantity]
+    if text in known:
+        return text
+    return next((name for name in known if name.lower() == text.lower()
+                 and not (text[:1] in 'mM' and text[:1] != name[:1])), None)

@@ -1,0 +1,179 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every kind of file, there and back: stamps and values to the bit."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from pam_actuation import messages
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.cli.main import main
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import topic_of
+from pam_sim.errors import InputError
+import pytest
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import get_typestore, Stores
+from scipy.io import savemat
+
+DATA = Path(__file__).resolve().parents[3] / 'shared' / 'data'
+STAMPS = 10**18 + np.cumsum(np.random.default_rng(1).integers(1_900_000, 2_100_000, 200))
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    """Return a bag with two rates, a duty pair, and numbers that no decimal text has."""
+    path, noise = tmp_path_factory.mktemp('bag') / 'one', np.random.default_rng(2)
+    with BagWriter(path, {'valve': 'hsv'}) as writer:
+        for number, stamp_ns in enumerate(STAMPS.tolist()):
+            said = {'pressure': messages.Pressure(stamp_ns, 2e5 + 1e4 * noise.normal()),
+                    'valve_signal': messages.ValveSignal(
+                        stamp_ns, ('fill_duty', 'vent_duty'), tuple(noise.uniform(size=2)))}
+            if number % 2:
+                said['contraction'] = messages.Contraction(stamp_ns, 0.01 + 1e-3 * noise.normal())
+                said['force'] = messages.Force(stamp_ns, 40.0 + noise.normal())
+            for name, message in said.items():
+                writer.add_topic(f'/muscle/{name}', topic_of(name).type_name)
+                writer.write(f'/muscle/{name}', encode(name, message), stamp_ns, stamp_ns)
+    return path
+
+
+@pytest.mark.parametrize('ending', ['csv', 'tsv', 'parquet', 'mat', 'h5'])
+def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
+    table = str(tmp_path / f'table.{ending}')
+    assert main(['export', str(bag), '--out', table]) == 0
+    code = main(['import', table, '--out', str(tmp_path / 'back')])
+    said = capsys.readouterr().out
+    # Where a topic has no message the table is empty, which is said.
+    assert code == 1 and '100 of 200 values are missing' in said
+    first, second = load_run(bag), load_run(tmp_path / 'back')
+    assert set(first.topics) == set(second.topics)
+    for name, series in first.topics.items():
+        np.testing.assert_array_equal(second[name].stamp_ns, series.stamp_ns)
+        for field, values in series.values.items():
+            np.testing.assert_array_equal(second[name].values[field], values)
+
+
+def test_the_same_table_gives_the_same_bag(bag, tmp_path):
+    main(['export', str(bag), '--out', str(tmp_path / 'table.csv')])
+    for name in ('one', 'two'):
+        main(['import', str(tmp_path / 'table.csv'), '--out', str(tmp_path / name / 'bag')])
+    one, two = (tmp_path / name / 'bag' / 'bag_0.mcap' for name in ('one', 'two'))
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_data_frame_on_a_grid_holds_commands(bag):
+    frame = load_run(bag).to_dataframe(rate_hz=500.0, topics=['pressure', 'valve_signal'])
+    assert list(frame.columns) == [
+        'stamp_ns', 'time_s', 'pressure.pressure_pa', 'valve_signal.fill_duty',
+        'valve_signal.vent_duty']
+    assert set(frame['valve_signal.fill_duty']) <= set(
+        load_run(bag)['valve_signal']['fill_duty'])
+    with pytest.raises(InputError, match='pressure'):
+        load_run(bag).to_dataframe(topics=['presure'])
+    with pytest.raises(InputError, match='0.1 to'):
+        load_run(bag).to_dataframe(rate_hz=0.0)
+
+
+def test_a_struct_of_matlab(tmp_path, capsys):
+    time_s = np.arange(300) * 0.002
+    savemat(tmp_path / 'run.mat', {'log': {'t': time_s, 'signals': {
+        'values': np.column_stack([2.0 + time_s, 5.0 + time_s])}}, 'gain': 3.0})
+    assert main(['import', str(tmp_path / 'run.mat'), '--out', str(tmp_path / 'bag'), '--map',
+                 'time=log.t:s', '--map', 'pressure=log.signals.values[0]:bar_gauge', '--map',
+                 'contraction=log.signals.values[1]:mm']) == 0
+    run = load_run(tmp_path / 'bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'], 301_325.0 + 1e5 * time_s)
+    np.testing.assert_allclose(run['contraction']['contraction_m'], 5e-3 + 1e-3 * time_s)
+
+
+def test_topics_of_a_foreign_bag(tmp_path):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    number = store.types['std_msgs/msg/Float64']
+    with Writer(tmp_path / 'plc', version=9) as writer:
+        for topic, values in (('/plc/tank', 0.5 + 0.01 * np.arange(200)),
+                              ('/plc/rod', 3.0 + 0.02 * np.arange(200))):
+            connection = writer.add_connection(topic, number.__msgtype__, typestore=store)
+            for step, value in enumerate(values):
+                writer.write(connection, 10**18 + step * 4_000_000, store.serialize_cdr(
+                    number(data=float(value)), number.__msgtype__))
+    assert main(['import', str(tmp_path / 'plc'), '--out', str(tmp_path / 'bag'), '--map',
+                 'pressure=/plc/tank.data:bar_gauge', '--map', 'contraction=/plc/rod.data:mm'
+                 ]) == 0
+    run = load_run(tmp_path / 'bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'],
+                               101_325.0 + 1e5 * (0.5 + 0.01 * np.arange(200)))
+    assert run['contraction'].stamp_ns[1] == 10**18 + 4_000_000
+
+
+def test_two_files_are_one_recording(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, begin in (('a', 0.0), ('b', 1.0)):
+        rows = ''.join(f'{begin + 0.01 * k:.2f},{0.01 * k:.2f}\n' for k in range(100))
+        Path(f'{name}.csv').write_text(f't_s,p_bar\n{rows}', encoding='utf-8')
+    Path('c.csv').write_text('t_s,F_N\n' + ''.join(
+        f'{0.02 * k:.2f},{40 + k % 7}\n' for k in range(100)), encoding='utf-8')
+    assert main(['import', 'b.csv', 'a.csv', 'c.csv', '--out', 'bag']) == 0
+    run = load_run('bag')
+    assert len(run['pressure']) == 200 and len(run['force']) == 100
+    assert (np.diff(run['pressure'].stamp_ns) == 10_000_000).all()
+    assert main(['import', 'a.csv', 'a.csv', '--out', 'twice']) == 2
+
+
+def test_a_part_and_every_tenth_row(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.001 * k:.3f},{0.001 * k:.3f}\n' for k in range(5000))
+    Path('a.csv').write_text(f't_s,p_bar\n{rows}', encoding='utf-8')
+    assert main(['import', 'a.csv', '--out', 'bag', '--every', '10', '--from', '1', '--to', '2'
+                 ]) == 0
+    run = load_run('bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'],
+                               101_325.0 + 1e5 * np.arange(1.0, 2.005, 0.01))
+
+
+def test_a_question_on_a_terminal_is_asked(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('a.csv').write_text('t_s,pressure\n' + ''.join(
+        f'{0.01 * k:.2f},{0.02 * k:.2f}\n' for k in range(200)), encoding='utf-8')
+    assert main(['import', 'a.csv', '--preview', '--json']) == 0
+    question, = json.loads(capsys.readouterr().out)['questions']
+    assert 'bar_gauge' in question['answers']
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True)
+    monkeypatch.setattr('sys.stdout.isatty', lambda: True)
+    answers = iter(['bar', 'bar_gauge'])
+    monkeypatch.setattr('builtins.input', lambda _: next(answers))
+    assert main(['import', 'a.csv', '--out', 'bag', '--save-mapping', 'kept.yaml']) == 0
+    assert "'bar' is not one of them" in capsys.readouterr().out
+    Path('b.csv').write_text(Path('a.csv').read_text(encoding='utf-8'), encoding='utf-8')
+    assert main(['import', 'b.csv', '--out', 'again', '--mapping', 'kept.yaml']) == 0
+    np.testing.assert_array_equal(load_run('bag')['pressure']['pressure_pa'],
+                                  load_run('again')['pressure']['pressure_pa'])
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason='measurements of others are not at hand')
+@pytest.mark.parametrize('file, options, topics', [
+    ('dmsp10_250_steps_and_loop/steps_100hz.csv', [], {'pressure', 'contraction', 'valve_signal'}),
+    ('dmsp10_250_steps_and_loop/quasi_static_loop.csv', [],
+     {'pressure', 'contraction', 'valve_signal'}),
+    *((f'isometric_10mm_25cm/contraction_{share}.csv', [
+        '--map', 'force=#1:N', '--map', 'pressure=#2:kPa_gauge', '--map', 'time=#3:s'],
+       {'force', 'pressure'}) for share in ('00', '25', '50', '75'))])
+def test_measurements_of_others(tmp_path, file, options, topics):
+    assert main(['import', str(DATA / file), '--out', str(tmp_path / 'bag'), *options]) in (0, 1)
+    assert set(load_run(tmp_path / 'bag').topics) == topics
+    assert main(['report', str(tmp_path / 'bag'), '--out', str(tmp_path / 'report.html')]) in (
+        0, 1)

@@ -1,0 +1,68 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Spoiled tables: a right import, or a sentence; none is silently wrong."""
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.cli.main import main
+from pam_actuation.tables.signals import BY_NAME
+import pytest
+import spoiled
+
+CASES = spoiled.cases()
+
+
+def imported(case, folder, monkeypatch, capsys):
+    """Return exit code and all that the import of a case says."""
+    monkeypatch.chdir(folder)
+    (folder / case.file).write_bytes(case.content)
+    code = main(['import', case.file, '--out', 'bag', *case.options])
+    said = capsys.readouterr()
+    return code, said.out + said.err
+
+
+def test_there_are_a_hundred():
+    assert len({case.name for case in CASES}) == len(CASES) >= 90
+
+
+@pytest.mark.parametrize('case', CASES, ids=[case.name for case in CASES])
+def test_right_or_said(case, tmp_path, monkeypatch, capsys):
+    code, said = imported(case, tmp_path, monkeypatch, capsys)
+    assert (code, case.remark in said) == (case.ends, True), said
+    if code == 2:
+        assert len(said.strip().splitlines()) == 1 and 'Traceback' not in said
+        assert not (tmp_path / 'bag').exists()
+        return
+    run = load_run('bag')
+    for name, wanted in spoiled.TRUTH.items():
+        if name in case.differs:
+            continue
+        series = run[BY_NAME[name].topic]
+        found, wanted = series[BY_NAME[name].field], wanted[case.rows]
+        places = np.searchsorted(spoiled.TIME_S, series.time_s - 1e-4)
+        lost = 0.2 if 'missing' in case.remark else 0.0
+        assert len(found) >= (1.0 - lost) * len(wanted) - 1
+        np.testing.assert_allclose(found, wanted[places], rtol=0, atol=1e-6 * np.ptp(wanted))
+
+
+def test_two_gigabytes_are_answered_at_once(tmp_path, monkeypatch, capsys):
+    text = 50 * spoiled.table().encode()
+    case = spoiled.Spoiled('long', text, spoiled.REFUSED, '--every')
+    (tmp_path / 'log.csv').write_bytes(text)
+    with open(tmp_path / 'log.csv', 'r+b') as stream:      # sparse: takes no room on the disk
+        stream.truncate(2 * 1024**3)
+    monkeypatch.chdir(tmp_path)
+    assert main(['import', 'log.csv', '--out', 'bag']) == 2
+    assert case.remark in capsys.readouterr().err
