@@ -40,12 +40,15 @@ from pam_actuation.rigging.client import NAME, RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.topics.table import OF_A_RUN
+from std_srvs.srv import SetBool
 
 CONTROLLER = 'sofc_controller'
 NODES = ('plant_simulator', 'valve_driver', CONTROLLER, 'reference_generator')
 NAMESPACE = '/muscle'
 START_TIMEOUT_S = 120.0
 STALLED_S = 10.0
+# The last message of a slow topic is followed by another one within this time.
+AFTER_NS = 150_000_000
 # A sender keeps what the listener has not got yet: a busy machine delivers seconds late.
 KEPT = 20_000
 
@@ -154,7 +157,8 @@ def run_once(arguments):
 def follow(client, listener, until_ns):
     """Wait until all up to a time has been simulated and heard; return simulated s per second."""
     plant = f'{NAMESPACE}/plant_simulator'
-    before, moved_s = None, time.monotonic()
+    before, moved_s, paused = None, time.monotonic(), False
+    pause = client.node.create_client(SetBool, f'{plant}/pause')
     while True:
         client.spin(0.02)
         listener.take()
@@ -162,8 +166,12 @@ def follow(client, listener, until_ns):
         steps = int(values.get('physics.steps', 0))
         if (steps, listener.count) != before:
             before, moved_s = (steps, listener.count), time.monotonic()
-        if START_NS + steps * 1_000_000 > until_ns and listener.has_all(sent(client), until_ns):
-            return float(values['clock.rate'])
+        if START_NS + steps * 1_000_000 > until_ns + AFTER_NS:
+            if not paused:      # the listener has time to get what it lacks
+                paused, rate = True, float(values['clock.rate'])
+                pause.call_async(SetBool.Request(data=True))
+            if listener.has_all(sent(client), until_ns):
+                return rate
         if time.monotonic() - moved_s > STALLED_S:
             raise SystemExit(f'the rig stands still after {steps * 1e-3:.3f} simulated seconds')
 
