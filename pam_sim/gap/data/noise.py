@@ -171,4 +171,5 @@ def autocorrelation_time(values: FloatArray) -> float:
     correlation /= correlation[0]
     negative = np.flatnonzero(correlation < 0.0)
     stop = negative[0] if negative.size else n
-    return float(min(max(1.0 + 2.0 * correlation[1:stop].sum(), 1.0), n / 10.0))
+    total = 1.0 + 2.0 * float(correlation[1:stop].sum())
+    return min(max(total, 1.0), n / 10.0)
