@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 
 Parameters = dict[str, Any]      # of a node: name to value
 
-RECORDER, PLANT, DRIVER, REFERENCE = (
-    'experiment_recorder', 'plant_simulator', 'valve_driver', 'reference_generator')
+RECORDER, PLANT, DRIVER, WATCHDOG, REFERENCE = (
+    'experiment_recorder', 'plant_simulator', 'valve_driver', 'valve_watchdog',
+    'reference_generator')
 JOINT_PLANT, JOINT_CONTROLLER = 'joint_simulator', 'joint_controller'
 REALTIME_PRIORITY = 1        # the lowest; where it is not allowed the nodes run without
 
@@ -51,6 +52,7 @@ class RigPlan:
     ``parameters`` maps the place of a node, such as ``valve_driver`` or ``flexor/valve_driver``,
     to ROS parameters, in the order in which the nodes become active. ``controller_node`` is ''
     for an experiment without controller. A muscle has one of the ``drivers``, a joint two.
+    Beside each driver a watchdog, a process of its own, vents when that driver falls silent.
     """
 
     experiment: 'Experiment'
@@ -61,6 +63,11 @@ class RigPlan:
     folder: Path
     plant_node: str = PLANT
     drivers: tuple[str, ...] = (DRIVER,)
+
+    @property
+    def watchdogs(self) -> tuple[str, ...]:
+        """Return the places of the watchdogs, in the order of the drivers."""
+        return tuple(f'{place.removesuffix(DRIVER)}{WATCHDOG}' for place in self.drivers)
 
     def remove(self) -> None:
         """Delete the files made for the nodes."""
@@ -177,6 +184,8 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
             nodes[RECORDER]['topics'] = list(RECORDED_OF_JOINT)
     model = {'joint' if isinstance(rig, JointRig) else 'rig': rig_file}
     nodes[plan.plant_node] = {**model, 'valve_type': rig.valve, 'seed': seed}
+    # Before the drivers: a watchdog takes the first sender it hears for its driver.
+    nodes.update({watchdog: {'valve_type': rig.valve} for watchdog in plan.watchdogs})
     for driver, muscle in zip(plan.drivers, rig.muscles.values()):
         file = rig_file if muscle is rig else _write(
             plan.folder / f'{driver.replace("/", "_")}.yaml', muscle.to_yaml())

@@ -93,13 +93,17 @@ class NodeProcess:
         Topic of the node to the name it has instead.
     parameter_file : str
         ROS parameter file with further parameters; '' for none.
+    label : str
+        What sentences call it, such as ``flexor/valve_driver``; '': its name.
 
     """
 
     def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
                  environment: Mapping[str, str], log_dir: str | os.PathLike[str],
-                 remap: Mapping[str, str] | None = None, parameter_file: str = '') -> None:
+                 remap: Mapping[str, str] | None = None, parameter_file: str = '',
+                 label: str = '') -> None:
         self.name = name
+        self.label = label or name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
         command = [
@@ -131,11 +135,11 @@ class NodeProcess:
         """Return a phrase on how the process ended, with the last line it printed."""
         code = self.exit_code
         if code is None:
-            return f'{self.name} runs'
+            return f'{self.label} runs'
         if code < 0:
-            return f'{self.name} was ended by {signal.Signals(-code).name}'
+            return f'{self.label} was ended by {signal.Signals(-code).name}'
         last = self.last_line()
-        return f'{self.name} ended with exit code {code}' + (f' ({last})' if last else '')
+        return f'{self.label} ended with exit code {code}' + (f' ({last})' if last else '')
 
     def last_line(self) -> str:
         """Return the last line the node printed, without the time."""

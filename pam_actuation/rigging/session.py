@@ -16,10 +16,10 @@
 One experiment on live nodes, from the first process to the closed bag.
 
 Order of the start: all nodes are configured, the recorder is active first and connected
-to every publisher, then plant, driver, controller and reference. Order of the end:
+to every publisher, then plant, watchdog, driver, controller and reference. Order of the end:
 reference and controller stop (which commands atmospheric pressure), the driver stops with
-the signal that vents, the plant a little later, the recorder last. The same order on
-Ctrl-C and when a node dies.
+the signal that vents, watchdog and plant a little later, the recorder last. The same order on
+Ctrl-C and when a node dies. Of a driver that died, the watchdog vents the muscle meanwhile.
 """
 
 from collections.abc import Callable, Iterable
@@ -32,6 +32,7 @@ import time
 from typing import Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
+from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.rigging.domain import DomainLock
@@ -173,7 +174,8 @@ class RigSession:
             log_dir = self.plan.folder / below
             log_dir.mkdir(exist_ok=True)
             self.processes[place] = NodeProcess(
-                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, environment, log_dir)
+                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, environment, log_dir,
+                label=place)
         # Only now: a process with the threads of the middleware does not fork safely.
         self.client = self._new_client(self.domain_id)
         self.change(self.processes, 'configure', START_TIMEOUT_S)
@@ -222,18 +224,24 @@ class RigSession:
                     f'the reference did not finish within {total_s + OVERDUE_S:.0f} s')
 
     def _describe_loss(self, process: NodeProcess, done_s: float) -> str:
-        """Return a sentence on a node that ended, and on what the driver made of it."""
+        """Return a sentence on a node that ended, and on how the muscles were vented."""
         sentence = f'{process.how_it_ended()} {done_s:.1f} s into the experiment'
-        drivers = [self.processes[name] for name in self.plan.drivers]
-        if drivers == [process]:
-            return f'{sentence}; nobody drives the valve'
-        client = self._started()
-        client.spin(0.4)
-        for driver in drivers:
-            level, message, _ = client.statuses.get(driver.full_name, (0, '', {}))
+        self._started().spin(0.4)
+        for driver, watchdog in zip(self.plan.drivers, self.plan.watchdogs):
+            if self.processes[driver] is process:
+                level, message = self._status(watchdog)
+                vents = level >= LEVEL_ERROR and message.startswith(VENTS)
+                return (f'{sentence}; {watchdog}: {VENTS}' if vents
+                        else f'{sentence}; nobody drives the valve')
+        for driver in self.plan.drivers:
+            level, message = self._status(driver)
             if level:
-                return f'{sentence}; {driver.name}: {message}'
+                return f'{sentence}; {driver}: {message}'
         return sentence
+
+    def _status(self, place: str) -> tuple[int, str]:
+        """Return level and message of what a node said last, (0, '') if nothing."""
+        return self._started().statuses.get(self.processes[place].full_name, (0, '', {}))[:2]
 
     def finish(self, ended: str = '', because: str = '') -> list[str]:
         """
@@ -259,7 +267,8 @@ class RigSession:
         problems += self._deactivate([REFERENCE, self.plan.controller_node, *drivers])
         if self._active.intersection(drivers):
             self.client.spin(VENT_S)
-        problems += self._deactivate([self.plan.plant_node])
+        # The watchdogs hold out until then: a driver that is dead or hangs does not vent.
+        problems += self._deactivate([*self.plan.watchdogs, self.plan.plant_node])
         self._tell_recorder(ended, because)
         problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
         self.client.spin(0.1)

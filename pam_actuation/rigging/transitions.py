@@ -67,7 +67,7 @@ def change(client: 'RigClient', processes: Iterable[NodeProcess], transition: st
             raise SessionFailed(process.how_it_ended())
         last = process.last_line()
         raise SessionFailed(
-            f'{process.name} did not {transition}' + (f': {last}' if last else ''))
+            f'{process.label} did not {transition}' + (f': {last}' if last else ''))
 
 
 @contextmanager

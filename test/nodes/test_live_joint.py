@@ -31,7 +31,8 @@ from pam_actuation.nodes.controller_node import GIVING
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.replay.joint import replay_joint
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
-from pam_actuation.rigging.session import run_experiment
+from pam_actuation.rigging.plan import make_plan
+from pam_actuation.rigging.session import Result, RigSession, run_experiment, run_guarded
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_actuation.topics.codec import Writer
 from pam_sim.joint.parameters import SIDES
@@ -73,7 +74,7 @@ def test_an_experiment_is_recorded_as_a_whole_and_replayed_to_the_bit(tmp_path, 
     assert result.complete and result.findings == [], result
     assert set(result.exit_codes) == {
         'experiment_recorder', 'joint_simulator', 'joint_controller', 'reference_generator',
-        *(f'{side}/valve_driver' for side in SIDES)}
+        *(f'{side}/{node}' for side in SIDES for node in ('valve_driver', 'valve_watchdog'))}
     assert set(result.exit_codes.values()) == {0}
     run = load_recording(result.bag)
     assert run.namespace == '/left_knee' and run.metadata['seed'] == '3'
@@ -92,6 +93,28 @@ def test_an_experiment_is_recorded_as_a_whole_and_replayed_to_the_bit(tmp_path, 
     assert len(controller.recorded['flexor/pressure_command.pressure_pa']) > 250
     assert main(['report', result.bag, '--out', str(tmp_path / 'page.html')]) == 0
     assert 'left_knee' in (tmp_path / 'page.html').read_text(encoding='utf-8')
+
+
+def test_a_killed_driver_of_a_run_leaves_both_muscles_vented(tmp_path):
+    plan = make_plan(SHORT.replace('0.5}', '60.0}'), 'joint_dmsp_5_300_realistic', None, 'hsv',
+                     tmp_path / 'bag', namespace='/knee')
+    result = Result(str(tmp_path / 'bag'))
+    with RigSession(plan, '/knee') as rig:
+        def kill(done_s, total_s):
+            if done_s > 1.5:
+                rig.processes['flexor/valve_driver'].send_signal(signal.SIGKILL)
+
+        run_guarded(rig, result, kill)
+    plan.remove()
+    assert 'flexor/valve_driver was ended by SIGKILL' in result.failure
+    assert 'flexor/valve_watchdog: vented because the valve' in result.failure
+    assert result.exit_codes.pop('flexor/valve_driver') == -signal.SIGKILL
+    assert set(result.exit_codes.values()) == {0}
+    run = load_recording(result.bag)
+    assert ending_of(run.metadata).ended == 'error'
+    for side in SIDES:
+        pressure_pa = run[f'{side}/pressure']['pressure_pa']
+        assert pressure_pa.max() > 300e3 and pressure_pa[-1] < 115e3, side
 
 
 @pytest.fixture

@@ -65,7 +65,7 @@ def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
     assert result.published == result.recorded
     assert result.complete
     assert set(result.exit_codes.values()) == {0}
-    assert len(result.cpu_share) == 5
+    assert len(result.cpu_share) == 6
     assert seen[-1][0] <= seen[-1][1] == 1.5
     run = load_run(result.bag)
     assert run.metadata['experiment_name'] == 'short' and run.metadata['seed'] == '3'
@@ -128,6 +128,30 @@ def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(t
     assert vented[-1]
 
 
+def test_a_killed_driver_leaves_a_vented_muscle(tmp_path):
+    """The on/off valves of a dead driver would stay as they are: shut, with the air inside."""
+    bag = tmp_path / 'bag'
+    plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'hsv', bag)
+    result = session.Result(str(bag))
+    with session.RigSession(plan) as rig:
+        def kill(done_s, total_s):
+            if done_s > 1.5:
+                rig.processes['valve_driver'].send_signal(signal.SIGKILL)
+
+        session.run_guarded(rig, result, kill)
+    plan.remove()
+    assert 'valve_driver was ended by SIGKILL' in result.failure
+    assert 'valve_watchdog: vented because the valve signal fell silent' in result.failure
+    assert result.exit_codes.pop('valve_driver') == -signal.SIGKILL
+    assert set(result.exit_codes.values()) == {0}
+    run = load_run(bag)
+    assert ending_of(run.metadata).ended == 'error'
+    pressure_pa = run.topics['pressure'].values['pressure_pa']
+    assert pressure_pa.max() > 300e3 and pressure_pa[-1] < 115e3
+    signals = run.topics['valve_signal'].values
+    assert (signals['fill_duty'][-1], signals['vent_duty'][-1]) == (0.0, 1.0)
+
+
 def test_the_user_may_stop_it(tmp_path):
     def stop(done_s, total_s):
         if done_s > 0.5:
@@ -169,7 +193,8 @@ def test_without_recorder_and_stopped_during_the_start(tmp_path, monkeypatch):
     monkeypatch.setattr(session.RigSession, 'change', stop)
     result = session.run_experiment(PRESSURE, with_recorder=False)
     assert result.failure == 'stopped by the user' and result.bag == ''
-    assert set(result.exit_codes) == {'plant_simulator', 'valve_driver', 'reference_generator'}
+    assert set(result.exit_codes) == {
+        'plant_simulator', 'valve_watchdog', 'valve_driver', 'reference_generator'}
     assert None not in result.exit_codes.values()
 
 
