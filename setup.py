@@ -19,7 +19,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 PACKAGE = 'pam_actuation'
-VERSION = '0.1.0'
+VERSION = '1.0.0'
 HERE = Path(__file__).parent
 
 # Read or shown at run time; found again by pam_actuation/resources.py.

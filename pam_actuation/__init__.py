@@ -14,4 +14,4 @@
 
 """Control, driving, recording and replay of pneumatic artificial muscles; nodes on ROS 2."""
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'
