@@ -116,7 +116,7 @@ def test_one_version_everywhere(manifest, setup_keywords):
 def test_changelog_is_read_by_the_release_tool():
     changelog = get_changelog_from_path(str(ROOT), 'pam_actuation')
     versions = [version for version, date, content in changelog.foreach_version()]
-    assert versions and versions[0] == pam_actuation.__version__
+    assert versions[-1] == pam_actuation.__version__       # the oldest comes first
 
 
 def test_setup_agrees_with_the_manifest(manifest, setup_keywords):
