@@ -24,7 +24,8 @@ import pytest
 # What each verb needs before an option is looked at.
 NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
          'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
-         'valves': ['compare'], 'rules': ['sofc_ppr']}
+         'valves': ['compare'], 'rules': ['sofc_ppr'], 'import': ['table.csv'],
+         'export': ['bag', '--out', 'table.csv']}
 WRONG_NUMBERS = {
     'number': ('-5', 'nan', 'inf', 'five', '3,5', '', '1e999'),
     'count': ('-5', 'nan', '2.5', 'five', '3,5', '', '99999999999999999999x')}
@@ -34,6 +35,9 @@ NUMBERS = {
     ('simulate', '--seed'): '0 to 4294967295',
     ('up', '--domain-id'): '0 to 232', ('up', '--realtime-priority'): '0 to 96',
     ('up', '--seconds'): '0 s or more',
+    ('import', '--rate'): '0.1 to 1000000 Hz', ('import', '--every'): '1 to 1000000',
+    ('import', '--from'): '0 s or more', ('import', '--to'): '0 s or more',
+    ('export', '--rate'): '0.1 to 100000 Hz',
     ('tune', '--rollouts'): '10 or more', ('tune', '--randomise'): '0 to 1000',
     ('tune', '--patience'): '0 or more', ('tune', '--jobs'): '1 to 1024, or -1 for one a core',
     ('tune', '--seed'): '0 to 4294967295',
