@@ -61,6 +61,11 @@ VALUES = {
     'rules': ('rules.json', 'binary.mcap', 'cut.mcap', 'folder', 'empty_folder', 'pipe.json',
               'pid', *ABSENT, *SPECIAL),
     'table': ('table.csv', 'pipe.csv', *BAGS),
+    'foreign table': ('binary.mcap', 'folder', 'empty_folder', 'pipe.csv', 'page.html', *ABSENT,
+                      *SPECIAL),
+    'table to write': ('folder', '.', 'page.html', 'no/folder.xlsx', 'dangling', 'pipe', *NOWHERE),
+    'map': ('pressure', 'presure=p:bar_abs', 'pressure=p:bar', 'pressure=p:bar_abs',
+            'time=t:parsec', 'force=f:N:gain=0', '=', ''),
     'valve': ('xyz', '', 'PPR hsv', '-5', LONG),
     'new bag': ('.', '..', '../..', '/', '~', 'page.html', 'bag', 'many', 'folder',
                 'link_folder', 'dangling', 'loop', 'pipe', 'socket', '/dev/null', *NOWHERE),
@@ -131,6 +136,15 @@ VERBS = {
         (Slot('--explain', 'effect', 'coulomb_friction'), Slot('--model', 'rig', RIG))],
     'report': [(BAG, BAG, INSIDE, Slot('--out', 'page', 'new.html'))],
     'info': [(BAG,)],
+    'import': [
+        (Slot('', 'foreign table', 'bag'), Slot('--out', 'new bag', 'new'),
+         Slot('--map', 'map', 'pressure=/muscle/pressure.fluid_pressure:Pa_abs'),
+         Slot('--rate', 'number above 0'), Slot('--every', 'count'), Slot('--rig', 'rig'),
+         Slot('--from', 'number above 0'), Slot('--save-mapping', 'page', 'new.yaml'),
+         Slot('--namespace', 'namespace'))],
+    'export': [
+        (BAG, INSIDE, Slot('--out', 'table to write', 'new.csv'),
+         Slot('--rate', 'number above 0'), Slot('--topics', 'effects'))],
     'experiments': [(Slot('', 'experiment'),)],
     'models': [
         (Slot('', 'entry'), Slot('--html', 'page'), Slot('--markdown', 'page'))],
