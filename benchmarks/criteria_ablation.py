@@ -380,8 +380,9 @@ def report(args, logs, chosen):
     rows = rows_of(logs, chosen)
     lines = [
         '# Ablation of the decision thresholds', '',
-        f'`python benchmarks/criteria_ablation.py --recorded {args.recorded} --number '
-        f'{args.number} --seed {args.seed}` on {time.strftime("%Y-%m-%d")}, '
+        f'`python benchmarks/criteria_ablation.py --work ablation '
+        f'--recorded {args.recorded} --number {args.number} --seed {args.seed}` '
+        f'on {time.strftime("%Y-%m-%d")}, '
         f'{platform.machine()}, commit {commit}. {len(CRITERION)} thresholds; {len(logs)} cases '
         f'recorded, the {len(chosen)} nearest to a decision asked again, {right} of them right '
         'as they are.', '',
