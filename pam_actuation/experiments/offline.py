@@ -20,7 +20,6 @@ rig does, less transport. Same input, same bits: all randomness comes from the
 seed, all stamps from the virtual clock.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -30,6 +29,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation import interrupts
 from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
+from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
@@ -43,7 +43,6 @@ from pam_actuation.loops.wiring import (
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
-from pam_actuation.topics.table import topic_of
 from pam_sim.files import cannot_write
 
 if TYPE_CHECKING:
@@ -57,42 +56,13 @@ STATUS_EVERY_NS = 500_000_000
 LEAD_NS = 100_000_000         # a controller runs this long before the experiment, as it does live
 
 
-class _Recorder:
-    """Encode messages into a bag and count them, as publisher and recorder at once."""
-
-    def __init__(self, writer: BagWriter, namespace: str, name: str) -> None:
-        self._writer, self._namespace = writer, namespace
-        self.name = name            # of the muscle or joint, within messages
-        # Topic to its full name and what makes its bytes.
-        self._known: dict[str, tuple[str, Callable[[Any], bytes]]] = {}
-        self.counts: Counter[str] = Counter()
-
-    def write(self, topic: str, message: Any, now_ns: int) -> None:
-        """Write one message under its full topic name."""
-        if topic not in self._known:
-            row, (place, _, _) = topic_of(topic), topic.rpartition('/')
-            full = row.full_name(f'{self._namespace}/{place}' if place else self._namespace)
-            self._writer.add_topic(full, row.type_name)
-            self._known[topic] = full, row.content.encoder(self.name)
-        full, encode = self._known[topic]
-        self._writer.write(full, encode(message), now_ns, now_ns)
-        self.counts[full] += 1
-
-    def finish(self, now_ns: int, said: str) -> None:
-        """Write the last status: the counts as a node states them."""
-        published = tuple((f'published.{name}', str(count)) for name, count in self.counts.items()
-                          if not name.endswith('/diagnostics'))
-        self.write('diagnostics', Status(
-            now_ns, 0, f'{self._namespace}/simulation', said, published), now_ns)
-
-
 class _Loops:
     """The loops of the live nodes on a bus, and how far they came."""
 
     def __init__(
             self, experiment: 'Experiment', rig: 'Rig | JointRig',
             controller: 'Controller | None',
-            seed: int, learning: bool, recorder: _Recorder, transport_ns: int,
+            seed: int, learning: bool, recorder: MessageWriter, transport_ns: int,
             ticks: Mapping[str, Iterable[int]]) -> None:
         self._recorder = recorder
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
@@ -208,7 +178,7 @@ def simulate_experiment(
     try:
         with interrupts.held() as stopped:
             writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
-            recorder = _Recorder(writer, namespace, name)
+            recorder = MessageWriter(writer, namespace, name)
             loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
                            ticks or {})
             ending = _recorded(loops, recorder, experiment, progress, stopped)
@@ -230,7 +200,7 @@ def simulate_experiment(
             f'stopped; the bag {writer.directory} holds {ending.reached_s:.1f} of '
             f'{ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
-            'counts': dict(recorder.counts)}
+            'counts': writer.counts}
 
 
 def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:
@@ -241,7 +211,7 @@ def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:
     return namespace.rpartition('/')[2], namespace
 
 
-def _recorded(loops: _Loops, recorder: _Recorder, experiment: 'Experiment',
+def _recorded(loops: _Loops, recorder: MessageWriter, experiment: 'Experiment',
               progress: Callable[..., Any] | None, stopped: Callable[..., Any]) -> Ending:
     """Run the loops to the end or to an interrupt; return the Ending."""
     end = START_NS + round(experiment.duration_s * 1e9)
@@ -252,5 +222,10 @@ def _recorded(loops: _Loops, recorder: _Recorder, experiment: 'Experiment',
     except KeyboardInterrupt:
         ended, said, reached_s = INTERRUPTED, 'interrupted', max(loops.reached_ns, 0) * 1e-9
         end = START_NS + max(loops.reached_ns, 0)
-    recorder.finish(end, said)
+    # The last status: the counts as a node states them.
+    published = tuple((f'published.{name}', str(count))
+                      for name, count in recorder.bag.counts.items()
+                      if not name.endswith('/diagnostics'))
+    recorder.write('diagnostics', Status(
+        end, 0, f'{recorder.namespace}/simulation', said, published), end)
     return Ending(experiment.duration_s, reached_s, ended)
