@@ -14,14 +14,17 @@
 
 """A recorded or simulated run as named arrays with units: what every analysis starts from."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, Self, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = (
@@ -29,6 +32,7 @@ HELD_TOPICS = (
     'controller_state')
 # A day at 1 kHz; stamps of a broken clock would ask for far more than memory holds.
 MAX_GRID_POINTS = 100_000_000
+LEAST_RATE_HZ, MOST_RATE_HZ = 0.1, 1e5       # of the rows of a data frame
 
 
 class Seconds(np.ndarray):
@@ -182,7 +186,9 @@ class Run:
         """
         if topic not in self:
             have = ', '.join(sorted(name for name in self.topics if name in self)) or 'none'
-            raise InputError(f'has no `{topic}` messages; topics with messages: {have}', self.path)
+            raise InputError(
+                f'has no `{topic}` messages{did_you_mean(topic, self.topics)}; topics with '
+                f'messages: {have}', self.path)
         return self.topics[topic]
 
     @property
@@ -263,6 +269,56 @@ class Run:
                 else _interpolated(time_s, seconds, np.asarray(samples, float)[order], max_gap_s)
                 for key, samples in one.values.items()}
         return Grid(int(start_ns), dt_s, time_s, values)
+
+    def to_dataframe(self, rate_hz: float | None = None,
+                     topics: Collection[str] | None = None) -> 'pd.DataFrame':
+        """
+        Return the run as one pandas table, in SI, pressures absolute.
+
+        Columns are ``stamp_ns``, ``time_s`` since the start, and ``topic.field``, such as
+        ``pressure.pressure_pa``. A field that no message has is left out.
+
+        Parameters
+        ----------
+        rate_hz : float, optional
+            Rows at equal distances, as ``on_grid``. By default there is a row for each stamp
+            of any topic, and NaN where a topic has no message at that stamp.
+        topics : collection of str, optional
+            Short names; all with messages by default.
+
+        Raises
+        ------
+        InputError
+            A topic without messages, a rate out of range, no messages.
+
+        """
+        import pandas as pd     # takes a second to load
+        series = {name: self.require(name)
+                  for name in topics or [name for name in self.topics if name in self]}
+        if not series:
+            raise InputError('has no messages', self.path or 'run')
+        if rate_hz is not None:
+            if not LEAST_RATE_HZ <= rate_hz <= MOST_RATE_HZ:
+                raise InputError(
+                    f'{rate_hz:g} Hz; allowed is {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g} Hz', 'rate')
+            grid = self.on_grid(1.0 / rate_hz, topics=series)
+            stamp_ns = grid.start_ns + np.round(grid.time_s * 1e9).astype(np.int64)
+            columns = {f'{topic}.{name}': values for topic, fields in grid.values.items()
+                       for name, values in fields.items()}
+        else:
+            stamp_ns = np.unique(np.concatenate([one.stamp_ns for one in series.values()]))
+            columns = {f'{topic}.{name}': _at(stamp_ns, one.stamp_ns, values)
+                       for topic, one in series.items() for name, values in one.values.items()}
+        return pd.DataFrame({
+            'stamp_ns': stamp_ns, 'time_s': _seconds(stamp_ns, self.start_ns),
+            **{name: column for name, column in columns.items() if np.isfinite(column).any()}})
+
+
+def _at(stamp_ns: IntArray, own_ns: IntArray, values: FloatArray) -> FloatArray:
+    """Return values at stamps, NaN between their own; of several with one stamp the last."""
+    column = np.full(len(stamp_ns), np.nan)
+    column[np.searchsorted(stamp_ns, own_ns)] = values
+    return column
 
 
 @short_repr

@@ -19,10 +19,9 @@ Any namespace, any rates, topics missing, bags of other recorders: what can be
 used is returned, what is odd is said in ``remarks``.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,9 +36,6 @@ from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 from pam_sim.run import Run, Series
 from pam_sim.units import unit_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _SIGNAL_NAMES = tuple(name for names in VALVE_NAMES.values() for name in names)
 # Any clock that counts from 1970 is far above this; a simulation's may start at 0.
@@ -85,27 +81,6 @@ class RecordedRun(Run):
     def unusable(self) -> tuple[str, ...]:
         """Return those of them after which the values mean something else, a unit say."""
         return tuple(found.sentence for found in self.findings if found.unusable)
-
-    def to_dataframe(self, rate_hz: float | None = None,
-                     topics: Collection[str] | None = None) -> 'pd.DataFrame':
-        """
-        Return the run as one table, in SI, pressures absolute; see ``data_frame``.
-
-        Parameters
-        ----------
-        rate_hz : float, optional
-            Rows at equal distances; by default a row for each stamp of any topic.
-        topics : collection of str, optional
-            Short names; default: all that have messages.
-
-        Raises
-        ------
-        InputError
-            A topic that the run does not have, a rate out of range, no messages.
-
-        """
-        from pam_actuation.bags.data_frame import data_frame
-        return data_frame(self, rate_hz, topics)
 
 
 def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,

@@ -42,7 +42,6 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the table and say what is in it."""
-    from pam_actuation.bags.data_frame import data_frame
     from pam_actuation.bags.load import load_run
     from pam_actuation.tables.export import check_ending, write_table
     check_ending(args.out)
@@ -50,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     loaded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
     note_implausible(args, [loaded])
     topics = [name.strip() for name in args.topics.split(',')] if args.topics else None
-    frame = data_frame(loaded, args.rate, topics)
+    frame = loaded.to_dataframe(args.rate, topics)
     write_table(frame, args.out)
     columns = [str(name) for name in frame.columns]
     emit(args, {'table': args.out, 'rows': len(frame), 'columns': columns},
