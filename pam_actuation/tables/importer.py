@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation import messages
+from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import START_NS, VALVE_NAMES
@@ -29,8 +30,9 @@ from pam_actuation.namespaces import MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
-from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.signals import SIGNALS
 from pam_actuation.tables.table import no_column, Table
+from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import BY_NAME as TOPICS
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -161,6 +163,9 @@ def _check(result: Recording, length_m: float, accept: bool) -> None:
     if not result.signals:
         raise InputError('no column is mapped to a signal; add --map pressure="COLUMN:bar_gauge" '
                          'and others', '--map')
+    if {'reference', 'reference_force'} <= {*result.signals}:
+        raise InputError('reference and reference_force are both mapped; a message wants a '
+                         'contraction or a force, so leave one out', '--map')
     duties = {*VALVE_NAMES['hsv']} & {*result.signals}
     if len(duties) == 1:
         other, = {*VALVE_NAMES['hsv']} - duties
@@ -209,66 +214,49 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
                           for name, digest in recording.sources.items()))
     space = namespace_of(namespace)
     streams = _streams(recording.signals)
-    order, total = _by_time(streams), sum(len(one.stamp_ns) for one in streams)
+    order = _by_time(streams)
     writer = BagWriter(path, metadata, overwrite)
+    messages_of = MessageWriter(writer, space, space.rpartition('/')[2])
     try:
-        for stream in streams:
-            row = TOPICS[stream.topic]
-            writer.add_topic(row.full_name(space), row.type_name)
-            stream.full, stream.encode = row.full_name(space), row.content.encoder(
-                space.rpartition('/')[2])
         for done, (place, number) in enumerate(order):
             stream = streams[place]
             stamp_ns = int(stream.stamp_ns[number])
-            writer.write(stream.full, stream.encode(stream.message(stamp_ns, number)),
-                         stamp_ns, stamp_ns)
+            messages_of.write(
+                stream.topic, stream.make(stamp_ns, stream.values[number].tolist()), stamp_ns)
             if progress is not None and done % _PROGRESS_EVERY == 0:
-                progress(done / total)
-        counts = dict(writer.counts)
+                progress(done / len(order))
         writer.close()
     finally:
         writer.discard()
-    return counts
+    return writer.counts
 
 
 @dataclass
 class _Stream:
-    """The messages of one topic: ``values`` by name of the message's fields."""
+    """The messages of one topic: ``make`` makes one of a stamp and a row of ``values``."""
 
     topic: str
     stamp_ns: IntArray
-    values: dict[str, FloatArray]
-    full: str = ''
-    encode: Callable[[Any], bytes] = bytes
-
-    def message(self, stamp_ns: int, number: int) -> Any:
-        """Return the plain message number ``number``."""
-        if self.topic == 'valve_signal':
-            return messages.ValveSignal(stamp_ns, tuple(self.values), tuple(
-                float(one[number]) for one in self.values.values()))
-        kind = {'contraction': messages.Contraction, 'reference': messages.Reference,
-                'force': messages.Force, 'external_force': messages.Force}.get(
-                    self.topic, messages.Pressure)
-        return kind(stamp_ns, **{name: float(one[number]) for name, one in self.values.items()})
+    values: FloatArray
+    make: Make
 
 
 def _streams(signals: Mapping[str, tuple[IntArray, FloatArray]]) -> list[_Stream]:
     """Return one stream a topic: without rows that say nothing, fields of one time together."""
-    by_topic: dict[str, dict[str, tuple[IntArray, FloatArray]]] = {}
-    for name, (stamps, values) in signals.items():
-        finite = np.isfinite(values)
-        by_topic.setdefault(BY_NAME[name].topic, {})[BY_NAME[name].field] = (
-            stamps[finite], values[finite])
     streams = []
-    for topic in (name for name in TOPICS if name in by_topic):
-        fields = by_topic[topic]
-        stamps = np.unique(np.concatenate([own for own, _ in fields.values()]))
-        columns = {}
-        for name in sorted(fields, key=lambda one: one != 'fill_duty'):
-            column = np.full(len(stamps), np.nan)
-            column[np.searchsorted(stamps, fields[name][0])] = fields[name][1]
-            columns[name] = column
-        streams.append(_Stream(topic, stamps, columns))
+    for topic in TOPICS.values():
+        held = [(signal.field, *signals[signal.name]) for signal in SIGNALS
+                if signal.topic == topic.name and signal.name in signals]
+        if not held or topic.numeric is None:
+            continue
+        said = [(stamps[np.isfinite(values)], values[np.isfinite(values)])
+                for _, stamps, values in held]
+        stamps = np.unique(np.concatenate([own for own, _ in said]))
+        values = np.full((len(stamps), len(said)), np.nan)
+        for column, (own, finite) in enumerate(said):
+            values[np.searchsorted(stamps, own), column] = finite
+        streams.append(_Stream(topic.name, stamps, values, topic.numeric.maker(
+            tuple(field for field, *_ in held))))
     return streams
 
 

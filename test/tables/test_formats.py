@@ -145,6 +145,14 @@ def test_a_part_and_every_tenth_row(tmp_path, monkeypatch):
                                101_325.0 + 1e5 * np.arange(1.0, 2.005, 0.01))
 
 
+def test_a_reference_is_of_contraction_or_of_force(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('a.csv').write_text('t_s,xref_mm,force_ref_N\n' + ''.join(
+        f'{0.01 * k:.2f},{k % 9},{40 + k % 7}\n' for k in range(200)), encoding='utf-8')
+    assert main(['import', 'a.csv', '--out', 'bag']) == 2
+    assert 'reference and reference_force are both mapped' in capsys.readouterr().err
+
+
 def test_a_question_on_a_terminal_is_asked(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path('a.csv').write_text('t_s,pressure\n' + ''.join(
