@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     """Return the tables and how they are read; InputError where that stays open."""
     from pam_actuation.tables.formats import read_tables
-    from pam_actuation.tables.guess import ask, guess
+    from pam_actuation.tables.guess import as_stated, ask, guess
     from pam_actuation.tables.mapping import load_mapping, TableMapping
     from pam_actuation.tables.preview import question_sentence
     from pam_sim.errors import InputError
@@ -122,9 +122,8 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     with progress(args, float(len(args.files)), '', 'reading') as bar:
         for done, file in enumerate(args.files):
             tables += read_tables(file, args.every, wanted, partial(_move, bar, done))
-    found = guess(tables, mapping, args.missing)
-    if args.mapping:                    # a file that is kept says everything
-        found.mapping, found.questions = mapping, []
+    # A file that is kept says everything.
+    found = as_stated(mapping) if args.mapping else guess(tables, mapping, args.missing)
     if found.questions and not args.preview:
         if sys.stdin.isatty() and sys.stdout.isatty() and not args.json:
             found = ask(found, _asked)

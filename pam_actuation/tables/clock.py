@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 import re
-from typing import TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.messages import START_NS
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 SLOWEST_HZ, FASTEST_HZ = 0.1, 50_000.0
 SLOW_HZ = 10.0                              # below: another unit may be meant
 EPOCH_S = 9e8                               # seconds that can only count from 1970
-MOST_REPEATED = 0.01                        # share of rows that may repeat a time as they are
-_COARSE = 1e-3                              # of a step: what counts as a whole number of them
 
 
 @dataclass(frozen=True)
@@ -93,25 +91,33 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
         No time; times that are missing, run back or repeat; a rate that no unit explains.
 
     """
-    count = len(table)
-    every_row = np.arange(count, dtype=np.int64)
     if mapping.rate_hz is not None:
-        stamps = start_ns + np.round(every_row * (1e9 / mapping.rate_hz)).astype(np.int64)
-        return Clock(stamps, every_row, f'{mapping.rate_hz:g} rows a second')
+        rows = np.arange(len(table), dtype=np.int64)
+        stamps = start_ns + np.round(rows * (1e9 / mapping.rate_hz)).astype(np.int64)
+        return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second')
     column = time_column(table, mapping)
     if column is None:
         if table.stamp_ns is None:
             raise InputError(
                 'no column is the time; add --map time="COLUMN:s", or --rate HZ for rows at '
                 'equal distances', table.source)
-        stamps, told, step_ns = table.stamp_ns, 'times of the messages', 0
+        read = _Times(table.stamp_ns, 'times of the messages')
     else:
-        stamps, told, step_ns = _from_column(table, column, start_ns)
-    return _in_order(table, stamps, every_row, told, sort, step_ns)
+        read = _from_column(table, column, start_ns)
+    return _in_order(table, read, sort)
 
 
-def _from_column(table: Table, column: TimeMap, start_ns: int) -> tuple[IntArray, str, int]:
-    """Return the stamps in a column, what they are read as, and the column's resolution [ns]."""
+class _Times(NamedTuple):
+    """The stamps of all rows as they were read; ``step_ns`` is the resolution, 0 if unknown."""
+
+    stamp_ns: IntArray
+    told: str
+    step_ns: int = 0
+    remark: str = ''
+
+
+def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
+    """Return the times in a column."""
     import pandas as pd
     name = table.require(column.column, column.where)
     values = table.columns[name]
@@ -119,12 +125,12 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> tuple[IntArray
     is_text = not is_date and not pd.api.types.is_numeric_dtype(values) and column.unit in (
         '', DATE)
     if is_date or is_text and _is_date(values):
-        return _dates(table, name), f'column "{name}", dates', 0
+        return _Times(_dates(table, name), f'column "{name}", dates')
     unit = column.unit or _unit_of_name(table, name)
     if pd.api.types.is_integer_dtype(values) and unit == 'ns':
         stamps = values.to_numpy(dtype=np.int64)
         start = 0 if len(stamps) and abs(int(stamps[0])) > EPOCH_S * 1e9 else start_ns
-        return start + stamps, f'column "{name}" in ns', 0
+        return _Times(start + stamps, f'column "{name}" in ns')
     numbers = table.numbers(name)
     missing = np.flatnonzero(~np.isfinite(numbers))
     if len(missing):
@@ -136,10 +142,8 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> tuple[IntArray
     start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else start_ns
     # Whole numbers of the unit first: their product with a power of ten is exact.
     stamps = start + np.round(numbers * (factor * 1e9)).astype(np.int64)
-    remark = _rate_remark(table, name, unit, stamps)
-    if remark:
-        table.remarks.append(remark)
-    return stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start)
+    return _Times(stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start),
+                  _rate_remark(table, name, unit, stamps))
 
 
 def _is_date(values: 'pd.Series') -> bool:
@@ -210,10 +214,10 @@ def _resolution_ns(times_ns: IntArray) -> int:
     return 0
 
 
-def _in_order(table: Table, stamps: IntArray, rows: IntArray, told: str, sort: bool,
-              step_ns: int) -> Clock:
+def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
     """Return the clock with its rows in order, each with a time of its own."""
-    remarks = []
+    stamps, told, step_ns, remark = read
+    rows, remarks = np.arange(len(stamps), dtype=np.int64), [remark] if remark else []
     back = np.flatnonzero(np.diff(stamps) < 0)
     if len(back):
         if not sort:

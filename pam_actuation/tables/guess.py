@@ -23,7 +23,8 @@ from pam_actuation.tables.mapping import ColumnMap, TableMapping
 from pam_actuation.tables.signals import BY_NAME, Signal, SIGNALS, TIME_WORDS
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
-    ABSOLUTE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, Unit, unit_of_text, VOLTAGE)
+    ABSOLUTE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
+    VOLTAGE)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
 
@@ -77,6 +78,11 @@ class Guess:
     questions: list[Question] = field(default_factory=list)
 
 
+def as_stated(mapping: TableMapping) -> Guess:
+    """Return what the user said, and nothing else."""
+    return Guess(mapping, dict.fromkeys(mapping.signals, 'as stated'))
+
+
 def guess(tables: Collection[Table], mapping: TableMapping,
           missing: Collection[str] = ()) -> Guess:
     """
@@ -94,7 +100,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         Texts that stand for missing values.
 
     """
-    found = Guess(mapping, dict.fromkeys(mapping.signals, 'as stated'))
+    found = as_stated(mapping)
     signals = dict(mapping.signals)
     for table in tables:
         used = {table.name_of(one.column) for one in mapping.signals.values()}
@@ -153,10 +159,8 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
                ) -> tuple[ColumnMap, str] | Question | None:
     """Return what a column is and why, a question, or None for one that is another quantity."""
     if _is_exported(column, signal):
-        si = next(iter(FACTORS[signal.quantity]))
-        name = f'{si}_{ABSOLUTE}' if signal.quantity == PRESSURE else si
-        unit = unit_of_text(name, signal.quantity)
-        return None if unit is None else (ColumnMap(column, unit), f'unit {unit.name} by name')
+        si = si_unit(signal.quantity)
+        return ColumnMap(column, si), f'unit {si.name} by name'
     text = table.units.get(column, '') or unit_in(column)
     unit = unit_of_text(text, signal.quantity) if text else None
     if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):

@@ -140,7 +140,7 @@ class TableMapping:
             An option that is not ``NAME=COLUMN:UNIT``, with the name of a signal or ``time``.
 
         """
-        signals, time = dict(self.signals), self.time
+        signals, time, rows_hz = dict(self.signals), self.time, self.rate_hz
         for text in options:
             name, equals, rest = text.partition('=')
             name, where = name.strip(), f'--map {text}'
@@ -148,14 +148,12 @@ class TableMapping:
                 raise InputError(f'write --map NAME="{SYNTAX}", NAME one of time, '
                                  f'{", ".join(BY_NAME)}', where)
             if name == TIME:
-                time = _time_of_text(rest, where)
+                time, rows_hz = _time_of_text(rest, where), None
             else:
                 signals[name] = column_of_text(name, rest, where)
         if rate_hz is not None:
-            time = None
-        return replace(self, signals=signals, time=time,
-                       rate_hz=rate_hz if rate_hz is not None else
-                       None if time is not self.time else self.rate_hz)
+            time, rows_hz = None, rate_hz
+        return replace(self, signals=signals, time=time, rate_hz=rows_hz)
 
 
 def column_of_text(signal: str, text: str, where: str) -> ColumnMap:

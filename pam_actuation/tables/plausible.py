@@ -76,7 +76,7 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     wrong = value_findings('', signal.field, finite, lambda: length_m)
     if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
             high - low > 2.0 * MAX_CONTRACTION * length_m):
-        return [Doubt(f'{_range(signal, mapped, low, high)}, which no rig has'
+        return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
                       f'{_fix(signal, mapped, finite, length_m)}', True)]
     found = [Doubt(one.sentence.partition(': ')[2].rstrip('.')) for one in wrong]
     if low == high:
@@ -123,10 +123,6 @@ def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float)
     if not usual:
         return '; look for the unit, zero and gain of the column'
     return '; plausible would be ' + ' or '.join(one.option(signal.name) for one in usual[:3])
-
-
-def _range(signal: Signal, mapped: ColumnMap, low: float, high: float) -> str:
-    return f'{_shown(signal, low)} to {_shown(signal, high)}'
 
 
 def _shown(signal: Signal, value: float, difference: bool = False) -> str:

@@ -120,6 +120,11 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
     return unit
 
 
+def si_unit(quantity: str) -> Unit:
+    """Return the SI unit of a quantity; a pressure in it is absolute."""
+    return Unit(names_of(quantity)[quantity == PRESSURE], 1.0)
+
+
 def names_of(quantity: str) -> list[str]:
     """Return the units of a quantity as they are to be written."""
     names = list(FACTORS[quantity])

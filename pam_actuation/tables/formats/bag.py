@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.tables.table import MOST_ROWS, Table
+from pam_actuation.topics.definitions import typestore
 from pam_sim.errors import InputError
 
 _MOST_ITEMS = 32                 # of an array in a message
@@ -35,10 +36,9 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     without header. Of topics that are not ``wanted`` only the first messages are read.
     """
     from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.typesys import get_typestore, Stores
     place = Path(path)
     try:
-        with AnyReader([place], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        with AnyReader([place], default_typestore=typestore()) as reader:
             total = sum(one.msgcount for one in reader.connections) or 1
             tables, done = [], 0
             for connection in reader.connections:
