@@ -21,6 +21,7 @@ import subprocess
 import sys
 import time
 
+from killed_node import run_and_kill
 from live_rig import LiveRig, wait_for
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.load_joint import load_recording
@@ -31,8 +32,7 @@ from pam_actuation.nodes.controller_node import GIVING
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.replay.joint import replay_joint
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
-from pam_actuation.rigging.plan import make_plan
-from pam_actuation.rigging.session import Result, RigSession, run_experiment, run_guarded
+from pam_actuation.rigging.session import run_experiment
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_actuation.topics.codec import Writer
 from pam_sim.joint.parameters import SIDES
@@ -96,20 +96,9 @@ def test_an_experiment_is_recorded_as_a_whole_and_replayed_to_the_bit(tmp_path, 
 
 
 def test_a_killed_driver_of_a_run_leaves_both_muscles_vented(tmp_path):
-    plan = make_plan(SHORT.replace('0.5}', '60.0}'), 'joint_dmsp_5_300_realistic', None, 'hsv',
-                     tmp_path / 'bag', namespace='/knee')
-    result = Result(str(tmp_path / 'bag'))
-    with RigSession(plan, '/knee') as rig:
-        def kill(done_s, total_s):
-            if done_s > 1.5:
-                rig.processes['flexor/valve_driver'].send_signal(signal.SIGKILL)
-
-        run_guarded(rig, result, kill)
-    plan.remove()
-    assert 'flexor/valve_driver was ended by SIGKILL' in result.failure
+    result = run_and_kill('flexor/valve_driver', SHORT.replace('0.5}', '60.0}'),
+                          'joint_dmsp_5_300_realistic', tmp_path / 'bag', '/knee')
     assert 'flexor/valve_watchdog: vented because the valve' in result.failure
-    assert result.exit_codes.pop('flexor/valve_driver') == -signal.SIGKILL
-    assert set(result.exit_codes.values()) == {0}
     run = load_recording(result.bag)
     assert ending_of(run.metadata).ended == 'error'
     for side in SIDES:

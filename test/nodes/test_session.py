@@ -14,19 +14,17 @@
 
 """Test whole sessions: real processes, a complete bag, and an orderly end of every kind."""
 
-import signal
-
 import pytest
 
 pytest.importorskip('rclpy')
 
+from killed_node import run_and_kill                                        # noqa: E402, I100
 from pam_actuation.bags.ending import Ending, ending_of                     # noqa: E402, I100
 from pam_actuation.bags.info import bag_info, render_text                   # noqa: E402
 from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.replay.controller import replay_controller               # noqa: E402
 from pam_actuation.rigging import session                                   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
-from pam_actuation.rigging.plan import make_plan                            # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -104,19 +102,8 @@ def test_pressure_experiments_need_no_controller(tmp_path):
 
 def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(tmp_path):
     bag = tmp_path / 'bag'
-    plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'hsv', bag)
-    result = session.Result(str(bag))
-    with session.RigSession(plan) as rig:
-        def kill(done_s, total_s):
-            if done_s > 1.5:
-                rig.processes['sofc_controller'].send_signal(signal.SIGKILL)
-
-        session.run_guarded(rig, result, kill)
-    plan.remove()
-    assert 'sofc_controller was ended by SIGKILL' in result.failure
+    result = run_and_kill('sofc_controller', LONG, 'dmsp_5_300_hanging_mass', bag)
     assert 'vented because no valid pressure command' in result.failure
-    assert result.exit_codes.pop('sofc_controller') == -signal.SIGKILL
-    assert set(result.exit_codes.values()) == {0}
     run = load_run(bag)
     ending = ending_of(run.metadata)
     assert ending.ended == 'error' and 'sofc_controller was ended by SIGKILL' in ending.because
@@ -131,19 +118,8 @@ def test_a_killed_controller_ends_the_session_with_a_reason_and_a_readable_bag(t
 def test_a_killed_driver_leaves_a_vented_muscle(tmp_path):
     """The on/off valves of a dead driver would stay as they are: shut, with the air inside."""
     bag = tmp_path / 'bag'
-    plan = make_plan(LONG, 'dmsp_5_300_hanging_mass', None, 'hsv', bag)
-    result = session.Result(str(bag))
-    with session.RigSession(plan) as rig:
-        def kill(done_s, total_s):
-            if done_s > 1.5:
-                rig.processes['valve_driver'].send_signal(signal.SIGKILL)
-
-        session.run_guarded(rig, result, kill)
-    plan.remove()
-    assert 'valve_driver was ended by SIGKILL' in result.failure
+    result = run_and_kill('valve_driver', LONG, 'dmsp_5_300_hanging_mass', bag)
     assert 'valve_watchdog: vented because the valve signal fell silent' in result.failure
-    assert result.exit_codes.pop('valve_driver') == -signal.SIGKILL
-    assert set(result.exit_codes.values()) == {0}
     run = load_run(bag)
     assert ending_of(run.metadata).ended == 'error'
     pressure_pa = run.topics['pressure'].values['pressure_pa']
