@@ -20,13 +20,13 @@ Tracking error of force mode, joint mode and a joint's torque on realistic rigs,
     python benchmarks/force_and_joint.py
     python benchmarks/force_and_joint.py --seeds 0 1 2 3 4 --json
 
-Force: 20 to 80 N at 0.5 Hz, on the isometric load held at 10 mm and on a driven load that
-moves 4 mm about 6 mm at 0.2 Hz, which no reference tells the controller. Joint: 20 degrees to
-either side at 0.5 Hz on the small joint and, bent by 57 degrees, on the knee with the shank of a
-person. Torque, which has no rules to learn: 0.5 N m to either side at 0.5 Hz on the small joint,
-10 N m on the knee, both held by something heavy, and 0.15 N m on the small joint with its limb
-free to swing. Printed is the root mean square error of the first and of the last of 20 cycles
-(torque: 5), rules untaught at the start, the worst of the seeds.
+Force: 20 to 80 N at 0.5 Hz. One load is isometric, held at 10 mm. The other is driven and moves
+4 mm about 6 mm at 0.2 Hz; no reference tells the controller. Joint: 20 degrees to either side at
+0.5 Hz, on the small joint, and on the knee with the shank of a person, bent by 57 degrees. Torque
+has no rules to learn. Held by something heavy, it is 0.5 N m to either side at 0.5 Hz on the small
+joint, and 10 N m on the knee. With the limb of the small joint free to swing, it is 0.15 N m.
+Printed is the root mean square error of the first and of the last of 20 cycles (torque: 5). Rules
+are untaught at the start; the worst of the seeds counts.
 """
 
 import argparse

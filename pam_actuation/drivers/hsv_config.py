@@ -26,12 +26,13 @@ import math
 from pam_actuation.drivers.parameter import number
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.parameters import check_parameters
 from pam_sim.records import record, values_of
 from pam_sim.units import RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K
 from pam_sim.valve import hsv
 
 SENT_SIZE = 32                        # periods a command may be under way
-_RIG = {parameter.name: parameter.default for parameter in hsv.PARAMETERS}
+_RIG = check_parameters(hsv.PARAMETERS, {})
 _SPAN_PA = 600_000.0
 
 

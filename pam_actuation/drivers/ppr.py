@@ -28,11 +28,12 @@ import numpy as np
 from pam_actuation.drivers.parameter import number
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point
+from pam_sim.parameters import check_parameters
 from pam_sim.records import cells, record, values_of, zeros
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.ppr import MAX_VOLTAGE_V, PARAMETERS as OF_THE_RIG
 
-_RIG = {parameter.name: parameter.default for parameter in OF_THE_RIG}
+_RIG = check_parameters(OF_THE_RIG, {})
 
 PARAMETERS = record(
     'v_per_pa',             # volts per pascal gauge

@@ -17,9 +17,9 @@ Choked flow caps the pressure rate of a regulator, fill and vent apart.
 
     -r_v g(p, p_atm) V400 / (g400 V(x))  <=  dp/dt  <=  r_f g(p_s, p) V400 / (g400 V(x))
 
-with g(p1, p2) = p1 psi(p2 / p1) of ISO 6358, b = 0.3, and V400, g400 at 400 kPa
-gauge, x = 10 mm and nominal supply, so that r_f and r_v are the caps there; p_s
-is the rig's own supply.
+Here g(p1, p2) = p1 psi(p2 / p1) of ISO 6358, with b = 0.3. V400 and g400 hold at 400 kPa
+gauge, x = 10 mm and nominal supply. So r_f and r_v are the caps there. p_s is the rig's own
+supply.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ from pam_sim.compiled import compiled
 from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
-from pam_sim.parameters import Parameter
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve import hsv
@@ -39,7 +39,7 @@ from pam_sim.valve.flow import mass_flow_kg_per_s
 
 CRITICAL_RATIO = 0.3
 _GAUGE_PA, _CONTRACTION_M = 400e3, 0.010
-_NOMINAL_SUPPLY_PA = next(p.default for p in hsv.PARAMETERS if p.name == 'supply_pa')
+_NOMINAL_SUPPLY_PA = check_parameters(hsv.PARAMETERS, {})['supply_pa']
 _NO_LIMIT = 1e30
 _RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
 

@@ -57,8 +57,8 @@ def _rollout_entry(key: int) -> Callable[..., Any]:
     """
     Return the rollout, stored under ``key``.
 
-    It calls the two above as names of this module: numba takes what a function closes over as
-    part of what it is stored under, and a compiled function differs from process to process.
+    It calls the two above as names of this module. What a function closes over is part of the key
+    under which numba stores it, and a compiled function differs from process to process.
     """
     @allocating_entry_point
     def joint_rollout(inputs: FloatArray, joint: Arrays, flexor: Arrays, extensor: Arrays,
