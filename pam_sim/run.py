@@ -185,10 +185,10 @@ class Run:
 
         """
         if topic not in self:
-            have = ', '.join(sorted(name for name in self.topics if name in self)) or 'none'
+            have = sorted(name for name in self.topics if name in self)
             raise InputError(
-                f'has no `{topic}` messages{did_you_mean(topic, self.topics)}; topics with '
-                f'messages: {have}', self.path)
+                f'has no `{topic}` messages{did_you_mean(topic, have)}; topics with messages: '
+                f'{", ".join(have) or "none"}', self.path)
         return self.topics[topic]
 
     @property
