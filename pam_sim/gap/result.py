@@ -93,6 +93,55 @@ class Calibrated:
                 'unit': self.unit, 'ci95': list(self.ci95)}
 
 
+@dataclass(frozen=True)
+class SubsystemVerdict:
+    """
+    What is said of one subsystem, on the certify data and on its own measured inputs.
+
+    Parameters
+    ----------
+    verdict : str
+        ``no_gap``, ``parameter``, ``effects``, ``ambiguous`` or ``unknown``.
+    names : tuple of str
+        What is named in it; of ``ambiguous``, all that cannot be told apart.
+    signal : str
+        The signal with the largest gap after calibration.
+    gap : SignalGap
+        Of that signal.
+    unexplained_fraction : float
+        Share of the squared gap after calibration that is left, over all its signals.
+
+    """
+
+    verdict: str
+    names: tuple[str, ...]
+    signal: str
+    gap: SignalGap
+    unexplained_fraction: float
+
+    @property
+    def unexplained(self) -> float:
+        """Return what the final model leaves of the signal beyond its noise floor (rms)."""
+        return math.sqrt(max(self.gap.rmse_after ** 2 - self.gap.noise_floor ** 2, 0.0))
+
+    def text(self) -> str:
+        """Return it in a few words, such as ``creep and hysteresis, 0.4 mm unexplained``."""
+        if self.verdict == 'no_gap':
+            return 'no gap beyond noise'
+        factor, unit = READABLE[self.signal]
+        left = f'{self.unexplained * factor:.3g} {unit} unexplained'
+        between = ' or ' if self.verdict == 'ambiguous' else ' and '
+        return f'{between.join(self.names)}, {left}' if self.names else left
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entry of gap.json."""
+        return {'verdict': self.verdict, 'names': list(self.names),
+                'unexplained': self.unexplained, 'unit': self.gap.unit,
+                'unexplained_fraction': self.unexplained_fraction, 'signal': self.signal,
+                'noise_floor': self.gap.noise_floor, 'rmse_before': self.gap.rmse_before,
+                'rmse_refit': self.gap.rmse_refit, 'rmse_after': self.gap.rmse_after}
+
+
 @short_repr
 @dataclass(frozen=True)
 class Trace:
@@ -119,6 +168,9 @@ class GapResult:
         One or two sentences for a person.
     signals : dict of str -> SignalGap
         By signal name; signals that were not recorded are absent.
+    subsystems : dict of str -> SubsystemVerdict
+        By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
+        them is named.
     where : list of Share
         Shares of the squared gap by subsystem and by condition.
     parameters : list of Calibrated
@@ -145,6 +197,7 @@ class GapResult:
     verdict: str
     reason: str
     signals: dict[str, SignalGap] = field(default_factory=dict)
+    subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
     where: list[Share] = field(default_factory=list)
     parameters: list[Calibrated] = field(default_factory=list)
     calibration: list[Calibrated] = field(default_factory=list)
@@ -167,6 +220,7 @@ class GapResult:
     def text(self) -> str:
         """Return the result in lines for a person."""
         rows = [f'{self.verdict}: {self.reason}']
+        rows += [f'  {name}: {found.text()}' for name, found in self.subsystems.items()]
         for name, s in self.signals.items():
             factor, unit = READABLE[name]
             rows.append(
@@ -178,7 +232,9 @@ class GapResult:
     def to_dict(self) -> dict[str, Any]:
         """Return what gap.json holds, plain data without NaN."""
         return _finite({
-            'schema': SCHEMA, 'verdict': self.verdict, 'effects': self.effects,
+            'schema': SCHEMA, 'verdict': self.verdict,
+            'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
+            'effects': self.effects,
             'parameters': [p.to_dict() for p in self.parameters],
             'ambiguity_set': self.ambiguity_set, 'next_experiment': self.next_experiment,
             'where': [w.to_dict() for w in self.where],

@@ -25,6 +25,7 @@ from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
+from pam_sim.gap.report.by_subsystem import subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.location import locate
 from pam_sim.gap.report.reason import explain
@@ -35,6 +36,7 @@ from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verdict import fill, judge
 from pam_sim.gap.verify.materiality import is_material, moved
 from pam_sim.gap.verify.model import free_run_of, held_without
+from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.refutation import refute, unconfirmed
 from pam_sim.gap.verify.validation import Validation
 from pam_sim.rig import Rig
@@ -142,12 +144,16 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     fill(result, estimator, outcome, final, validation)
     judge(result, outcome, estimator, validation, base, final, materiality, certify is not None)
+    own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
+    result.subsystems = subsystem_verdicts(
+        result, outcome.named, rig, own_runs, criteria, materiality)
     result.where = locate(rig, validation.recording, validation.before, validation.floor)
     result.traces = validation.traces()
     result.fingerprint = fingerprint(estimator, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome)
-    result.simulations = estimator.simulations + validation.simulations
+    result.simulations = sum(
+        one.simulations for one in (estimator, validation, own_runs))
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result

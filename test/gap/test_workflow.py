@@ -213,9 +213,11 @@ def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
     found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
-        'schema', 'verdict', 'effects', 'parameters', 'ambiguity_set', 'next_experiment', 'where',
-        'signals', 'unexplained_fraction', 'fingerprint', 'minimum_detectable', 'runtime_s',
-        'simulations', 'reason'}
+        'schema', 'verdict', 'subsystems', 'effects', 'parameters', 'ambiguity_set',
+        'next_experiment', 'where', 'signals', 'unexplained_fraction', 'fingerprint',
+        'minimum_detectable', 'runtime_s', 'simulations', 'reason'}
+    assert set(found['subsystems']) == {'valve', 'muscle'}
+    assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {
         'unit', 'noise_floor', 'rmse_before', 'rmse_refit', 'rmse_after', 'shrink_percent'}
     assert load_rig(str(tmp_path / 'gap' / 'model.yaml')).valve == 'ppr'

@@ -30,6 +30,7 @@ VERDICT_TEXT = {
     'no_gap': 'No gap beyond noise', 'parameter': 'A parameter of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
+SIZES = ('signal', 'noise floor', 'given model', 'numbers calibrated', 'final model')
 EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %
 
 
@@ -53,9 +54,9 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
     """
     body = paragraph(remark) if remark else ''
     body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
+    body += _subsystems(result)
     if result.signals:
-        body += table(['signal', 'noise floor', 'given model', 'numbers calibrated',
-                       'final model', 'gap closed'],
+        body += table([*SIZES, 'gap closed'],
                       [_size(name, s) for name, s in result.signals.items()])
         body += paragraph(
             'RMS difference of whole free runs of the model on the recorded valve signal, on '
@@ -68,6 +69,22 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
     if result.traces:
         body += plot(_overlay(result, max_points)) + coloured_part(result)
     return Section(key, title, body)
+
+
+def _subsystems(result: 'GapResult') -> str:
+    if not result.subsystems:
+        return ''
+    return '<h3>By subsystem</h3>' + table(
+        ['subsystem', 'verdict', 'named', *SIZES, 'unexplained'],
+        [[name, VERDICT_TEXT.get(one.verdict, one.verdict), ', '.join(one.names) or None,
+          *_size(one.signal, one.gap)[:-1],
+          f'{one.unexplained * SHOWN[one.signal][0]:.3g} {SHOWN[one.signal][2]}, '
+          f'{100 * one.unexplained_fraction:.0f} % of the squared gap']
+         for name, one in result.subsystems.items()]) + paragraph(
+        'RMS difference with the measured inputs of each subsystem: the valve gets the measured '
+        'contraction, muscle and load the measured pressure. The signal is the one with the '
+        'largest gap. Load and sensors stand here where something of them is named.',
+        'note') + '<h3>The whole chain</h3>'
 
 
 def _size(name: str, s: 'SignalGap') -> list[str | None]:

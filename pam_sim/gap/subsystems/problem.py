@@ -69,6 +69,8 @@ class SubsystemProblem:
         Part, test block and signal (index into ``signals``) of every compared sample.
     time_s, run : numpy.ndarray, shape (N,)
         Its time in its recording, and which of them that is.
+    measured : numpy.ndarray, shape (N,)
+        What was measured.
 
     """
 
@@ -103,7 +105,7 @@ class SubsystemProblem:
             self._index.append(chosen)
             first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
         self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
-        self.signal, self._measured = np.concatenate(signals), np.concatenate(measured)
+        self.signal, self.measured = np.concatenate(signals), np.concatenate(measured)
         self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
         self.floor = self._floors(rig, seed)
         self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
@@ -140,7 +142,7 @@ class SubsystemProblem:
             Normalised values of ``known``.
 
         """
-        return (self.values(rig, known_z) - self._measured) / self._scale
+        return (self.values(rig, known_z) - self.measured) / self._scale
 
     def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """Return the simulated values of all compared samples, shape (N,)."""

@@ -14,12 +14,17 @@
 
 """What the doubt about the parameters of a model leaves on the certify data."""
 
+from collections.abc import Callable, Mapping
 import math
+from typing import TypeVar
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.verify.validation import Validation
+
+Signal = TypeVar('Signal', str, tuple[str, str])
 
 SMALL_STEP = 0.3             # of a number, in its standard deviation
 
@@ -46,15 +51,39 @@ def spread_of_numbers(validation: Validation, estimator: Estimator, base: Fit, w
         By signal the rms, in its unit.
 
     """
-    covariances, at = estimator.spread(base)
+    def run(found: Fit) -> dict[str, FloatArray]:
+        validation.simulations += 1
+        return {s: values[validation.part[s]] for s, values in validation.run(
+            found, whole).items()}
+
+    return spread_of_runs(estimator.spread(base), run, {
+        s: values[validation.part[s]] for s, values in validation.refit.items()})
+
+
+def spread_of_runs(spread: tuple[list[FloatArray], Callable[[int, float], Fit]],
+                   run: Callable[[Fit], Mapping[Signal, FloatArray]],
+                   usual: Mapping[Signal, FloatArray]) -> dict[Signal, float]:
+    """
+    Return how far runs of a fit may be off by the doubt about its numbers, rms by signal.
+
+    Parameters
+    ----------
+    spread : tuple
+        What ``Estimator.spread`` returns.
+    run : callable
+        ``run(fit)``: its signals.
+    usual : dict of numpy.ndarray
+        The signals of the fit itself.
+
+    """
+    covariances, at = spread
     changes = []
     for j, step in enumerate(SMALL_STEP * np.sqrt(np.diag(covariances[0]))):
-        moved = validation.run(at(j, step), whole)
-        changes.append({s: (moved[s] - validation.refit[s]) / step for s in moved})
-    validation.simulations += len(changes)
+        moved = run(at(j, step))
+        changes.append({s: (moved[s] - usual[s]) / step for s in usual})
     found = {}
-    for s, chosen in validation.part.items():
-        by_number = np.column_stack([change[s][chosen] for change in changes])
+    for s in usual:
+        by_number = np.column_stack([change[s] for change in changes])
         found[s] = max(math.sqrt(float(np.mean(np.einsum(
             'nk,kl,nl->n', by_number, c, by_number)))) for c in covariances)
     return found

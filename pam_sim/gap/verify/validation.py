@@ -19,7 +19,7 @@ The given model, the same with its numbers calibrated, and the final one run on 
 recorded valve signal alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import math
 
 import numpy as np
@@ -47,6 +47,20 @@ def start_error_sd(recording: Recording) -> float:
     white = MEDIAN_SD * noise.white_sd / np.sqrt(max(np.sum(time_s <= START_S), 1))
     return float(np.hypot(white, noise.slow_sd * min(1.0, np.sqrt(
         2.0 * noise.memory_s / START_S))))
+
+
+def share_left(gaps: Iterable[SignalGap], floor_error: float) -> float:
+    """
+    Return the share of squared gaps after calibration that the final model leaves, at most 1.
+
+    In floors squared; signals within the error of the floor do not count.
+    """
+    before = after = 0.0
+    for s in gaps:
+        if max(s.rmse_refit, s.rmse_after) > floor_error * s.noise_floor:
+            before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+            after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
+    return min(after / before, 1.0) if before > 0.0 else 0.0
 
 
 class Validation:
@@ -173,13 +187,7 @@ class Validation:
 
         Of signals that show one: where both are within the error of the floor, nothing is said.
         """
-        before = after = 0.0
-        floor_error = self.estimator.criteria.floor_error
-        for s in self.signals().values():
-            if max(s.rmse_refit, s.rmse_after) > floor_error * s.noise_floor:
-                before += max(s.rmse_refit ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
-                after += max(s.rmse_after ** 2 / s.noise_floor ** 2 - 1.0, 0.0)
-        return min(after / before, 1.0) if before > 0.0 else 0.0
+        return share_left(self.signals().values(), self.estimator.criteria.floor_error)
 
     def _rms(self, simulated: Mapping[str, FloatArray], signal: str) -> float:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]

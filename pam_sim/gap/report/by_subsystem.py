@@ -1,0 +1,131 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One verdict per subsystem: what is named in it, and what it leaves unexplained."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+import math
+
+from pam_sim.effects.registry import effects, get_effect
+from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.result import GapResult, SignalGap, SubsystemVerdict
+from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.verify.own_runs import largest, OwnRuns
+from pam_sim.gap.verify.uncertainty import NORMAL_95
+from pam_sim.gap.verify.validation import share_left
+from pam_sim.load import LOADS
+from pam_sim.rig import Rig
+from pam_sim.valve import hsv, ppr
+
+SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
+
+
+def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, runs: OwnRuns,
+                       criteria: Criteria, materiality: float) -> dict[str, SubsystemVerdict]:
+    """
+    Return what is said of every subsystem, the valve first.
+
+    Parameters
+    ----------
+    result : GapResult
+        With verdict, effects, parameters and the noise of the sensors.
+    named : list of NamedEffect
+        What was added to the model.
+    rig : pam_sim.Rig
+        The given model.
+    runs : OwnRuns
+        On the certify data.
+    criteria : Criteria
+        Decision thresholds.
+    materiality : float
+        From how many deviations of a sensor on a gap matters.
+
+    """
+    names = _names(result, named, rig)
+    found = {}
+    for s in SUBSYSTEMS:
+        own = _own(s, names.get(s, ()), runs.gaps)
+        if not own or (s not in runs.gaps and s not in names):
+            continue
+        signal = largest(own)
+        found[s] = SubsystemVerdict(
+            _verdict(s, names.get(s, ()), result, named), names.get(s, ()), signal, own[signal],
+            share_left(own.values(), criteria.floor_error))
+    if result.verdict == 'no_gap':
+        return found
+    open_ones = [s for s, one in found.items() if one.verdict == 'no_gap']
+    least = criteria.likely_sd * max(materiality, 1.0)
+    left = {s: _left(runs.gaps[s], result, criteria, {}) for s in open_ones}
+    if any(value > least for value in left.values()):
+        doubt = runs.spread()
+        left = {s: _left(runs.gaps[s], result, criteria, {
+            signal: doubt[s, signal] for signal in runs.gaps[s]}) for s in open_ones}
+    unknown = {s for s, value in left.items() if value > least}
+    if result.verdict == 'unknown' and not unknown:
+        unknown = {max(left, key=lambda s: left[s])}       # the whole chain shows it
+    return {s: replace(one, verdict='unknown') if s in unknown else one
+            for s, one in found.items()}
+
+
+def subsystem_of(name: str, rig: Rig) -> str:
+    """Return the subsystem of an effect or of a parameter of a rig."""
+    if name in effects():
+        return get_effect(name).subsystem
+    if name in {p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)}:
+        return 'valve'
+    return 'load' if name in {p.name for p in LOADS[rig.load].PARAMETERS} else 'muscle'
+
+
+def _names(result: GapResult, named: list[NamedEffect], rig: Rig) -> dict[str, tuple[str, ...]]:
+    """Return what is named by subsystem, with all names of a set under that of its first."""
+    sets = {w.name: w.names for w in named}
+    found: dict[str, list[str]] = {}
+    for name in (*(e['name'] for e in result.effects), *(p.name for p in result.parameters)):
+        found.setdefault(subsystem_of(name, rig), []).extend(sets.get(name, (name,)))
+    return {s: tuple(dict.fromkeys(names)) for s, names in found.items()}
+
+
+def _own(s: str, names: tuple[str, ...], gaps: Mapping[str, Mapping[str, SignalGap]]
+         ) -> dict[str, SignalGap]:
+    """Return the gaps that tell of a subsystem; of sensors, those of the signals they read."""
+    if s == 'valve':
+        return dict(gaps['valve'])
+    of_muscle = dict(gaps.get('muscle', {}))
+    if s != 'sensor':
+        return of_muscle
+    read = {get_effect(n).fitting.sensor_signal for n in names if n in effects()}
+    return {signal: gap for signal, gap in {**of_muscle, **gaps['valve']}.items()
+            if signal in read} or of_muscle
+
+
+def _verdict(s: str, names: tuple[str, ...], result: GapResult, named: list[NamedEffect]) -> str:
+    """Return the verdict of what is named; ``no_gap`` where nothing is."""
+    if not names or result.verdict in ('no_gap', 'unknown'):
+        return 'no_gap'
+    if any(len(w.names) > 1 and w.name in names for w in named):
+        return 'ambiguous'
+    return 'effects' if any(e['subsystem'] == s for e in result.effects) else 'parameter'
+
+
+def _left(gaps: Mapping[str, SignalGap], result: GapResult, criteria: Criteria,
+          doubt: Mapping[str, float]) -> float:
+    """Return what is left beyond the floor and the doubt about numbers, in sensor deviations."""
+    found = 0.0
+    for signal, gap in gaps.items():
+        floor = math.hypot(criteria.floor_error * gap.noise_floor,
+                           NORMAL_95 * doubt.get(signal, 0.0))
+        beyond = math.sqrt(max(gap.rmse_after ** 2 - floor ** 2, 0.0))
+        found = max(found, beyond / max(result.noise.get(signal, 0.0), 1e-12))
+    return found

@@ -1,0 +1,132 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Each subsystem on its own measured inputs, on data that neither fit nor ranking has seen.
+
+In a run of the whole chain, an error of the valve reaches the muscle. Here the valve gets the
+measured contraction, and muscle and load the measured pressure. What a subsystem misses is then
+its own.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.gap.data.signals import UNIT
+from pam_sim.gap.data.split import CERTIFY, SETTLE_S
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.result import SignalGap
+from pam_sim.gap.subsystems.known import SKEW_MAX_S
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.verify.spread import spread_of_runs
+from pam_sim.gap.verify.validation import Validation
+
+
+class OwnRuns:
+    """
+    Runs of the subsystems on the certify data, each on its own measured inputs.
+
+    Parameters
+    ----------
+    validation : Validation
+        Has the recording.
+    whole : bool
+        As of the Validation.
+    estimator : Estimator
+    base, final : Fit
+        Numbers calibrated alone, and the final model.
+    seed : int
+        Of the draws that carry input noise into the floor.
+
+    Attributes
+    ----------
+    gaps : dict of str -> dict of str -> SignalGap
+        By subsystem (``valve``, ``muscle``: muscle and load) and signal.
+
+    """
+
+    def __init__(self, validation: Validation, whole: bool, estimator: Estimator, base: Fit,
+                 final: Fit, seed: int = 0) -> None:
+        self._whole, self._estimator, self._final = whole, estimator, final
+        self._problems = subsystem_problems(
+            estimator.rig, [validation.recording], False, seed, estimator.criteria
+        ) if whole else estimator.problems
+        before, refit, after = self._given(), self._errors(base), self._errors(final)
+        self._after = after
+        self.gaps = {p.subsystem: {s: SignalGap(
+            UNIT[s], p.floor[s], *(_rms(errors[p.subsystem, s]) for errors in (
+                before, refit, after))) for s in p.signals} for p in self._problems}
+
+    @property
+    def simulations(self) -> int:
+        """Return how many simulations were made for this."""
+        return sum(p.simulations for p in self._problems) if self._whole else 0
+
+    def spread(self) -> dict[tuple[str, str], float]:
+        """Return the rms by which the final model may be off by its numbers alone."""
+        return spread_of_runs(self._estimator.spread(self._final), self._errors, self._after)
+
+    def _given(self) -> dict[tuple[str, str], FloatArray]:
+        """Return the errors of the given model, by subsystem and signal."""
+        found = {}
+        for p in self._problems:
+            found.update(self._cut(p, p.errors(self._estimator.rig, np.zeros(len(p.known)))))
+        return found
+
+    def _errors(self, found: Fit) -> dict[tuple[str, str], FloatArray]:
+        """Return the errors of a fit, by subsystem and signal."""
+        rig = self._estimator.with_effects(found.settings())
+        z = {k.name: float(z) for p in self._estimator.problems
+             for k, z in zip(p.known, found.known_z[p.subsystem])}
+        if self._whole:          # a closed volume keeps the error of its start: another one here
+            z['start_error'] = 0.0
+        parts = {}
+        for p in self._problems:
+            known = np.array([z.get(k.name, 0.0) for k in p.known])
+            parts.update(self._cut(p, p.errors(rig, known)))
+        return parts
+
+    def _cut(self, p: SubsystemProblem, errors: FloatArray
+             ) -> dict[tuple[str, str], FloatArray]:
+        """Return the errors on the certify data in SI units, by subsystem and signal."""
+        part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
+        found = {}
+        for place, s in enumerate(p.signals):
+            chosen = part & (p.signal == place)
+            error = errors[chosen] * p.floor[s]
+            if self._whole and p.subsystem != 'valve':
+                error = _aligned(error, p.time_s[chosen], p.measured[chosen])
+            found[p.subsystem, s] = error
+        return found
+
+
+def _aligned(error: FloatArray, time_s: FloatArray, measured: FloatArray) -> FloatArray:
+    """Return an error less what a skew of this recording explains, as in the Validation."""
+    slope = np.gradient(measured + error, time_s)
+    square = float(np.sum(slope ** 2))
+    late_s = float(np.sum(slope * error)) / square if square > 0.0 else 0.0
+    return error - min(max(late_s, -SKEW_MAX_S), SKEW_MAX_S) * slope
+
+
+def _rms(errors: FloatArray) -> float:
+    return float(np.sqrt(np.mean(errors ** 2)))
+
+
+def largest(gaps: Mapping[str, SignalGap]) -> str:
+    """Return the signal whose gap after calibration stands out most from its noise floor."""
+    return max(gaps, key=lambda s: max(gaps[s].rmse_refit, gaps[s].rmse_after) / max(
+        gaps[s].noise_floor, 1e-12))
