@@ -25,6 +25,7 @@ UDP.
 """
 
 import argparse
+from functools import partial
 import json
 import os
 import random
@@ -91,7 +92,8 @@ def trials(times, environment, seed, title):
     chance = random.Random(seed)
     processes = [subprocess.Popen(
         [sys.executable, __file__, '--participant', role], env=environment, text=True,
-        stdout=subprocess.PIPE, start_new_session=True, preexec_fn=end_with_parent)
+        stdout=subprocess.PIPE, start_new_session=True,
+        preexec_fn=partial(end_with_parent, os.getpid()))
         for role in ('talker', *['listener'] * LISTENERS)]
     stopped = []
     try:

@@ -30,7 +30,9 @@ the echo.
 """
 
 import argparse
+from functools import partial
 import json
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -43,7 +45,7 @@ from pam_actuation.nodes.realtime import ask_for_realtime
 from pam_actuation.nodes.timing import Latency, LoopTiming
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT
-from pam_actuation.rigging.processes import end_with_parent
+from pam_actuation.rigging.processes import end_with_parent, node_environment
 from pam_actuation.transport import unprepared
 from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
 
@@ -118,7 +120,7 @@ class Beside:
         self._processes = [
             subprocess.Popen([sys.executable, __file__, '--echo', role], env=plain,
                              stdout=subprocess.PIPE, text=True, start_new_session=True,
-                             preexec_fn=end_with_parent)
+                             preexec_fn=partial(end_with_parent, os.getpid()))
             for role in ('listener', 'talker', BARE)]
 
     def end(self):
@@ -147,11 +149,11 @@ def measure(seconds, folder):
     result, last = session.Result(''), {}
     try:
         with session.RigSession(plan) as rig:
-            beside = Beside(session.node_environment(rig.domain_id, plan.folder))
+            beside = Beside(node_environment(rig.domain_id, plan.folder))
 
             def note(done_s, total_s):
                 for name in LOOPS:
-                    status = rig.client.statuses.get(f'{rig.namespace}/{name}')
+                    status = rig.group.started.statuses.get(f'{rig.namespace}/{name}')
                     if status is not None and 'loop.ticks' in status[2]:
                         last[name] = status[2]
 

@@ -37,6 +37,7 @@ import time
 from pam_actuation.bags.info import bag_info
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT, RECORDER
+from pam_actuation.rigging.processes import node_environment
 import yaml
 
 PLANT_HZ, CONTROLLER_HZ, EXTRA_HZ = 1000.0, 500.0, 1000.0
@@ -134,7 +135,7 @@ def measure(seconds, extra, bag):
     try:
         with session.RigSession(plan) as rig:
             if extra:
-                environment = session.node_environment(rig.domain_id, plan.folder)
+                environment = node_environment(rig.domain_id, plan.folder)
                 sender = subprocess.Popen(
                     [sys.executable, __file__, '--publish', str(extra)], env=environment,
                     stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,

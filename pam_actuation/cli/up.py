@@ -24,7 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.files import check_file
 
 if TYPE_CHECKING:
-    from pam_actuation.rigging.layouts import NodeSpec
+    from pam_actuation.rigging.node_spec import NodeSpec
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
 EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'

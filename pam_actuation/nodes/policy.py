@@ -25,7 +25,7 @@ import xml.etree.ElementTree as ElementTree
 
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
-from pam_actuation.rigging.layouts import NodeSpec
+from pam_actuation.rigging.node_spec import NodeSpec
 
 PARAMETER_SERVICES = (
     'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',

@@ -20,29 +20,16 @@ What the launch files of the same names describe, for those who start nodes with
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import namespace_of
+from pam_actuation.rigging.node_spec import NodeSpec
 from pam_sim.joint.parameters import SIDES
 
-# The order in which nodes become active; it is that of the end, read backwards.
-ORDER = ('experiment_recorder', 'plant_simulator', 'hardware_sensors', 'joint_simulator',
-         'valve_watchdog', 'valve_driver', 'sofc_controller', 'pid_controller',
-         'joint_controller', 'reference_generator')
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
 KNEES = ('left_knee', 'right_knee')
-
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """One node: executable, namespace, parameters, and a file with further ones or ''."""
-
-    name: str
-    namespace: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    parameter_file: str = ''
 
 
 def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',

@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable, Mapping
 import ctypes
+from functools import partial
 import os
 from pathlib import Path
 import signal
@@ -118,7 +119,7 @@ class NodeProcess:
         with open(self.log_file, 'wb') as log:
             self._process = subprocess.Popen(
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True, preexec_fn=end_with_parent)
+                start_new_session=True, preexec_fn=partial(end_with_parent, os.getpid()))
         self.pid = self._process.pid
 
     @property
@@ -188,7 +189,13 @@ def end_all(processes: Iterable[NodeProcess], timeout_s: float = 5.0) -> None:
         process.wait(timeout_s)
 
 
-def end_with_parent() -> None:
-    """Ask Linux for a SIGTERM to this process when its parent dies (a ``preexec_fn``)."""
+def end_with_parent(parent_pid: int) -> None:
+    """
+    Ask Linux for a SIGTERM to this process when its parent dies (a ``preexec_fn``).
+
+    A parent that died before is not told of any more: the process ends at once.
+    """
     if LIBC is not None:
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent_pid:
+            os._exit(1)

@@ -15,14 +15,13 @@
 """
 One experiment on live nodes, from the first process to the closed bag.
 
-Order of the start: all nodes are configured, the recorder is active first and connected
-to every publisher, then plant, watchdog, driver, controller and reference. Order of the end:
-reference and controller stop (which commands atmospheric pressure), the driver stops with
-the signal that vents, watchdog and plant a little later, the recorder last. The same order on
-Ctrl-C and when a node dies. Of a driver that died, the watchdog vents the muscle meanwhile.
+The recorder becomes active first and is connected to every publisher before the others move.
+At the end reference and controller stop (which commands atmospheric pressure), the driver stops
+with the signal that vents, watchdog and plant a little later, the recorder last. The same order
+on Ctrl-C and when a node dies. Of a driver that died, the watchdog vents the muscle meanwhile.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 import contextlib
 from dataclasses import dataclass, field
 import json
@@ -35,13 +34,10 @@ from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, 
 from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
-from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.node_group import NodeGroup
+from pam_actuation.rigging.node_spec import NodeSpec
 from pam_actuation.rigging.plan import make_plan, RECORDER, REFERENCE, RigPlan
-from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
-from pam_actuation.rigging.transitions import (
-    change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, termination_as_interrupt,
-    TRANSITION_TIMEOUT_S)
-from pam_actuation.ros_missing import ros_missing
+from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 import yaml
@@ -49,14 +45,12 @@ import yaml
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
     from pam_actuation.experiments.experiment import Experiment
-    from pam_actuation.rigging.client import RigClient
+    from pam_actuation.rigging.processes import NodeProcess
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 Progress = Callable[[float, float], object]     # takes seconds done, seconds in all
 
-START_TIMEOUT_S = 60.0        # a busy machine compiles for long
-VENT_S = 0.6                  # after the end, so that the recording shows the vent
 OVERDUE_S = 5.0               # the reference may finish this much late
 STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
@@ -124,20 +118,15 @@ class RigSession:
 
     def __init__(self, plan: RigPlan, namespace: str = '/muscle', domain_id: int | None = None
                  ) -> None:
-        try:
-            from pam_actuation.rigging.client import RigClient
-            self._new_client = RigClient
-        except ImportError as error:
-            raise InputError(ros_missing(error.name or 'rclpy')) from None
         self.plan = plan
         self.namespace = namespace_of(namespace)
-        self.processes: dict[str, NodeProcess] = {}
-        self._lock = DomainLock(domain_id)
-        self.domain_id = self._lock.domain_id
-        self.client: RigClient | None = None
+        nodes = {}
+        for place, parameters in plan.parameters.items():
+            below, _, name = place.rpartition('/')
+            nodes[place] = NodeSpec(
+                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, label=place)
+        self.group = NodeGroup(nodes, plan.folder, domain_id)
         self._cpu: dict[str, float | None] = {}
-        self._active: set[str] = set()
-        self._may_record = False
         self._active_since: float | None = None
         self.ended_at: float | None = None
 
@@ -145,18 +134,19 @@ class RigSession:
         """Return the session."""
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *why: object) -> None:
         """End all processes of this session."""
-        with undisturbed():
-            end_all(self.processes.values())
-            if self.client is not None:
-                self.client.close()
-            self._lock.release()
+        self.group.__exit__(*why)
 
-    def _started(self) -> 'RigClient':
-        """Return the client, which there is from ``start`` on."""
-        assert self.client is not None
-        return self.client
+    @property
+    def domain_id(self) -> int:
+        """Return the ROS domain of the nodes."""
+        return self.group.domain_id
+
+    @property
+    def processes(self) -> 'dict[str, NodeProcess]':
+        """Return the processes, each by its place below the namespace."""
+        return self.group.processes
 
     def start(self) -> None:
         """
@@ -168,28 +158,9 @@ class RigSession:
             A node ended or refused.
 
         """
-        environment = node_environment(self.domain_id, self.plan.folder)
-        for place, parameters in self.plan.parameters.items():
-            below, _, name = place.rpartition('/')
-            log_dir = self.plan.folder / below
-            log_dir.mkdir(exist_ok=True)
-            self.processes[place] = NodeProcess(
-                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, environment, log_dir,
-                label=place)
-        # Only now: a process with the threads of the middleware does not fork safely.
-        self.client = self._new_client(self.domain_id)
-        self.change(self.processes, 'configure', START_TIMEOUT_S)
-        for name in self.processes:
-            self._may_record |= name == RECORDER
-            self.change([name], 'activate')
-            self._active.add(name)
+        self.group.start()
         self._active_since = time.monotonic()
         self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
-
-    def change(self, names: Iterable[str], transition: str,
-               timeout_s: float = TRANSITION_TIMEOUT_S) -> None:
-        """Ask nodes for a transition at the same time; SessionFailed if one does not make it."""
-        change(self._started(), [self.processes[name] for name in names], transition, timeout_s)
 
     def run(self, progress: Progress | None = None) -> None:
         """
@@ -208,25 +179,25 @@ class RigSession:
         """
         total_s = self.plan.experiment.duration_s
         reference = self.processes[REFERENCE].full_name
-        client, begin = self._started(), time.monotonic()
+        client, begin = self.group.started, time.monotonic()
         while True:
             client.spin(0.05)
             done_s = time.monotonic() - begin
             if progress is not None:
                 progress(min(done_s, total_s), total_s)
-            for process in self.processes.values():
-                if not process.running:
-                    raise SessionFailed(self._describe_loss(process, done_s))
+            ended = self.group.ended()
+            if ended is not None:
+                raise SessionFailed(self._describe_loss(self.processes[ended], done_s))
             if client.statuses.get(reference, (0, '', {}))[1].startswith(FINISHED):
                 return
             if done_s > total_s + OVERDUE_S:
                 raise SessionFailed(
                     f'the reference did not finish within {total_s + OVERDUE_S:.0f} s')
 
-    def _describe_loss(self, process: NodeProcess, done_s: float) -> str:
+    def _describe_loss(self, process: 'NodeProcess', done_s: float) -> str:
         """Return a sentence on a node that ended, and on how the muscles were vented."""
         sentence = f'{process.how_it_ended()} {done_s:.1f} s into the experiment'
-        self._started().spin(0.4)
+        self.group.started.spin(0.4)
         for driver, watchdog in zip(self.plan.drivers, self.plan.watchdogs):
             if self.processes[driver] is process:
                 level, message = self._status(watchdog)
@@ -241,7 +212,7 @@ class RigSession:
 
     def _status(self, place: str) -> tuple[int, str]:
         """Return level and message of what a node said last, (0, '') if nothing."""
-        return self._started().statuses.get(self.processes[place].full_name, (0, '', {}))[:2]
+        return self.group.started.statuses.get(self.processes[place].full_name, (0, '', {}))[:2]
 
     def finish(self, ended: str = '', because: str = '') -> list[str]:
         """
@@ -260,38 +231,13 @@ class RigSession:
         """
         self._note_cpu()
         self.ended_at = time.monotonic()
-        problems: list[str] = []
-        if self.client is None:
-            return problems
-        drivers = self.plan.drivers
-        problems += self._deactivate([REFERENCE, self.plan.controller_node, *drivers])
-        if self._active.intersection(drivers):
-            self.client.spin(VENT_S)
-        # The watchdogs hold out until then: a driver that is dead or hangs does not vent.
-        problems += self._deactivate([*self.plan.watchdogs, self.plan.plant_node])
-        self._tell_recorder(ended, because)
-        problems += self._deactivate([RECORDER], CLOSE_TIMEOUT_S)
-        self.client.spin(0.1)
-        end_all(self.processes.values())
-        return problems
+        return self.group.stop(lambda: self._tell_recorder(ended, because))
 
     def _tell_recorder(self, ended: str, because: str) -> None:
         """Write down why the run ended, for the bag; without a word the recorder judges."""
         if ended:
             write_text(self.plan.folder / ENDED_FILE,
                        json.dumps({'ended': ended, 'because': because}))
-
-    def _deactivate(self, names: Iterable[str], timeout_s: float = STOP_TIMEOUT_S) -> list[str]:
-        problems: list[str] = []
-        for name in names:
-            if name in self._active and self.processes[name].running:
-                try:
-                    self.change([name], 'deactivate', timeout_s)
-                except SessionFailed as error:
-                    problems.append(str(error))
-                    # The driver, which vents, must not wait for a node that does not answer.
-                    end_all([self.processes[name]])
-        return problems
 
     def _note_cpu(self) -> None:
         if self._active_since is None:
@@ -312,18 +258,19 @@ class RigSession:
 
     def fill(self, result: Result) -> None:
         """Enter counts, exit codes and findings into a Result."""
-        if not self._may_record or not os.path.isdir(result.bag):
+        if not self.group.was_asked(RECORDER) or not os.path.isdir(result.bag):
             result.bag = ''         # there is none, or only that of an earlier run
-        if self.client is None:
+        client = self.group.client
+        if client is None:
             return
-        result.published = self.client.published()
+        result.published = client.published()
         result.bag = self._bag(result.bag)
         result.recorded = recorded_counts(result.bag) if result.bag else {}
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
         result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()
                             if share is not None}
         result.findings += [
-            f'{name}: {message}' for when, name, level, message in self.client.changes
+            f'{name}: {message}' for when, name, level, message in client.changes
             if level >= LEVEL_ERROR and self.ended_at is not None and when < self.ended_at]
 
 

@@ -12,15 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Bring nodes up in order, watch them, take them down safely; no ``ros2 launch`` needed.
-
-All nodes are configured at the same time, then become active one kind after the other: what
-measures, the watchdogs, the drivers, the controllers, the reference. The end, whatever its
-cause, goes the other way round: the drivers vent while plant and recorder still run.
-"""
+"""Bring nodes up, watch them, take them down safely; no ``ros2 launch`` needed."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 import os
 from pathlib import Path
 import shutil
@@ -28,22 +23,13 @@ import tempfile
 import time
 from typing import Self, TYPE_CHECKING
 
-from pam_actuation.interrupts import undisturbed
-from pam_actuation.rigging.domain import DomainLock
-from pam_actuation.rigging.layouts import ORDER
-from pam_actuation.rigging.plan import DRIVER, RECORDER
-from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
-from pam_actuation.rigging.transitions import (
-    change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S)
-from pam_actuation.ros_missing import ros_missing
-from pam_sim.errors import InputError
+from pam_actuation.namespaces import node_name_of
+from pam_actuation.rigging.node_group import NodeGroup
+from pam_actuation.rigging.transitions import SessionFailed
 
 if TYPE_CHECKING:
-    from pam_actuation.rigging.client import RigClient
-    from pam_actuation.rigging.layouts import NodeSpec
-
-START_TIMEOUT_S = 60.0
-VENT_S = 0.6                  # for the air, before the plant stops
+    from pam_actuation.rigging.node_spec import NodeSpec
+    from pam_actuation.rigging.processes import NodeProcess
 
 
 class Supervisor:
@@ -58,51 +44,31 @@ class Supervisor:
     realtime_priority : int
         Of all nodes, 1 to 96; 0: none.
 
-    Attributes
-    ----------
-    processes : dict
-        Full node name to NodeProcess, in the order in which they become active.
-    client : RigClient
-        With the newest status of every node, once started.
-
     """
 
     def __init__(self, nodes: 'Iterable[NodeSpec]', domain_id: int | None = None,
                  realtime_priority: int = 0) -> None:
-        try:
-            from pam_actuation.rigging.client import RigClient
-        except ImportError as error:
-            raise InputError(ros_missing(error.name or 'rclpy')) from None
-        self._new_client = RigClient
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
-        self._lock = DomainLock(domain_id)
-        self._nodes = sorted(nodes, key=lambda node: ORDER.index(node.name))
-        self._priority = realtime_priority
         self._folder = Path(tempfile.mkdtemp(prefix='pam_nodes_'))
-        self.processes: dict[str, NodeProcess] = {}
-        self.client: RigClient | None = None
-        self._active: list[NodeProcess] = []
+        self._group = NodeGroup({
+            node_name_of(node.name, node.namespace): replace(node, parameters={
+                'realtime_priority': realtime_priority, **node.parameters, 'autostart': False})
+            for node in nodes}, self._folder, domain_id)
 
     def __enter__(self) -> Self:
         """Return the supervisor."""
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *why: object) -> None:
         """End all processes."""
-        with undisturbed():
-            drivers = [one for one in self.processes.values() if one.name == DRIVER]
-            end_all(drivers)
-            end_all(self.processes.values())
-            if self.client is not None:
-                self.client.close()
-            self._lock.release()
-            shutil.rmtree(self._folder, ignore_errors=True)
+        self._group.__exit__(*why)
+        shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _started(self) -> 'RigClient':
-        """Return the client, which there is from ``start`` on."""
-        assert self.client is not None
-        return self.client
+    @property
+    def processes(self) -> 'dict[str, NodeProcess]':
+        """Return full node name to process, in the order in which they become active."""
+        return self._group.processes
 
     def start(self) -> None:
         """
@@ -114,23 +80,7 @@ class Supervisor:
             A node ended or refused.
 
         """
-        environment = node_environment(self._lock.domain_id, self._folder)
-        for node in self._nodes:
-            log_dir = self._folder / node.namespace.strip('/')
-            log_dir.mkdir(parents=True, exist_ok=True)
-            process = NodeProcess(
-                node.name, node.namespace, {
-                    'realtime_priority': self._priority, **node.parameters,
-                    'autostart': False},
-                environment, log_dir, parameter_file=node.parameter_file)
-            self.processes[process.full_name] = process
-        # Only now: a process with the threads of the middleware does not fork safely.
-        self.client = self._new_client(self._lock.domain_id)
-        change(self.client, self.processes.values(), 'configure', START_TIMEOUT_S)
-        for name in ORDER:
-            of_a_kind = [one for one in self.processes.values() if one.name == name]
-            self._active += of_a_kind
-            change(self.client, of_a_kind, 'activate')
+        self._group.start()
 
     def watch(self, seconds: float | None = None) -> None:
         """
@@ -144,10 +94,10 @@ class Supervisor:
         """
         deadline = None if seconds is None else time.monotonic() + seconds
         while deadline is None or time.monotonic() < deadline:
-            self._started().spin(0.05)
-            for full_name, process in self.processes.items():
-                if not process.running:
-                    raise SessionFailed(f'{full_name}: {process.how_it_ended()}')
+            self._group.started.spin(0.05)
+            ended = self._group.ended()
+            if ended is not None:
+                raise SessionFailed(self._how_it_ended(ended))
 
     def finish(self) -> list[str]:
         """
@@ -159,23 +109,11 @@ class Supervisor:
             What did not go as it should.
 
         """
-        problems: list[str] = []
-        for name in reversed(ORDER):
-            of_a_kind = [one for one in self._active if one.name == name and one.running]
-            if not of_a_kind:
-                continue
-            try:
-                change(self._started(), of_a_kind, 'deactivate',
-                       CLOSE_TIMEOUT_S if name == RECORDER else STOP_TIMEOUT_S)
-            except SessionFailed as error:
-                if all(one.running for one in of_a_kind):       # those that ended come below
-                    problems.append(str(error))
-                # The driver, which vents, must not wait for a node that does not answer.
-                end_all(of_a_kind)
-            if name == DRIVER:
-                self._started().spin(VENT_S)
-        self._active = []
-        end_all(self.processes.values())
-        return problems + [
-            f'{full_name}: {process.how_it_ended()}'
-            for full_name, process in self.processes.items() if process.exit_code != 0]
+        problems = self._group.stop()
+        ended = {one.how_it_ended() for one in self.processes.values()}
+        return [one for one in problems if one not in ended] + [
+            self._how_it_ended(name) for name, one in self.processes.items()
+            if one.exit_code != 0]
+
+    def _how_it_ended(self, name: str) -> str:
+        return f'{name}: {self.processes[name].how_it_ended()}'

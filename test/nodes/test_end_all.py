@@ -14,6 +14,8 @@
 
 """Test how long nodes that do not end may hold up those who end them."""
 
+from functools import partial
+import os
 import signal
 import subprocess
 import sys
@@ -23,7 +25,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.rigging.processes import end_all, NodeProcess            # noqa: E402, I100
+from pam_actuation.rigging.processes import (                              # noqa: E402, I100
+    end_all, end_with_parent, NodeProcess)
 
 DEAF = 'import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); ' \
     'print(flush=True); time.sleep(60)'
@@ -45,3 +48,11 @@ def test_nodes_that_do_not_end_share_the_time_they_are_given():
     end_all(nodes, timeout_s=1.5)
     assert 1.5 <= time.monotonic() - begin < 4.5        # one after the other: 6 s
     assert [node.exit_code for node in nodes] == [-signal.SIGKILL] * 4
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='asks Linux')
+def test_a_node_whose_parent_died_while_it_started_ends():
+    codes = [subprocess.run([sys.executable, '-c', ''],
+                            preexec_fn=partial(end_with_parent, parent)).returncode
+             for parent in (os.getpid(), os.getppid())]
+    assert codes == [0, 1]

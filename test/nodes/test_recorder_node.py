@@ -125,7 +125,7 @@ def test_a_disk_that_refuses_ends_the_experiment_safely_and_keeps_the_record(tmp
                     rig.processes[RECORDER].pid, resource.RLIMIT_FSIZE, (size, size))
 
         session.run_guarded(rig, result, fill_the_disk)
-        driver = rig.client.statuses['/muscle/valve_driver']
+        driver = rig.group.started.statuses['/muscle/valve_driver']
     plan.remove()
     assert 'experiment_recorder ended with exit code 1' in result.failure
     assert 'writing failed (File too large)' in result.failure

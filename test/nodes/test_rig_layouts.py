@@ -16,6 +16,7 @@
 
 from pam_actuation.cli.main import main
 from pam_actuation.rigging import layouts
+from pam_actuation.rigging.node_spec import ORDER
 import pytest
 
 
@@ -92,7 +93,7 @@ def test_a_joint_is_recorded_as_a_whole_and_each_knee_in_a_bag_of_its_own():
 def test_every_node_has_its_place_in_the_order():
     nodes = [*layouts.rig(hardware='dummy', experiment='rest', record='bag'), *layouts.rig(),
              *layouts.exo(experiment='joint_sine')]
-    assert {node.name for node in nodes} <= set(layouts.ORDER)
+    assert {node.name for node in nodes} <= set(ORDER)
 
 
 @pytest.mark.parametrize('arguments, words', [

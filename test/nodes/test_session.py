@@ -23,7 +23,7 @@ from pam_actuation.bags.ending import Ending, ending_of                     # no
 from pam_actuation.bags.info import bag_info, render_text                   # noqa: E402
 from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.replay.controller import replay_controller               # noqa: E402
-from pam_actuation.rigging import session                                   # noqa: E402
+from pam_actuation.rigging import node_group, session                       # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
@@ -166,7 +166,7 @@ def test_without_recorder_and_stopped_during_the_start(tmp_path, monkeypatch):
     def stop(self, name, transition, *_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(session.RigSession, 'change', stop)
+    monkeypatch.setattr(node_group.NodeGroup, 'change', stop)
     result = session.run_experiment(PRESSURE, with_recorder=False)
     assert result.failure == 'stopped by the user' and result.bag == ''
     assert set(result.exit_codes) == {

@@ -22,7 +22,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from pam_actuation.bags.load import load_run                                # noqa: E402, I100
-from pam_actuation.rigging import session, supervisor                       # noqa: E402
+from pam_actuation.rigging import node_group, session, supervisor           # noqa: E402
 
 pytestmark = pytest.mark.ros
 
@@ -32,7 +32,7 @@ def stop(*_, **__):
 
 
 def test_a_run_that_is_stopped_before_it_records_names_no_bag(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(session.RigSession, 'change', stop)
+    monkeypatch.setattr(node_group.NodeGroup, 'change', stop)
     bag = tmp_path / 'bag'
     assert main(['run', 'short_sine', '--out', str(bag)]) == 130
     out, err = capsys.readouterr()
@@ -54,7 +54,7 @@ def test_a_run_that_is_stopped_later_names_its_bag(tmp_path, monkeypatch, capsys
 
 def test_to_bring_nodes_up_is_interrupted_and_to_keep_them_up_is_ended(monkeypatch, capsys):
     with monkeypatch.context() as patch:
-        patch.setattr(supervisor, 'change', stop)
+        patch.setattr(node_group.NodeGroup, 'change', stop)
         assert main(['up', 'rig']) == 130
     assert capsys.readouterr() == ('', 'pam up: stopped while the nodes started\n')
     monkeypatch.setattr(supervisor.Supervisor, 'watch', stop)
