@@ -186,6 +186,10 @@ class Criteria:
         0.25, 'floors squared', 'plausibility',
         'Rest so small that it may be the error of the floor.',
         'Half a floor.')
+    partial_share: float = _criterion(
+        0.3, 'of the gap', 'plausibility',
+        'Rest on the certify data from which on what is named is a part only.',
+        'The interface of gap.json.')
     visible_sd: float = _criterion(
         0.3, 'sensor deviations', 'materiality',
         'Less cannot be told from none.',

@@ -101,7 +101,7 @@ class SubsystemVerdict:
     Parameters
     ----------
     verdict : str
-        ``no_gap``, ``parameter``, ``effects``, ``ambiguous`` or ``unknown``.
+        ``no_gap``, ``parameter``, ``effects``, ``partial``, ``ambiguous`` or ``unknown``.
     names : tuple of str
         What is named in it; of ``ambiguous``, all that cannot be told apart.
     signal : str
@@ -163,7 +163,8 @@ class GapResult:
     Attributes
     ----------
     verdict : str
-        ``effects``, ``parameter``, ``no_gap``, ``unknown``, ``ambiguous`` or ``refused``.
+        ``effects``, ``parameter``, ``partial``, ``no_gap``, ``unknown``, ``ambiguous`` or
+        ``refused``.
     reason : str
         One or two sentences for a person.
     signals : dict of str -> SignalGap
@@ -174,7 +175,7 @@ class GapResult:
     where : list of Share
         Shares of the squared gap by subsystem and by condition.
     parameters : list of Calibrated
-        Numbers found wrong (verdict ``parameter``).
+        Numbers found wrong.
     calibration : list of Calibrated
         All numbers that were calibrated, for the report.
     traces : dict of str -> Trace

@@ -98,6 +98,8 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
         result.verdict = 'ambiguous'
     else:
         result.verdict = 'effects' if result.effects else 'parameter'
+        if result.unexplained_fraction >= criteria.partial_share:
+            result.verdict = 'partial'
 
 
 def _at_most(estimator: Estimator, final: Fit, named: Sequence[NamedEffect]) -> float:

@@ -251,6 +251,24 @@ def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
     assert result.verdict == verdict
 
 
+@pytest.mark.parametrize('found, left, verdict', [
+    ('effects', 0.29, 'effects'), ('effects', 0.3, 'partial'), ('parameters', 0.31, 'partial'),
+    ('parameters', 0.0, 'parameter')])
+def test_what_leaves_much_of_the_gap_is_a_part_only(monkeypatch, found, left, verdict):
+    result = SimpleNamespace(**{'parameters': [], 'effects': [], 'signals': {}} | {
+        found: [SimpleNamespace(prior_deviation=9.0)]})
+    validation = SimpleNamespace(
+        noise={}, unexplained=lambda: left, fall=lambda *given: (1.0, 9.0),
+        moved=lambda *given: {'contraction': 9.0}, refit=None, after=None)
+    monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
+    outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
+        NamedEffect('creep', 'muscle', [], ('creep',))])
+    final = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
+    estimator = SimpleNamespace(certainty=lambda found, place: 60.0, criteria=CRITERIA)
+    verdict_module.judge(result, outcome, estimator, validation, None, final, 1.0, True)
+    assert result.verdict == verdict
+
+
 @pytest.mark.parametrize('plain_share, stays', [(0.95, True), (0.85, False)])
 def test_a_name_that_a_further_shape_made_uncertain_stands_in_its_plainer_form(
         monkeypatch, plain_share, stays):

@@ -37,7 +37,7 @@ class Answer:
     @property
     def claimed(self):
         """Return what is claimed without a doubt: effects and wrong numbers."""
-        if self.verdict == 'effects':
+        if self.verdict in ('effects', 'partial'):
             return self.effects + self.parameters
         return self.parameters if self.verdict == 'parameter' else ()
 
@@ -59,7 +59,7 @@ def read_answer(raw):
     effects = tuple(e['name'] for e in raw.get('effects') or ())
     parameters = tuple(p['name'] for p in raw.get('parameters') or ())
     verdict = raw.get('verdict', 'crashed')
-    claims = verdict in ('effects', 'parameter', 'ambiguous')
+    claims = verdict in ('effects', 'parameter', 'partial', 'ambiguous')
     reported = dict.fromkeys(raw.get('ambiguity_set') or ())
     if claims:
         reported |= dict.fromkeys(parameters if verdict == 'parameter' else effects + parameters)

@@ -135,7 +135,8 @@ def _confusion(cases):
 
 
 def _confidence(cases):
-    named = [(e.get('confidence'), c) for c in cases if c.answer.verdict == 'effects'
+    named = [(e.get('confidence'), c) for c in cases
+             if c.answer.verdict in ('effects', 'partial')
              for e in c.answer.raw['effects'][:1] if e.get('confidence') is not None]
     parts = ['Stated confidence against how often the name was right:', '',
              '| confidence | right |', '|---|---|']

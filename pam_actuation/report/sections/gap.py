@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 VERDICT_TEXT = {
     'no_gap': 'No gap beyond noise', 'parameter': 'A parameter of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
+    'partial': 'A part of the gap is named; much of it is not explained',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}
 SIZES = ('signal', 'noise floor', 'given model', 'numbers calibrated', 'final model')
 EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %

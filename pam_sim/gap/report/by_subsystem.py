@@ -63,6 +63,9 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, ru
         found[s] = SubsystemVerdict(
             _verdict(s, names.get(s, ()), result, named), names.get(s, ()), signal, own[signal],
             share_left(own.values(), criteria.floor_error))
+        if found[s].verdict in ('effects', 'parameter') and (
+                found[s].unexplained_fraction >= criteria.partial_share):
+            found[s] = replace(found[s], verdict='partial')
     if result.verdict == 'no_gap':
         return found
     open_ones = [s for s, one in found.items() if one.verdict == 'no_gap']

@@ -25,6 +25,7 @@ from pam_sim.gap.select.search import Outcome
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
 LEAST_SHARE = 0.005
+WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 
 def explain(result: GapResult, outcome: Outcome) -> str:
@@ -32,7 +33,7 @@ def explain(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'no_gap':
         return 'The model follows the recording within sensor noise and stamps, its numbers ' \
             'calibrated within their tolerance.'
-    if result.verdict == 'parameter':
+    if result.verdict == 'parameter' and result.unexplained_fraction < WORTH_A_WORD:
         return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
         missed = _sizes(result.signals, 'rmse_refit')
@@ -49,9 +50,10 @@ def explain(result: GapResult, outcome: Outcome) -> str:
     else:
         parts = _found(result, lambda name: True)
     text = ' '.join(parts) + f' With this {_shrink(result)}.'
-    if result.unexplained_fraction >= 0.2:
+    if result.unexplained_fraction >= WORTH_A_WORD:
         text += (f' {100 * result.unexplained_fraction:.0f} % of the squared gap remain '
-                 'unexplained.')
+                 'unexplained')
+        text += ', so this is a part of the answer only.' if result.verdict == 'partial' else '.'
     return text
 
 
