@@ -34,6 +34,7 @@ from pam_sim.gap.select.context import context_of
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verdict import fill, judge
+from pam_sim.gap.verify.harm import without_harm
 from pam_sim.gap.verify.materiality import is_material, moved
 from pam_sim.gap.verify.model import free_run_of, held_without
 from pam_sim.gap.verify.own_runs import OwnRuns
@@ -119,7 +120,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         lambda: time.perf_counter() > deadline, matters))
     progress(0.8)
     estimator.use = (FIT, SELECT)
-    base = estimator.fit_base()
+    # What a fit does not touch stays as calibrated now.
+    base = estimator.base = estimator.fit_base()
     final = estimator.polish(outcome.final) if outcome.final.hypothesis.names else base
 
     def validated(final: Fit) -> Validation:
@@ -140,6 +142,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
                               'again in the certify data, so it is not named.')
         outcome.named = [w for w in outcome.named if w.name != name]
         validation = validated(final)
+    outcome.named, final, validation, harms = without_harm(
+        outcome.named, estimator, base, final, validation, validated)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     fill(result, estimator, outcome, final, validation)
@@ -151,7 +155,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.traces = validation.traces()
     result.fingerprint = fingerprint(estimator, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
-    result.reason = explain(result, outcome)
+    result.reason = explain(result, outcome, harms)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
     progress(1.0)

@@ -21,6 +21,7 @@ from pam_sim.effects.registry import effects
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.result import Calibrated, GapResult, SignalGap
 from pam_sim.gap.select.search import Outcome
+from pam_sim.gap.verify.harm import Harm
 
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
@@ -28,8 +29,12 @@ LEAST_SHARE = 0.005
 WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 
-def explain(result: GapResult, outcome: Outcome) -> str:
-    """Return the reason of a verdict, two or three sentences."""
+def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = ()) -> str:
+    """Return the reason of a verdict, two or three sentences, and what is not added for harm."""
+    return _told(result, outcome) + ''.join(_harm(one) for one in harms)
+
+
+def _told(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'no_gap':
         return 'The model follows the recording within sensor noise and stamps, its numbers ' \
             'calibrated within their tolerance.'
@@ -98,6 +103,14 @@ def _shrink(result: GapResult) -> str:
                 verb = 'rises' if s.rmse_after > s.rmse_refit else 'falls'
                 parts.append(f'the gap in {name} {verb} from {before} to {after} {unit}')
     return join(parts) if parts else 'every signal stays within its noise floor'
+
+
+def _harm(harm: Harm) -> str:
+    factor, unit = READABLE[harm.signal]
+    before, after = (f'{value * factor:.3g}' for value in (harm.refit, harm.after))
+    they = 'it is' if len(harm.names) == 1 else 'they are'
+    return (f' {join(harm.names)} would raise the gap in {harm.signal} of the proof from {before} '
+            f'to {after} {unit}, so {they} not added.')
 
 
 def _sizes(signals: Mapping[str, SignalGap], name: str) -> str:

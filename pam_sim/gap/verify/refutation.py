@@ -20,7 +20,7 @@ Those of the other are larger by the difference of the two. As a name needs to e
 gap and no more, for no formulation is the muscle's own, a smaller difference says nothing.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 import math
 
@@ -66,7 +66,7 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
             kept.append(w)
             continue
         runs = {name: validation.run(found, whole) for name, found in fits.items()}
-        before = validation.run(_less(w.name, estimator, base, final), whole)
+        before = validation.run(less([w.name], estimator, base, final), whole)
         told = {name: validation.fall(before, run) for name, run in runs.items()}
         best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2)
         gone = {name for name in runs if name != best and _contradicted(
@@ -106,7 +106,7 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
 
     """
     criteria = estimator.criteria
-    fits = {w.name: _less(w.name, estimator, base, final) for w in named}
+    fits = {w.name: less([w.name], estimator, base, final) for w in named}
     runs = {name: validation.run(fit, whole) for name, fit in fits.items()}
     told = {name: validation.fall(run, validation.after) for name, run in runs.items()}
     # Beside a large effect whose form leaves more than that, a small one cannot be judged.
@@ -145,9 +145,9 @@ def _comparable(w: NamedEffect, estimator: Estimator, final: Fit) -> dict[str, F
             if r.name in w.names and set(r.found.hypothesis.names) - {r.name} == beside}
 
 
-def _less(name: str, estimator: Estimator, base: Fit, final: Fit) -> Fit:
-    """Return the fit without one name, its numbers refitted."""
+def less(names: Collection[str], estimator: Estimator, base: Fit, final: Fit) -> Fit:
+    """Return the final fit without some names, its numbers refitted; ``base`` without any."""
     h = final.hypothesis
-    bare = held_without(final, set(h.names) - {name})
-    left = Hypothesis(bare.hypothesis.effects, tuple(f for f in h.numbers if f != name))
+    bare = held_without(final, set(h.names) - set(names))
+    left = Hypothesis(bare.hypothesis.effects, tuple(f for f in h.numbers if f not in names))
     return estimator.fit(left, bare.theta, final) if left.names else base

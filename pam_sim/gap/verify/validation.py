@@ -175,6 +175,25 @@ class Validation:
                         for d in self.drift]
         return float(np.sqrt(np.mean(by_draw ** 2))) / apart ** 2 if apart > 0.0 else 0.0
 
+    def worse(self) -> list[str]:
+        """
+        Return the signals of which the final model leaves more than the calibrated one.
+
+        Beyond the error of the floor, and by more than noise, stamps and the start of this
+        recording may raise the squared errors.
+        """
+        found, criteria = [], self.estimator.criteria
+        for s, gap in self.signals().items():
+            between = (self.after[s] - self.refit[s])[self.part[s]]
+            by_draw = [2.0 * float(np.mean(d[s][self.part[s]] * between)) for d in self.drift]
+            doubt = math.hypot(float(np.sqrt(np.mean(np.square(by_draw)))), 2.0 * self.noise[
+                s] * float(np.sqrt(np.mean(between ** 2))) / math.sqrt(between.size))
+            rise = gap.rmse_after ** 2 - gap.rmse_refit ** 2
+            if (gap.rmse_after > criteria.floor_error * self.highest_floor[s]
+                    and rise > criteria.certain_sd * doubt):
+                found.append(s)
+        return found
+
     def left(self) -> float:
         """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
         return math.sqrt(sum(
