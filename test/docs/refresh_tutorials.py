@@ -26,7 +26,7 @@ import tempfile
 
 import nbformat
 import notebooks
-from test_tutorials import FIGURE, FOLDER, NOTEBOOKS, ROOT
+from test_tutorials import FIGURE, FOLDER, NOTEBOOKS, PAGES, ROOT
 import tutorial_pages
 
 
@@ -39,13 +39,12 @@ def refresh(name, folder):
             cell.metadata.pop('execution', None)        # times of the day
         nbformat.write(made, path)
         return
-    page = FOLDER / f'{name}.md'
-    tutorial_pages.walk(page, folder)
-    for figure in FIGURE.findall(page.read_text(encoding='utf-8')):
+    tutorial_pages.walk(FOLDER / f'{name}.md', folder)
+    for figure in FIGURE.findall(PAGES[name]):
         shutil.copy(folder / figure, ROOT / 'docs/figures/tutorials' / figure)
 
 
 if __name__ == '__main__':
-    for wanted in sys.argv[1:] or sorted({path.stem for path in FOLDER.iterdir()}):
+    for wanted in sys.argv[1:] or (*PAGES, *NOTEBOOKS):
         with tempfile.TemporaryDirectory() as place:
             refresh(wanted, Path(place))

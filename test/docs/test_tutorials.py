@@ -24,8 +24,10 @@ import tutorial_pages  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'docs' / 'tutorials'
-LIVE = ('tune_and_live', 'ros_stack', 'hardware')       # start nodes
-OFFLINE = sorted(path.stem for path in FOLDER.glob('*.md') if path.stem not in LIVE)
+PAGES = {path.stem: path.read_text(encoding='utf-8') for path in sorted(FOLDER.glob('*.md'))}
+STARTS_NODES = re.compile(r'^\$ pam (run|up|demo) ', re.M)
+LIVE = [name for name, text in PAGES.items() if STARTS_NODES.search(text)]
+OFFLINE = [name for name in PAGES if name not in LIVE]
 NOTEBOOKS = sorted(path.stem for path in FOLDER.glob('*.ipynb'))
 # A figure of a page: made by its commands under the name that the figure has in docs/figures.
 FIGURE = re.compile(r'\]\(\.\./figures/tutorials/([^)]+)\)')
@@ -36,15 +38,20 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 def follow(name, folder):
     """Follow a page; look whether its commands made its figures."""
-    page = FOLDER / f'{name}.md'
-    assert tutorial_pages.walk(page, folder) >= FEWEST_COMMANDS
-    for figure in FIGURE.findall(page.read_text(encoding='utf-8')):
+    assert tutorial_pages.walk(FOLDER / f'{name}.md', folder) >= FEWEST_COMMANDS
+    for figure in FIGURE.findall(PAGES[name]):
         assert (folder / figure).stat().st_size > 1000, figure
         assert (ROOT / 'docs/figures/tutorials' / figure).is_file(), figure
 
 
 @pytest.mark.parametrize('name', OFFLINE)
 def test_a_reader_gets_what_the_page_shows(name, tmp_path):
+    follow(name, tmp_path)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('name', LIVE)
+def test_a_reader_with_nodes_gets_what_the_page_shows(name, tmp_path):
     follow(name, tmp_path)
 
 
@@ -70,19 +77,69 @@ def test_a_changed_output_fails(tmp_path):
         tutorial_pages.walk(page, tmp_path)
 
 
+BEAT = """```{code-block} python
+:caption: beat.py
+
+import time
+print("begin", flush=True)
+try:
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("end")
+```
+"""
+
+
+def in_terminal(caption, text):
+    return f'```{{code-block}} console\n:caption: {caption}\n\n{text}\n```\n'
+
+
+def walk_text(text, folder):
+    page = folder / 'page.md'
+    page.write_text(BEAT + text, encoding='utf-8')
+    return tutorial_pages.walk(page, folder)
+
+
 def test_files_and_terminals_of_a_page(tmp_path):
-    page = tmp_path / 'page.md'
-    page.write_text(
-        '```{code-block} python\n:caption: beat.py\n\nimport time\nprint("begin", flush=True)\n'
-        'try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print("end")\n```\n'
-        '```{code-block} console\n:caption: Terminal 1\n\n$ python beat.py\nbegin\nend\n```\n'
-        '```console\n$ ls *.py\nbeat.py\n```\n', encoding='utf-8')
-    assert tutorial_pages.walk(page, tmp_path) == 2
+    text = (in_terminal('Terminal 1', '$ python beat.py\nbegin\nend')
+            + '```console\n$ ls *.py\nbeat.py\n```\n'
+            + in_terminal('Terminal 2', '$ python beat.py\nbegin')
+            + in_terminal('Terminal 2, after Ctrl-C', 'end')
+            + in_terminal('Terminal 2', '$ echo one; sleep 0.3; echo two\none')
+            + in_terminal('Terminal 2, at its end', 'two'))
+    assert walk_text(text, tmp_path) == 4
+    with pytest.raises(AssertionError, match='it prints:\nbegin\nend'):
+        walk_text(text.replace('Ctrl-C\n\nend', 'Ctrl-C\n\nbye'), tmp_path)
+
+
+@pytest.mark.parametrize('text, why', [
+    (in_terminal('Terminal 1', '$ echo one; exit 3\none')
+     + in_terminal('Terminal 1, at its end', ''), 'exit code 3'),
+    (in_terminal('Terminal 1', '$ trap "exit 3" INT; echo one; sleep 9 & wait\none'),
+     'exit code 3'),
+    (in_terminal('Terminal 1', '$ echo one\ntwo'), 'begins with:\ntwo\nit prints:\none'),
+    (in_terminal('Terminal 1', '$ echo one'), 'at least one line that it prints'),
+    (in_terminal('Terminal 1, after Ctrl-C', 'end'), 'no command runs in `Terminal 1`'),
+    (in_terminal('Terminal 1', '$ python beat.py\nbegin')
+     + in_terminal('Terminal 1, later', 'end'), 'allowed after the comma'),
+    (2 * in_terminal('Terminal 1', '$ python beat.py\nbegin'), 'still runs python beat.py'),
+], ids=['code', 'code after Ctrl-C', 'first line', 'no line', 'not begun', 'moment', 'busy'])
+def test_a_wrong_terminal_fails_with_a_sentence(text, why, tmp_path):
+    with pytest.raises(AssertionError, match=why):
+        walk_text(text, tmp_path)
+
+
+def test_a_failure_ends_the_other_terminals(tmp_path):
+    text = (in_terminal('Terminal 1', '$ trap "touch ended; exit" TERM; echo one; '
+                                      'while true; do sleep 0.1; done\none')
+            + '```console\n$ echo one\ntwo\n```\n')
+    with pytest.raises(AssertionError, match='the page shows:\ntwo'):
+        walk_text(text, tmp_path)
+    assert (tmp_path / 'ended').exists()
 
 
 def test_every_tutorial_stands_first_on_the_index():
     index = (ROOT / 'docs' / 'index.md').read_text(encoding='utf-8')
     tree = index.partition(':caption: Tutorials\n')[2].partition('```')[0].split()
-    assert set(tree) == {f'tutorials/{name}' for name in (*OFFLINE, *NOTEBOOKS, *LIVE)
-                         if any(FOLDER.glob(f'{name}.*'))}
+    assert sorted(tree) == sorted(f'tutorials/{name}' for name in (*PAGES, *NOTEBOOKS))
     assert index.index('tutorials/first_run') < index.index('guides/')

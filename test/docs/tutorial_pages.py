@@ -16,33 +16,32 @@
 Runs the tutorials as a reader would: their files are written, their commands are typed.
 
 In a page, a ``console`` block holds commands, each after ``$``, and what they print; ``...``
-stands for anything. A ``code-block`` with a caption is a file of that name. If the caption is
-``Terminal N``, the commands keep running beside the rest, in a terminal of their own.
+stands for anything. A ``code-block`` with a caption is a file of that name. Three captions
+are kept for terminals:
+
+``Terminal N``
+    The command keeps running beside the rest. The page goes on when the first line that it
+    shows is printed.
+``Terminal N, after Ctrl-C``
+    Ctrl-C ends the command of that terminal; the block shows what it prints then.
+``Terminal N, at its end``
+    The page waits until that command ends without help; the block shows what it prints then.
+
+Terminals that still run when the page is over get Ctrl-C.
 """
 
-import doctest
-import os
 from pathlib import Path
 import re
-import signal
-import subprocess
-import sys
-import time
 
 from sybil import Document, Region
 from sybil.parsers.markdown.lexers import FencedCodeBlockLexer
 from sybil.parsers.myst.lexers import DirectiveLexer
+from terminals import assert_printed, environment, Terminal
 
-LONGEST_S = 180.0
-_STOPS_WITHIN_S = 20.0
-_CHECKER = doctest.OutputChecker()
-_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+__all__ = ['assert_printed', 'commands_in', 'environment', 'walk', 'Walk']
 
-
-def environment():
-    """Return the variables of a terminal in which the package is installed."""
-    return {**os.environ, 'COLUMNS': '99', 'NO_COLOR': '1',
-            'PATH': f'{Path(sys.executable).parent}{os.pathsep}{os.environ["PATH"]}'}
+_AFTER = 'after Ctrl-C'
+_AT_END = 'at its end'
 
 
 class Walk:
@@ -51,8 +50,7 @@ class Walk:
     def __init__(self, folder):
         self.folder = Path(folder)
         self.commands = 0
-        self.env = environment()
-        self._beside = []
+        self._beside = {}
 
     def write(self, name, text):
         """Write a file of the page."""
@@ -61,53 +59,41 @@ class Walk:
     def type_in(self, commands):
         """Run each command to its end and compare what it prints."""
         for command, shown in commands:
-            self.commands += 1
-            done = subprocess.run(
-                ['bash', '-c', command], cwd=self.folder, env=self.env, text=True,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                timeout=LONGEST_S)
-            assert_printed(command, shown, done.stdout)
-            # 1 is a finding; a mistake of the user (2) must be shown in the page.
-            assert done.returncode in (0, 1) or (done.returncode == 2 and shown), done.stdout
+            self._open(command, shown).wait()
 
-    def keep_running(self, commands):
-        """Start commands in a terminal of their own; wait for the first line that is shown."""
-        (command, shown), = commands
-        self.commands += 1
-        log = (self.folder / f'.terminal_{len(self._beside)}').open('w+', encoding='utf-8')
-        process = subprocess.Popen(
-            ['bash', '-c', f'exec {command}'], cwd=self.folder, env=self.env, stdout=log,
-            stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
-        self._beside.append((process, command, shown, log))
-        ready = re.compile(re.escape(shown.splitlines()[0]).replace(r'\.\.\.', '.*'))
-        end_s = time.monotonic() + LONGEST_S
-        while not ready.search(Path(log.name).read_text(encoding='utf-8')):
-            assert process.poll() is None, Path(log.name).read_text(encoding='utf-8')
-            assert time.monotonic() < end_s, f'{command} does not say {shown}'
-            time.sleep(0.1)
+    def keep_running(self, name, commands):
+        """Start a command in a terminal of its own; wait for the first line that is shown."""
+        assert len(commands) == 1 and commands[0][1], (
+            f'`{name}` needs one command after `$ ` and at least one line that it prints')
+        assert name not in self._beside, f'`{name}` still runs {self._beside[name].command}'
+        self._beside[name] = self._open(*commands[0])
+        self._beside[name].wait_for_first_line()
 
-    def stop(self, check=True):
+    def end(self, name, moment, shown_then):
+        """End the command of a terminal, or wait for its end, as the caption says."""
+        assert moment in (_AFTER, _AT_END), (
+            f'caption `{name}, {moment}`: allowed after the comma: `{_AFTER}`, `{_AT_END}`')
+        assert name in self._beside, f'`{name}, {moment}`: no command runs in `{name}`'
+        terminal = self._beside.pop(name)
+        if moment == _AFTER:
+            terminal.interrupt(shown_then)
+        else:
+            terminal.shown = f'{terminal.shown}\n{shown_then}'.rstrip()
+            terminal.wait()
+
+    def finish(self):
         """Press Ctrl-C in every other terminal, the newest first; compare what was printed."""
-        for process, command, shown, log in reversed(self._beside):
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(_STOPS_WITHIN_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                raise
-            finally:
-                log.close()
-            if check:
-                text = Path(log.name).read_text(encoding='utf-8')
-                assert_printed(command, shown, text)
-        self._beside.clear()
+        while self._beside:
+            self._beside.popitem()[1].interrupt()
 
+    def abandon(self):
+        """End every other terminal after a failure, the newest first; compare nothing."""
+        while self._beside:
+            self._beside.popitem()[1].kill()
 
-def assert_printed(command, shown, printed):
-    """Fail, with both texts, unless a command printed what the page shows."""
-    if shown and not _CHECKER.check_output(shown + '\n', printed.rstrip() + '\n', _FLAGS):
-        raise AssertionError(f'$ {command}\nthe page shows:\n{shown}\nit prints:\n{printed}')
+    def _open(self, command, shown):
+        self.commands += 1
+        return Terminal(command, shown, self.folder, self.folder / f'.printed_{self.commands}')
 
 
 def commands_in(source):
@@ -132,10 +118,15 @@ def _captioned(document):
     for lexed in DirectiveLexer('code-block')(document):
         caption = lexed.lexemes['options'].get('caption', '')
         source = str(lexed.lexemes['source'])
-        if caption.startswith('Terminal '):
-            yield Region(lexed.start, lexed.end, commands_in(source), _evaluate_terminal)
-        elif caption:
-            yield Region(lexed.start, lexed.end, (caption, source), _evaluate_file)
+        name, comma, moment = caption.partition(', ')
+        if not caption.startswith('Terminal '):
+            parsed, evaluate = (caption, source), _evaluate_file
+        elif comma:
+            parsed, evaluate = (name, moment, source.strip()), _evaluate_end
+        else:
+            parsed, evaluate = (name, commands_in(source)), _evaluate_terminal
+        if caption:
+            yield Region(lexed.start, lexed.end, parsed, evaluate)
 
 
 def _evaluate_commands(example):
@@ -143,7 +134,11 @@ def _evaluate_commands(example):
 
 
 def _evaluate_terminal(example):
-    example.namespace['walk'].keep_running(example.parsed)
+    example.namespace['walk'].keep_running(*example.parsed)
+
+
+def _evaluate_end(example):
+    example.namespace['walk'].end(*example.parsed)
 
 
 def _evaluate_file(example):
@@ -158,8 +153,7 @@ def walk(page, folder):
     try:
         for example in document.examples():
             example.evaluate()
-    except BaseException:
-        reader.stop(check=False)
-        raise
-    reader.stop()
+        reader.finish()
+    finally:
+        reader.abandon()
     return reader.commands
