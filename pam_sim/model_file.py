@@ -28,6 +28,7 @@ from pam_sim.parameters import check_parameters
 from pam_sim.rig import EffectSetting, Rig
 from pam_sim.rig_parameters import rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.tolerance import read_tolerance
 from pam_sim.valve import hsv
 
 KEYS = (
@@ -46,8 +47,9 @@ KEYS = (
         'pulse.', otherwise='that of `rig`, else averaged', choices=hsv.FIDELITIES),
     Key('parameters', dict, 'Numbers of muscle, load and valves that differ from the nominal '
         'ones.', otherwise='nominal'),
-    Key('tolerance', dict, 'Relative standard deviation with which a number of `parameters` is '
-        'known; 0 is exactly. `pam gap` adjusts a number within it.',
+    Key('tolerance', dict, 'How well a number of `parameters` is known: its relative standard '
+        'deviation, 0 for exactly; `{sd: ...}`, the same in the unit of the number; or '
+        '`unknown`, anywhere in its range. `pam gap` adjusts a number within it.',
         otherwise='that of the parameter', lower=0.0, upper=1.0),
     Key('effects', list, 'Effects added to the nominal physics, each a mapping.',
         otherwise='those of `rig`'),
@@ -136,8 +138,9 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
     tolerance = dict(base.tolerance)
     stated = data.get('tolerance', dict) if data.get('tolerance') is not None else Located({})
     stated.check_keys([parameter.name for parameter in known], 'parameter')
-    for key in stated:
-        tolerance[key] = stated.require(key, float, lower=0.0, upper=1.0)
+    for parameter in known:
+        if parameter.name in stated:
+            tolerance[parameter.name] = read_tolerance(stated, parameter)
     sensors = data.get('sensors', dict) if data.get('sensors') is not None else {}
     check_parameters(SENSOR_PARAMETERS, sensors, 'sensor setting')
     return Rig(

@@ -29,6 +29,7 @@ from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig_parameters import rig_parameters, VALVES
 from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.tolerance import prior_sd, Tolerance, tolerances, UNKNOWN
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 from pam_sim.valve import hsv, ppr
 
@@ -94,7 +95,8 @@ class Rig:
     sensors : dict
         Sensor settings, name -> value (see :class:`pam_sim.sensors.SensorChain`).
     tolerance : dict
-        Parameter name -> relative standard deviation.
+        Parameter name -> how well it is known: a relative standard deviation, an
+        ``AbsoluteSd``, or ``UNKNOWN`` (infinite).
     muscle : Muscle or str
         Dimensions and force law, or the name of a muscle; ``dmsp_5_300`` by default.
 
@@ -107,7 +109,7 @@ class Rig:
     parameters: dict[str, float] = field(default_factory=dict)
     effects: list[EffectSetting] = field(default_factory=list)
     sensors: dict[str, float] = field(default_factory=dict)
-    tolerance: dict[str, float] = field(default_factory=dict)
+    tolerance: dict[str, Tolerance] = field(default_factory=dict)
     muscle: Muscle = field(default_factory=lambda: get_muscle('dmsp_5_300'))
 
     def __post_init__(self) -> None:
@@ -124,8 +126,6 @@ class Rig:
             raise InputError(
                 f'`contraction_m` is {self.parameters["contraction_m"]:g}; allowed 0 to '
                 f'{self.muscle.stroke_m:g} m with muscle {self.muscle.name}', 'parameters')
-        tolerance = {parameter.name: parameter.tolerance for parameter in known}
-        tolerance.update(self.tolerance)
         settings: dict[str, EffectSetting] = {}
         for item in self.effects:
             setting = EffectSetting.of(item)
@@ -135,7 +135,7 @@ class Rig:
         checked: dict[str, object] = {
             'parameters': check_parameters(known, self.parameters),
             'sensors': check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting'),
-            'tolerance': tolerance, 'effects': list(settings.values())}
+            'tolerance': tolerances(known, self.tolerance), 'effects': list(settings.values())}
         for name, ready in checked.items():
             object.__setattr__(self, name, ready)
 
@@ -143,6 +143,20 @@ class Rig:
     def parameter_list(self) -> tuple[Parameter, ...]:
         """Parameter descriptions (unit, bounds, nominal, tolerance) of this rig."""
         return rig_parameters(self.load)
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Names of the parameters that are stated as unknown, in the order of model files."""
+        return tuple(name for name, known in self.tolerance.items() if known == UNKNOWN)
+
+    def prior_sd(self, name: str) -> float:
+        """
+        Return the standard deviation with which a parameter is known, in its unit.
+
+        That of an unknown one is half of its range, see :func:`pam_sim.tolerance.prior_sd`.
+        """
+        parameter = next(p for p in self.parameter_list if p.name == name)
+        return prior_sd(parameter, self.parameters[name], self.tolerance[name])
 
     @property
     def signal_names(self) -> tuple[str, ...]:
@@ -162,8 +176,8 @@ class Rig:
               effects: Sequence[EffectSetting | Mapping[str, Any] | str] | None = None,
               valve: str | None = None, fidelity: str | None = None, load: str | None = None,
               sensors: Mapping[str, float] | None = None, name: str | None = None,
-              muscle: Muscle | str | None = None,
-              law: LawChoice | str | None = None) -> 'Rig':
+              muscle: Muscle | str | None = None, law: LawChoice | str | None = None,
+              tolerance: Mapping[str, Tolerance] | None = None) -> 'Rig':
         """
         Return a changed copy.
 
@@ -181,6 +195,8 @@ class Rig:
             Another muscle.
         law : str or LawChoice, optional
             Another force law for the muscle; a name takes the law's first set.
+        tolerance : dict, optional
+            How well numbers are known, those to change.
 
         Raises
         ------
@@ -194,12 +210,13 @@ class Rig:
             chosen = chosen.with_law(law)
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
-        tolerance = {key: value for key, value in self.tolerance.items() if key in known}
+        tolerated = {key: value for key, value in self.tolerance.items() if key in known}
+        tolerated.update(tolerance or {})
         return replace(
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
             fidelity=fidelity or self.fidelity, parameters={**kept, **(parameters or {})},
             effects=self.effects if effects is None else [
-                EffectSetting.of(item) for item in effects], tolerance=tolerance,
+                EffectSetting.of(item) for item in effects], tolerance=tolerated,
             sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
 
     # -- statics ---------------------------------------------------------------------------

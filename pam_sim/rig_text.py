@@ -21,6 +21,7 @@ from pam_sim.located_yaml import dump_yaml
 from pam_sim.muscle.muscle import get_muscle
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.tolerance import plain_tolerance
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
@@ -58,7 +59,7 @@ def rig_to_yaml(rig: 'Rig') -> str:
     data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}
     changed = {p.name: rig.parameters[p.name] for p in known
                if rig.parameters[p.name] != p.default}
-    tolerance = {p.name: rig.tolerance[p.name] for p in known
+    tolerance = {p.name: plain_tolerance(rig.tolerance[p.name]) for p in known
                  if rig.tolerance[p.name] != p.tolerance}
     sensors = {p.name: rig.sensors[p.name] for p in SENSOR_PARAMETERS
                if rig.sensors[p.name] != p.default}

@@ -140,7 +140,7 @@ def _load(
     mass = None if rig is None else rig.parameters.get('mass_kg')
     if rig is None or mass is None:
         raise InputError('has no force and no rig with a mass; give the load with --load-n', path)
-    return mass * GRAVITY_M_PER_S2, rig.tolerance['mass_kg'] * mass * GRAVITY_M_PER_S2, 'rig'
+    return mass * GRAVITY_M_PER_S2, rig.prior_sd('mass_kg') * GRAVITY_M_PER_S2, 'rig'
 
 
 def by_load(loads: Sequence[FixedLoad]) -> list[FixedLoad]:

@@ -17,10 +17,13 @@
 from dataclasses import dataclass
 
 from pam_sim.rig import Rig
+from pam_sim.tolerance import UNKNOWN
 from pam_sim.valve import hsv, ppr
 
 LATENCY_PRIOR_S, LATENCY_SD_S, LATENCY_MAX_S = 1e-3, 1e-3, 3e-3
 SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
+STEP_SD = 0.05               # of slopes, in deviations of the prior
+STEP_OF_UNKNOWN = 0.01       # the same of the value, or of the deviation where that is 0
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,8 @@ class Known:
     """
     A number with a Gaussian prior; ``of_rig`` False for one of the measurement alone.
 
-    ``step`` is that of the slope, in deviations: a time needs whole steps of the grid.
+    ``step`` is that of the slope, in deviations: a time needs whole steps of the grid, and
+    a number that is ``unknown`` small ones, for its prior is as wide as its range.
     """
 
     name: str
@@ -38,17 +42,23 @@ class Known:
     lower: float
     upper: float
     of_rig: bool = True
-    step: float = 0.05
+    step: float = STEP_SD
+    unknown: bool = False
 
 
 def known_numbers(rig: Rig) -> list[Known]:
     """Return the numbers of a rig with a tolerance that act with its valve, as Known."""
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
-    return [Known(p.name, p.unit, rig.parameters[p.name],
-                  abs(rig.parameters[p.name]) * rig.tolerance[p.name], p.lower, p.upper)
-            for p in rig.parameter_list
-            if rig.tolerance[p.name] > 0.0 and rig.parameters[p.name] != 0.0
-            and p.name not in other]
+    found = []
+    for p in rig.parameter_list:
+        if p.name in other:
+            continue
+        value, sd = rig.parameters[p.name], rig.prior_sd(p.name)
+        if sd > 0.0:
+            unknown = rig.tolerance[p.name] == UNKNOWN
+            step = STEP_OF_UNKNOWN * (abs(value) / sd or 1.0) if unknown else STEP_SD
+            found.append(Known(p.name, p.unit, value, sd, p.lower, p.upper, True, step, unknown))
+    return found
 
 
 def of_run(name: str, index: int) -> str:
