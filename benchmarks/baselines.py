@@ -30,6 +30,7 @@ from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
 from pam_sim.files import write_text
 from pam_sim.located_yaml import dump_yaml
+import results_page
 
 RIG = 'dmsp_5_300_realistic'
 KINDS = {'pid_plain': 'PID', 'pid': 'PID + inverse, preview', 'lqi': 'LQI'}
@@ -76,16 +77,17 @@ segments:
 """)
 
 
-def show_errors(valve):
-    """Print the error of the last cycle per frequency."""
-    rig = load_rig(RIG, valve=valve)
-    loops = [ClosedLoop(rig, sine(frequency), seed=3) for frequency in FREQUENCIES_HZ]
-    print(f'\n### Baselines, {valve}: RMSE of cycle {CYCLES} [mm]\n')
-    print('| controller | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
-    print('|---|' + '---|' * len(FREQUENCIES_HZ))
-    for name, build in baselines():
-        errors = [1e3 * loop.run(build(rig)).cycle_rmse_m()[-1] for loop in loops]
-        print(f'| {name} | ' + ' | '.join(f'{error:.3f}' for error in errors) + ' |', flush=True)
+def show_errors(valves):
+    """Print the error of the last cycle [mm] per frequency."""
+    print('| controller | valve | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
+    print('|---|---|' + '---|' * len(FREQUENCIES_HZ))
+    for valve in valves:
+        rig = load_rig(RIG, valve=valve)
+        loops = [ClosedLoop(rig, sine(frequency), seed=3) for frequency in FREQUENCIES_HZ]
+        for name, build in baselines():
+            errors = [1e3 * loop.run(build(rig)).cycle_rmse_m()[-1] for loop in loops]
+            print(f'| {name} | {valve.upper()} | '
+                  + ' | '.join(f'{error:.3f}' for error in errors) + ' |', flush=True)
 
 
 def tune_presets(valve, jobs):
@@ -110,18 +112,26 @@ def tune_presets(valve, jobs):
         print(f'{path}: {result.text()}', flush=True)
 
 
-def main():
-    """Print the tables, or tune."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--tune', action='store_true', help='search the presets anew')
     parser.add_argument('--jobs', type=int, default=-1, help='threads; -1 = one a core')
-    args = parser.parse_args()
-    for valve in args.valve.split(','):
-        if args.tune:
+    results_page.add_write(parser, 'baselines')
+    return parser
+
+
+def main():
+    """Print the table, or tune."""
+    args = command_line().parse_args()
+    valves = args.valve.split(',')
+    if args.tune:
+        for valve in valves:
             tune_presets(valve, args.jobs)
-        else:
-            show_errors(valve)
+        return
+    with results_page.printed(args, __file__):
+        show_errors(valves)
 
 
 if __name__ == '__main__':

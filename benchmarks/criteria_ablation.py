@@ -38,8 +38,6 @@ import dataclasses
 import json
 import math
 from pathlib import Path
-import platform
-import subprocess
 import sys
 import time
 from unittest import mock
@@ -47,6 +45,7 @@ from unittest import mock
 from gap_memory import Memory, remembered
 from joblib import delayed, Parallel
 import numpy as np
+import results_page
 
 ROOT = Path(__file__).resolve().parent.parent
 # The generator and the scorer live beside their tests; runs from the source tree as it stands.
@@ -60,7 +59,6 @@ from pam_sim.gap.fit.solver import Solver  # noqa: E402
 from scoring_judge import is_right, read_answer  # noqa: E402
 import truth_cases  # noqa: E402
 
-RESULTS = ROOT / 'docs' / 'results' / 'criteria_ablation.md'
 CRITERION = {c.name: c for c in table()}
 NEAR, FACTOR = 1.2, 2.0
 NOTHING = '–'
@@ -309,7 +307,8 @@ def each(until, function, arguments, jobs):
     return all(Parallel(n_jobs=jobs)(delayed(begun)(one) for one in arguments))
 
 
-def main():
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--work', type=Path, required=True, help='answers are kept here')
     parser.add_argument('--recorded', type=int, default=165, help='cases that are recorded')
@@ -317,10 +316,16 @@ def main():
     parser.add_argument('--seed', type=int, default=2026, help='of the cases')
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--minutes', type=float, default=math.inf)
-    parser.add_argument('--write', action='store_true', help=f'write {RESULTS.name}')
     parser.add_argument('--check', type=int, default=0, metavar='CASES',
                         help='compare so many of them with and without memory, no more')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'criteria_ablation')
+    return parser
+
+
+def main():
+    """Ask what is left to ask, print the table; return the exit code."""
+    args = command_line().parse_args()
+    results_page.check(args, __file__)
     until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.recorded, args.seed)
     done = each(until, record, [(c, args.work) for c in cases], args.jobs)
@@ -334,10 +339,8 @@ def main():
         return 0
     for ask in (ask_groups, ask_single):
         done = done and each(until, ask, [(folder,) for folder in chosen], args.jobs)
-    text = report(args, logs, chosen)
-    print(text)
-    if args.write:
-        RESULTS.write_text(text, encoding='utf-8')
+    with results_page.printed(args, __file__):
+        print(report(logs, chosen))
     return 0 if done else UNFINISHED
 
 
@@ -372,25 +375,13 @@ def cells(asked, moved, before, now):
         f'{moved} of {asked}', f'{before} → {now}' if moved else NOTHING)
 
 
-def report(args, logs, chosen):
-    """Return the table as a page."""
-    commit = subprocess.run(['git', 'rev-parse', '--short', 'HEAD'], cwd=ROOT, text=True,
-                            capture_output=True, check=False).stdout.strip()
+def report(logs, chosen):
+    """Return the table and what it counts."""
     right = sum(read(folder / 'usual.json')['answer']['right'] for folder in chosen)
     rows = rows_of(logs, chosen)
     lines = [
-        '# Ablation of the decision thresholds', '',
-        f'`python benchmarks/criteria_ablation.py --work ablation '
-        f'--recorded {args.recorded} --number {args.number} --seed {args.seed}` '
-        f'on {time.strftime("%Y-%m-%d")}, '
-        f'{platform.machine()}, commit {commit}. {len(CRITERION)} thresholds; {len(logs)} cases '
-        f'recorded, the {len(chosen)} nearest to a decision asked again, {right} of them right '
-        'as they are.', '',
-        'Compared and within two times: cases out of all recorded. Changed: answers that differ '
-        'in verdict, names or set, out of the cases asked. Right: of the changed answers, how '
-        'many were right before and are right now. A threshold is asked by itself only where '
-        'its group changed the answer in that direction, and where it came within two times of '
-        'a decision. A dash: nothing to ask, or nothing changed.', '']
+        f'{len(CRITERION)} thresholds; {len(logs)} cases recorded, the {len(chosen)} nearest to '
+        f'a decision asked again, {right} of them right as they are.', '']
     lines += ['| ' + ' | '.join(map(str, row)) + ' |' for row in rows]
     lines.insert(-len(rows) + 1, '|' + '---|' * len(rows[0]))
     return '\n'.join([*lines, ''])

@@ -41,11 +41,13 @@ from pam_actuation.bags.recover import recover_bag
 from pam_actuation.drivers.safety import SafetyLimits
 from pam_actuation.rigging.transitions import termination_as_interrupt
 from pam_sim.errors import InputError
+import results_page
 from tqdm import tqdm
 
 LIMIT_PA = SafetyLimits().max_pressure_gauge_pa
 ALLOWED_PA = 1.02 * LIMIT_PA
 ALLOWED_S = 0.3
+ALL = 'all'                   # of the trials, in a cell of the table
 LOST_S = 1.0                 # of a recording, when its recorder is killed
 RESTART_S = 60.0             # a busy machine starts a node in many seconds
 START_S = 120.0
@@ -331,7 +333,8 @@ def table(outcomes, valve):
         late = [one['detection_to_safe_s'] for one in rows
                 if one['detection_to_safe_s'] is not None]
         counts = [_count(rows, name) for name in ('told', 'recorded', 'restarted')]
-        done = f' ({_count(rows, "safe_ok")})' if case.safe else ''
+        done = _count(rows, 'safe_ok')
+        done = f' ({done})' if case.safe and done != ALL else ''
         lines.append(
             f'| {case.title} | {len(rows)} | {what[case.safe]}{done} | '
             + (f'{statistics.median(delays) * 1e3:.0f} / {max(delays) * 1e3:.0f} ms'
@@ -345,16 +348,23 @@ def table(outcomes, valve):
 def _count(rows, name):
     """Return how many of the rows have a property, '–' where it does not apply."""
     values = [one[name] for one in rows if one[name] is not None]
+    if values and all(values):
+        return ALL
     return f'{sum(values)} of {len(values)}' if values else '–'
+
+
+def command_line():
+    """Return the parser of the command line."""
+    return series_parser(CASES, 'fault_table.jsonl', __doc__, 'faults')
 
 
 def main():
     """Play, print the table; exit code 1 if anything was not as it must be."""
-    return run_series(Series, table, CASES, 'fault_table.jsonl', __doc__)
+    return run_series(command_line(), __file__, Series, table)
 
 
-def run_series(series_class, table_of, keys, out, description, times=3, is_good=good):
-    """Play what the command line asks for, print the table; return the exit code."""
+def series_parser(keys, out, description, page, times=3):
+    """Return the parser of a series of faults whose table is on a page of docs/results."""
     parser = argparse.ArgumentParser(description=description.split('\n')[1])
     parser.add_argument('--times', type=int, default=times, help='how often each fault strikes')
     parser.add_argument('--valve', choices=('ppr', 'hsv'), default='hsv')
@@ -362,16 +372,29 @@ def run_series(series_class, table_of, keys, out, description, times=3, is_good=
     parser.add_argument('--out', default=out, help='one line per fault')
     parser.add_argument('--only', nargs='*', choices=keys, help='these faults only')
     parser.add_argument('--print', action='store_true', help='only print what there is')
+    results_page.add_write(parser, page)
+    return parser
+
+
+def run_series(parser, program, series_class, table_of, is_good=good):
+    """Play what the command line asks for, print the table; return the exit code."""
     arguments = parser.parse_args()
-    if arguments.print:
-        outcomes = read_outcomes(Path(arguments.out))
-    else:
-        series = series_class(arguments)
-        with termination_as_interrupt():
-            series.run()
-        outcomes = series.outcomes
-    outcomes = [one for one in outcomes if one['valve'] == arguments.valve]
-    print(table_of(outcomes, arguments.valve))
+    if arguments.print and arguments.write:
+        parser.error('--write needs a run of its own; --print shows an earlier one')
+    valve = arguments.valve
+    with results_page.printed(arguments, program, valve):
+        if arguments.print:
+            outcomes = read_outcomes(Path(arguments.out))
+        else:
+            series = series_class(arguments)
+            before = sum(one['valve'] == valve for one in series.outcomes)
+            with termination_as_interrupt():
+                series.run()
+            outcomes = series.outcomes
+            if before:
+                print(f'{before} outcomes are of earlier runs with the same `--out`.\n')
+        outcomes = [one for one in outcomes if one['valve'] == valve]
+        print(table_of(outcomes, valve))
     bad = [one for one in outcomes if not is_good(one)]
     for one in bad:
         print(f'not as it must be: {json.dumps(one)}', file=sys.stderr)

@@ -44,6 +44,7 @@ from pam_actuation.tuning.force_loop import ForceLoop
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
 from pam_sim.joint import load_joint
+import results_page
 
 HELD_M = 0.010
 HELD_LIMB = {'limb_mass_kg': 0.0, 'inertia_kg_m2': 100.0}
@@ -112,21 +113,33 @@ def rows(seeds):
                    'worst_of_last_five': float(cycles[:, -5:].max())}
 
 
-def main():
-    """Print the table; return 1 if a limit is not met."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument('--seeds', type=int, nargs='+', default=[0, 1, 2])
     parser.add_argument('--json', action='store_true', help='print the result as JSON')
-    args = parser.parse_args()
-    found = list(rows(args.seeds))
+    results_page.add_write(parser, 'force_and_joint')
+    return parser
+
+
+def show(found):
+    """Print the rows as a table."""
+    print('| controlled | valve | unit | first cycle | last | worst of the last five | limit |')
+    print('|---|---|---|---|---|---|---|')
+    for row in found:
+        print(f'| {row["case"]} | {row["valve"].upper()} | {row["unit"]} | {row["first"]:.3f} '
+              f'| {row["last"]:.3f} | {row["worst_of_last_five"]:.3f} | {row["limit"]:g} |')
+
+
+def main():
+    """Print the table; return 1 if a limit is not met."""
+    args = command_line().parse_args()
     if args.json:
+        found = list(rows(args.seeds))
         print(json.dumps({'seeds': args.seeds, 'rows': found}, indent=2))
     else:
-        print(f'RMSE per cycle, 0.5 Hz, worst of the seeds {args.seeds}')
-        print(f'{"":18} {"valve":5} {"first":>8} {"last":>8} {"worst of last 5":>16} {"limit":>6}')
-        for row in found:
-            print(f'{row["case"]:18} {row["valve"]:5} {row["first"]:8.3f} {row["last"]:8.3f} '
-                  f'{row["worst_of_last_five"]:16.3f} {row["limit"]:6.2f} {row["unit"]}')
+        with results_page.printed(args, __file__):
+            show(found := list(rows(args.seeds)))
     return int(any(row['last'] > row['limit'] for row in found))
 
 

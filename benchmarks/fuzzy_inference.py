@@ -34,7 +34,6 @@ functions on arrays that were made before, for the same surface.
 """
 
 import argparse
-import platform
 import sys
 import time
 
@@ -48,6 +47,7 @@ from pam_actuation.control.sofc.records import OUTPUT
 from pam_actuation.control.sofc.rule_table import infer_feedback
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim import load_rig
+import results_page
 
 PEAKS = np.linspace(-1.0, 1.0, SET_COUNT)
 FASTER_BAR, EQUAL_BAR, STEP_BAR_S = 1000.0, 1e-6, 10e-6
@@ -308,13 +308,25 @@ def step_times(preset):
     return max(best, float(np.median(spent)))
 
 
-def main():
-    """Print what is compared; return the exit code."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument(
         '--count', type=int, default=100, help='inferences of scikit-fuzzy in a round')
-    args = parser.parse_args()
-    print(f'{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}\n')
+    results_page.add_write(parser, 'rule_inference')
+    return parser
+
+
+def main():
+    """Print what is compared; return the exit code."""
+    args = command_line().parse_args()
+    print(f'{results_page.machine()}\n')
+    with results_page.printed(args, __file__):
+        return compare(args.count)
+
+
+def compare(count):
+    """Print the tables; return the exit code."""
     print('| whole step: inference, limits, learning | median | 99.9 % | longest | learned in |\n'
           '|---|---|---|---|---|')
     slowest = max(step_times(preset) for preset in ('sofc_ppr', 'sofc_hsv'))
@@ -326,7 +338,7 @@ def main():
               'pip install scikit-fuzzy networkx')
         return _end(missed)
     print()
-    faster = compare_speed(rules(), args.count)
+    faster = compare_speed(rules(), count)
     if faster < FASTER_BAR:
         missed.append(f'only {faster:.0f} times faster')
     print('\n| largest difference | degree of a set | strength of a rule | output |\n'

@@ -44,7 +44,8 @@ from pam_sim.rig import Rig
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'test' / 'hidden'))
 
-import truth_commands  # noqa: E402, I100
+import results_page  # noqa: E402, I100
+import truth_commands  # noqa: E402
 import truth_effects  # noqa: E402
 import truth_live  # noqa: E402
 import truth_run  # noqa: E402
@@ -135,12 +136,24 @@ def error_mm(path, model, rig, learning, folder):
     return float(np.sqrt(np.mean(squares)))
 
 
-def main():
-    """Print one line per case and controller."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--cases', default=','.join(CASES))
     parser.add_argument('--rollouts', type=int, default=1000)
-    args = parser.parse_args()
+    results_page.add_write(parser, 'gap_to_tuning')
+    return parser
+
+
+def main():
+    """Tune and compare."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        show(args)
+
+
+def show(args):
+    """Print one line per case and controller."""
     nominal = load_rig(MODEL)
     print('| hidden | pam gap says | controller | rules | tuned on nominal [mm] '
           '| tuned on model.yaml [mm] | change |\n|---|---|---|---|---|---|---|')

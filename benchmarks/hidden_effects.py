@@ -46,6 +46,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
 from asking import pam_gap  # noqa: E402, I100
+from pam_sim.files import write_text  # noqa: E402
+import results_page  # noqa: E402
 from scoring_table import scored, table  # noqa: E402
 from scoring_text import report  # noqa: E402
 import truth_cases  # noqa: E402
@@ -62,7 +64,8 @@ class OutOfMinutes(Exception):
     """The time for this piece of the examination is over."""
 
 
-def main():
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--number', type=int, default=330, help='cases (default: 330)')
     parser.add_argument('--seed', type=int, default=2026, help='of the examination')
@@ -81,7 +84,14 @@ def main():
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='with --work: begin no case after N minutes; start again to go on')
     parser.add_argument('--out', type=Path, help='write the report here as well')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'hidden_effects')
+    return parser
+
+
+def main():
+    """Examine; return the exit code."""
+    args = command_line().parse_args()
+    results_page.check(args, __file__)
     args.together = args.together or args.jobs
     args.until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.number, args.seed)
@@ -136,9 +146,10 @@ def examine(cases, work, args):
         f'{os.cpu_count()} cores ({platform.machine()}), '
         f'{sum(a["wall_s"] for a in answers.values()) / 60.0:.0f} min of answers.', '',
         report(found, FAMILIES, others), ''])
-    print(text)
+    with results_page.printed(args, __file__):
+        print(text)
     if args.out:
-        args.out.write_text(text, encoding='utf-8')
+        write_text(args.out, text)
     return int(any(row.met is False for row in table(found, FAMILIES)))
 
 

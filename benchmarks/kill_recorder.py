@@ -45,6 +45,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import ControllerState, Pressure
 from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import RECORDED
+import results_page
 from rosbags.rosbag2 import Reader
 
 FEED_PERIOD_S = 0.01
@@ -296,17 +297,38 @@ def summary(results):
         'problems': [problem for result in results for problem in result['problems']]}
 
 
-def main():
-    """Kill, repair, count; exit code 1 if any bag is not as it must be."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--kills', type=int, default=160)
     parser.add_argument('--nodes', type=int, default=40)
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--parallel', type=int, default=4)
     parser.add_argument('--publish', default='', help=argparse.SUPPRESS)
-    args = parser.parse_args()
+    results_page.add_write(parser, 'recording')
+    return parser
+
+
+def show(found):
+    """Print the figures as a table."""
+    print('| SIGKILL of | kills | before the first chunk | messages | bags not as they must be '
+          '| missing before the kill, median / worst |\n|---|---|---|---|---|---|')
+    for name, one in found.items():
+        print(f'| {name} | {one["kills"]} | {one["before_first_chunk"]} | {one["messages"]} '
+              f'| {one["bad_bags"]} | {one["missing_median_s"]} / {one["missing_worst_s"]} s |')
+
+
+def main():
+    """Kill, repair, count; exit code 1 if any bag is not as it must be."""
+    args = command_line().parse_args()
     if args.publish:
         return publish(args.publish)
+    with results_page.printed(args, __file__):
+        return run(args)
+
+
+def run(args):
+    """Kill, repair, print the table; return the exit code."""
     rng = random.Random(args.seed)
     found = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -315,7 +337,8 @@ def main():
         found['processes'] = summary([examine(case) for case in cases])
         cases = list(kill_nodes(folder, args.nodes, rng)) if args.nodes else []
         found['nodes'] = summary([examine(case, NODE_RATES_HZ) for case in cases])
-    print(json.dumps(found, indent=2))
+    print(json.dumps(found, indent=2), file=sys.stderr)
+    show(found)
     return 1 if any(part['bad_bags'] for part in found.values()) else 0
 
 

@@ -35,6 +35,7 @@ import argparse
 from dataclasses import dataclass
 from itertools import combinations
 import os
+import sys
 import tempfile
 
 import numpy as np
@@ -47,6 +48,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.rigging.session import run_experiment
 from pam_sim import load_rig
 from pam_sim.located_yaml import dump_yaml
+import results_page
 
 SIGNALS = {'pressure': ('pressure_pa', 'kPa', 1e-3), 'contraction': ('contraction_m', 'mm', 1e3),
            'force': ('force_n', 'N', 1.0)}
@@ -121,7 +123,7 @@ def timing_ms(ticks, name):
 
 
 def compare(name, valve, seconds, folder, domain_id):
-    """Run one experiment live and simulated; return the lines of the tables."""
+    """Run one experiment live and simulated; return (row, timing of its loops, transport)."""
     experiment = load_experiment(name)
     if seconds and seconds < experiment.duration_s:
         experiment = load_experiment(
@@ -151,7 +153,7 @@ def compare(name, valve, seconds, folder, domain_id):
     others = [simulated(f'other{seed}', rig, seed) for seed in OTHER_SEEDS]
     retimed = [simulated(f'retimed{seed}', rig, seed, ticks) for seed in OTHER_SEEDS]
     quiet_plain, quiet_retimed = simulated('q', quiet, 1), simulated('q_retimed', quiet, 1, ticks)
-    rows = []
+    cells = []
     for topic, (_, unit, _) in SIGNALS.items():
         def between(one, other):
             return rms_between(one, other, topic, experiment.duration_s)
@@ -160,19 +162,16 @@ def compare(name, valve, seconds, folder, domain_id):
         n = np.sqrt(np.mean(np.square([between(other, plain) for other in others])))
         r = np.median([between(live, one) for one in retimed])
         among = [between(*pair) for pair in combinations(retimed, 2)]
-        rows.append(
-            f'| {experiment.name} | {valve} | {experiment.duration_s:.0f} s | {topic} [{unit}] '
-            f'| {a:.3f} | {n:.3f} | {t:.3f} | {a / np.hypot(n, t):.2f} | {r:.3f} '
-            f'| {np.median(among):.3f}, {max(among):.3f} |')
-    shown = [f'| {experiment.name} | {valve} ']
-    for loop in TICKS:
-        shown.append('| – ' if loop not in ticks else '| {:.2f} ± {:.2f}, {:.1f} '.format(
-            *timing_ms(ticks, loop)))
-    return rows, ''.join(shown) + f'| {delay_ns * 1e-6:.2f} |'
+        cells.append(f' {a:.3f} ({a / np.hypot(n, t):.2f}); {r:.3f} '
+                     f'({np.median(among):.3f}–{max(among):.3f}) |')
+        print(f'{experiment.name} {valve}, {topic} [{unit}]: live - simulated {a:.3f}, noise '
+              f'{n:.3f}, timing {t:.3f}', file=sys.stderr, flush=True)
+    row = f'| `{experiment.name}` | {experiment.duration_s:.0f} s |{"".join(cells)}'
+    return row, {loop: timing_ms(ticks, loop) for loop in TICKS if loop in ticks}, delay_ns * 1e-6
 
 
-def main():
-    """Print both tables as Markdown."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--experiments', default=','.join(DEFAULT), help='names, by commas')
     parser.add_argument('--valve', default='ppr', choices=('ppr', 'hsv'))
@@ -180,22 +179,38 @@ def main():
     parser.add_argument('--domain-id', type=int, default=None, help='ROS domain')
     parser.add_argument('--keep', default=None, metavar='DIR',
                         help='keep the bags here; a live bag found there is not run again')
-    args = parser.parse_args()
-    timing = []
-    print('| experiment | valve | time | signal | live - sim | noise | timing | ratio '
-          '| live - re-timed | among re-timed |')
-    print('|---|---|---|---|---|---|---|---|---|---|')
+    results_page.add_write(parser, 'live_against_simulated')
+    return parser
+
+
+def main():
+    """Run and compare."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__, args.valve):
+        show(args)
+
+
+def show(args):
+    """Print both tables as Markdown."""
+    timings, delays_ms = [], []
+    print('| experiment | time |'
+          + ''.join(f' {topic} [{unit}] |' for topic, (_, unit, _) in SIGNALS.items()))
+    print('|---|---|---|---|---|')
     with tempfile.TemporaryDirectory() as temporary:
         for name in args.experiments.split(','):
-            rows, line = compare(
+            row, timing, delay_ms = compare(
                 name, args.valve, args.seconds, args.keep or temporary, args.domain_id)
-            print('\n'.join(rows), flush=True)
-            timing.append(line)
-    print('\nIntervals of the loops in the live run [ms], mean ± standard deviation, longest; '
-          'median transport:\n')
-    print('| experiment | valve | plant | reference | controller | driver | transport |')
-    print('|---|---|---|---|---|---|---|')
-    print('\n'.join(timing))
+            print(row, flush=True)
+            timings.append(timing)
+            delays_ms.append(delay_ms)
+    print('\n| loop | mean interval [ms] | standard deviation | longest |\n|---|---|---|---|')
+    for loop in TICKS:
+        of_loop = [timing[loop] for timing in timings if loop in timing]
+        if of_loop:
+            mean, spread, longest = zip(*of_loop)
+            print(f'| {loop} | {min(mean):.2f}–{max(mean):.2f} | {min(spread):.2f}–'
+                  f'{max(spread):.2f} | {max(longest):.1f} |')
+    print(f'\nMedian transport: {min(delays_ms):.2f}–{max(delays_ms):.2f} ms.')
 
 
 if __name__ == '__main__':

@@ -24,7 +24,6 @@ temporary folder (about 0.6 GB for the hour) and removed.
 import argparse
 import json
 from pathlib import Path
-import platform
 import subprocess
 import sys
 import tempfile
@@ -35,6 +34,7 @@ import numpy as np
 from pam_actuation.bags.load import load_run, read_series
 from pam_actuation.bags.source import read_bag
 from pam_actuation.topics import definitions
+import results_page
 from rosbags.highlevel import AnyReader
 
 STREAMS = {
@@ -134,20 +134,28 @@ def print_hour(folder, minutes):
     if set(counts.values()) != {60_000 * minutes} or remarks:
         raise SystemExit(f'not what was written: {counts} {remarks}')
     count = sum(counts.values())
-    print(f'| {minutes} minutes, five topics at 1 kHz | {count:,} messages in '
-          f'{path.stat().st_size / 1e9:.2f} GB | {seconds:.1f} s ({cpu_s:.1f} s of one core) | '
-          f'{count / seconds:,.0f} messages/s | {peak / 2**30:.2f} GiB peak |')
+    print('| five topics at 1 kHz | messages | file | by the clock | time of one core '
+          '| messages/s | peak memory |\n|---|---|---|---|---|---|---|')
+    print(f'| {minutes} minutes | {count:,} | {path.stat().st_size / 1e9:.2f} GB '
+          f'| {seconds:.1f} s | {cpu_s:.1f} s | {count / seconds:,.0f} '
+          f'| {peak / 2**30:.2f} GiB |')
 
 
-def main():
-    """Print both tables."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--seconds', type=int, default=60, help='length of the streams')
     parser.add_argument('--minutes', type=int, default=60, help='length of the long bag')
     parser.add_argument('--repeats', type=int, default=3)
-    args = parser.parse_args()
-    print(f'{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}\n')
-    with tempfile.TemporaryDirectory() as folder:
+    results_page.add_write(parser, 'loading')
+    return parser
+
+
+def main():
+    """Print both tables."""
+    args = command_line().parse_args()
+    print(f'{results_page.machine()}\n')
+    with tempfile.TemporaryDirectory() as folder, results_page.printed(args, __file__):
         print_streams(Path(folder), args.seconds, args.repeats)
         print()
         print_hour(Path(folder), args.minutes)

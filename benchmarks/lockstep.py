@@ -40,6 +40,7 @@ from pam_actuation.rigging.client import NAME, RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.topics.table import OF_A_RUN
+import results_page
 from std_srvs.srv import SetBool
 
 CONTROLLER = 'sofc_controller'
@@ -183,8 +184,8 @@ def sent(client):
             for key, count in values.items() if key.startswith(prefix) and int(count) > 0}
 
 
-def main(args=None):
-    """Run the benchmark; return its exit code."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--simulated-seconds', type=float, default=20.0)
     parser.add_argument('--runs', type=int, default=2)
@@ -193,20 +194,35 @@ def main(args=None):
     parser.add_argument('--experiment', default='sine_half_hz')
     parser.add_argument('--silent', action='store_true', help='listen to no topic')
     parser.add_argument('--json', action='store_true')
-    arguments = parser.parse_args(args)
+    results_page.add_write(parser, 'loop_timing')
+    return parser
+
+
+def main(args=None):
+    """Run the benchmark; return its exit code."""
+    arguments = command_line().parse_args(args)
+    with results_page.printed(arguments, __file__, arguments.valve):
+        return show(arguments)
+
+
+def show(arguments):
+    """Run, print speed and digests; return the exit code."""
     runs = [run_once(arguments) for _ in range(arguments.runs)]
     same = all(digests == runs[0][1] for _, digests in runs)
     if arguments.json:
         print(json.dumps({'rates': [rate for rate, _ in runs], 'same': same,
                           'topics': [digests for _, digests in runs]}))
         return 0 if same else 1
+    print('| run | simulated seconds per second | messages | topics as in the first run |')
+    print('|---|---|---|---|')
     for number, (rate, digests) in enumerate(runs, 1):
-        print(f'run {number}: {rate:.2f} simulated seconds per second')
-        for topic, (count, digest) in digests.items():
-            equal = 'same' if runs[0][1].get(topic) == (count, digest) else 'DIFFERENT'
-            print(f'  {topic:22s} {count:6d} messages  {digest}  {equal}')
+        count = sum(messages for messages, _ in digests.values())
+        equal = sum(runs[0][1].get(topic) == one for topic, one in digests.items())
+        print(f'| {number} | {rate:.2f} | {count} | {equal} of {len(digests)} |')
+        for topic, (messages, digest) in digests.items():
+            print(f'run {number}: {topic:22s} {messages:6d} messages  {digest}', file=sys.stderr)
     if not arguments.silent:
-        print('all runs are the same to the byte' if same else 'the runs differ')
+        print('\nAll runs are the same to the byte.' if same else '\nThe runs differ.')
     return 0 if same else 1
 
 

@@ -48,6 +48,7 @@ from pam_actuation.rigging.plan import make_plan, PLANT
 from pam_actuation.rigging.processes import end_with_parent, node_environment
 from pam_actuation.transport import unprepared
 from recording_load import CONTROLLER_HZ, experiment_text, fast_controller, PLANT_HZ
+import results_page
 
 ALLOWED_MISSED = 0.001
 ALLOWED_RATIO = 2.0
@@ -195,17 +196,24 @@ def judge(found):
     return good
 
 
-def main():
-    """Measure and judge."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--echo', choices=('talker', 'listener', BARE), help=argparse.SUPPRESS)
-    args = parser.parse_args()
+    results_page.add_write(parser, 'loop_timing')
+    return parser
+
+
+def main():
+    """Measure and judge."""
+    args = command_line().parse_args()
     if args.echo:
         return bare_loop() if args.echo == BARE else echo(args.echo)
-    with tempfile.TemporaryDirectory() as folder:
-        found = measure(args.seconds, folder)
-    return 0 if judge(found) else 1
+    with results_page.printed(args, __file__):
+        with tempfile.TemporaryDirectory() as folder:
+            found = measure(args.seconds, folder)
+        return 0 if judge(found) else 1
 
 
 if __name__ == '__main__':

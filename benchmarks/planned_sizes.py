@@ -32,6 +32,7 @@ from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.plan.outlook import outlooks
 from pam_sim.gap.plan.sensitivity import sized
+import results_page
 
 MODEL, PROTOCOL = 'dmsp_5_300_hanging_mass', 'pressure_identification'
 
@@ -42,14 +43,26 @@ def at_size(looks, outlook, times):
         sized(looks.probes[outlook.name], times * outlook.factors[1]))
 
 
-def main():
-    """Print one line per effect."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--effects', default=None)
     parser.add_argument('--times', default='0.5,1.5')
     parser.add_argument('--valve', default='ppr')
     parser.add_argument('--seconds', type=float, default=600.0, help='budget of each look')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'planned_sizes')
+    return parser
+
+
+def main():
+    """Look for every effect."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        show(args)
+
+
+def show(args):
+    """Print one line per effect."""
     rig = load_rig(MODEL, valve=args.valve)
     noisy = sensors_for(rig)[1]
     plain = load_experiment(PROTOCOL).to_dict()

@@ -41,6 +41,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import results_page
 
 MODEL = """
 muscle: {{like: dmsp_10_250, law: {{name: sarosi, set: dmsp_10}}}}
@@ -156,35 +157,49 @@ def injected(rig, run, name, parameter, size):
     return Run(topics, run.metadata, run.namespace, run.path)
 
 
-def main():
-    """Print what was found on the loop, on the steps, and of what was injected."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('folder')
     parser.add_argument('--seconds', type=float, default=600.0, help='budget of each look')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'real_records')
+    return parser
+
+
+def main():
+    """Look at the loop, at the steps, and for what was injected."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        show(args)
+
+
+def show(args):
+    """Print what was found, and of what was injected."""
     loop = read_table(args.folder, 'quasi_static_loop.csv')
     steps = read_table(args.folder, 'steps_100hz.csv')
     zero, slope = calibrated(loop)
     rig, off = model_of(loop, zero)
-    print(f'zero of the pressure {zero:.3f} bar, regulator {slope:.4f} bar/V; mass '
+    print(f'Zero of the pressure {zero:.3f} bar, regulator {slope:.4f} bar/V; mass '
           f'{rig.parameters["mass_kg"]:.2f} kg, spring '
-          f'{rig.effects[0].parameters["stiffness_n_per_m"]:.0f} N/m, balance off by {off:.1f} N')
+          f'{rig.effects[0].parameters["stiffness_n_per_m"]:.0f} N/m, balance off by '
+          f'{off:.1f} N.\n')
     first, second = (cycle(loop, k, zero, slope, seed=k) for k in (1, 2))
     stepped = step_run(steps, zero, slope)
     found = find_gap(first, rig, second, MUSCLE_NAMES, args.seconds)
-    print('loop, first cycle, judged on the second:', told(found), flush=True)
+    print('| looked at | answer |\n|---|---|')
+    print('| loop, first cycle, judged on the second |', told(found), '|', flush=True)
     better = load_rig(found.model_yaml)
     for label, run in (('second cycle', second), ('steps', stepped)):
-        print(f'  {label}, contraction at recorded pressure: off by {mm_off(rig, run):.2f} mm '
-              f'before, {mm_off(better, run):.2f} mm after', flush=True)
+        print(f'| {label}, contraction at recorded pressure | off by {mm_off(rig, run):.2f} mm '
+              f'before, {mm_off(better, run):.2f} mm after |', flush=True)
     result = find_gap(stepped, rig, None, VALVE_NAMES, args.seconds)
-    print('steps, names of the valve:', told(result), flush=True)
+    print('| steps, names of the valve |', told(result), '|', flush=True)
     better = replace(better, tolerance=dict.fromkeys(better.tolerance, KNOWN_NOW))
     for name, parameter, size in INJECTED:
         looks = [injected(better, run, name, parameter, size) for run in (first, second)]
         result = find_gap(looks[0], better, looks[1], MUSCLE_NAMES, args.seconds)
-        print(f'loop, {name} {parameter} {size:g} injected, from the found model:',
-              told(result), flush=True)
+        print(f'| loop, {name} {parameter} {size:g} injected, from the found model |',
+              told(result), '|', flush=True)
 
 
 if __name__ == '__main__':

@@ -38,6 +38,7 @@ from pam_actuation.bags.info import bag_info
 from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan, PLANT, RECORDER
 from pam_actuation.rigging.processes import node_environment
+import results_page
 import yaml
 
 PLANT_HZ, CONTROLLER_HZ, EXTRA_HZ = 1000.0, 500.0, 1000.0
@@ -196,18 +197,36 @@ def _figures(bag, result, told):
         'cpu_share': result.cpu_share, 'topics': topics}
 
 
-def main():
-    """Measure and judge."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--extra', type=int, default=0, help='further topics of 1 kHz')
     parser.add_argument('--publish', type=int, default=0, help=argparse.SUPPRESS)
-    args = parser.parse_args()
+    results_page.add_write(parser, 'recording')
+    return parser
+
+
+def show(found):
+    """Print the figures as a table."""
+    print('| duration | messages | a second | missing | lost | dropped | missed at start '
+          '| recorder, share of a core |\n|---|---|---|---|---|---|---|---|')
+    print(f'| {found["duration_s"]} s | {found["messages"]} | {found["messages_per_s"]} '
+          f'| {found["missing"]} | {found["lost"]} | {found["dropped"]} '
+          f'| {found["missed_at_start"]} | {found["recorder_share_of_a_core"]:.2f} |')
+
+
+def main():
+    """Measure and judge."""
+    args = command_line().parse_args()
     if args.publish:
         return publish_extra(args.publish)
-    with tempfile.TemporaryDirectory() as folder:
-        found = measure(args.seconds, args.extra, os.path.join(folder, 'load'))
-    print(json.dumps(found, indent=2))
+    with results_page.printed(args, __file__, 'extra' if args.extra else ''):
+        with tempfile.TemporaryDirectory() as folder:
+            found = measure(args.seconds, args.extra, os.path.join(folder, 'load'))
+        print(json.dumps(found, indent=2), file=sys.stderr)
+        if not found['failure']:
+            show(found)
     good = not found['failure'] and not found['missing'] and not found['dropped']
     return 0 if good and found['recorder_share_of_a_core'] < ALLOWED_SHARE else 1
 

@@ -40,7 +40,7 @@ import time
 
 from fault_rig import FaultRig
 from fault_table import (
-    DRIVER, read_outcomes, RECORDER, REFERENCE, RESTART_S, run_series, START_S)
+    DRIVER, read_outcomes, RECORDER, REFERENCE, RESTART_S, run_series, series_parser, START_S)
 import numpy as np
 from pam_actuation.messages import Pressure
 from pam_actuation.topics.codec import Writer
@@ -363,9 +363,14 @@ class Series:
         rig.witness.listen(3.0)
 
 
+def command_line():
+    """Return the parser of the command line."""
+    return series_parser(CASES, 'recoveries.jsonl', __doc__, 'recoveries', times=10)
+
+
 def main():
     """Play, print the table; exit code 1 if anything was not as it must be."""
-    return run_series(Series, table, CASES, 'recoveries.jsonl', __doc__, times=10, is_good=good)
+    return run_series(command_line(), __file__, Series, table, good)
 
 
 if __name__ == '__main__':

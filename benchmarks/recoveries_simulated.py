@@ -37,6 +37,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'test' / 'control'))
 
 from faulty_rig import FaultyRig, hold, slow_sine  # noqa: E402, I100
+import results_page  # noqa: E402
 
 CONTROLLERS = {'ppr': ('sofc_ppr', 'pid'), 'hsv': ('sofc_hsv', 'pid_hsv')}
 LOST = ('nan', 'silent', 'past', 'future')
@@ -61,13 +62,25 @@ def play(valve, controller, fault, reference, number, seed):
     return rig.excursion_m(at_s) - usual_m, max(rig.gauge_pa[round(at_s * 250.0):])
 
 
-def main():
-    """Play, print the table; exit code 1 if an excursion was too large."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--times', type=int, default=20, help='how often each fault strikes')
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--jobs', type=int, default=2)
-    given = parser.parse_args()
+    results_page.add_write(parser, 'recoveries')
+    return parser
+
+
+def main():
+    """Play, print the table; exit code 1 if an excursion was too large."""
+    given = command_line().parse_args()
+    with results_page.printed(given, __file__):
+        return show(given)
+
+
+def show(given):
+    """Play and print the table; return the exit code."""
     rows = [(valve, controller, fault, reference)
             for valve, names in CONTROLLERS.items() for controller in names
             for fault in FAULTS for reference in REFERENCES]

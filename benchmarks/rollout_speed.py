@@ -20,9 +20,8 @@ The best of several runs counts: other work on the machine can only make a run s
 ``bench`` extra for the comparison with MuJoCo.
 """
 
+import argparse
 import itertools
-import os
-import platform
 import subprocess
 import sys
 import time
@@ -36,6 +35,7 @@ from pam_sim.rollout.batch import default_workers, Record, residual_sums, simula
 from pam_sim.rollout.layout import OUTPUT
 from pam_sim.rollout.sampling import Measured
 from pam_sim.rollout.simulate import input_array
+import results_page
 
 STEPS = 10_000
 STEP_S = 1e-3
@@ -157,15 +157,22 @@ def print_first_call():
     print(f'Fresh process, start of Python to end of a simulated second: {seconds:.2f} s.')
 
 
+def command_line():
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    results_page.add_write(parser, 'speed')
+    return parser
+
+
 def main():
     """Print all tables."""
-    print(f'{platform.processor() or platform.machine()}, {default_workers()} cores, '
-          f'Python {platform.python_version()}, NumPy {np.__version__}; load before '
-          f'{os.getloadavg()[0]:.1f}\n')
-    nominal_s = print_rigs()
-    for table in (print_batch, lambda: print_against_mujoco(nominal_s), print_first_call):
-        print(flush=True)
-        table()
+    args = command_line().parse_args()
+    print(f'{results_page.machine()}\n')
+    with results_page.printed(args, __file__):
+        nominal_s = print_rigs()
+        for table in (print_batch, lambda: print_against_mujoco(nominal_s), print_first_call):
+            print(flush=True)
+            table()
 
 
 if __name__ == '__main__':

@@ -34,7 +34,8 @@ import time
 
 from fault_rig import NAMESPACE, RIG
 from fault_table import (
-    ALLOWED_PA, ALLOWED_S, CONTROLLER, DRIVER, RESTART_S, run_series, Series, SETTLE_S, WATCHDOG)
+    ALLOWED_PA, ALLOWED_S, CONTROLLER, DRIVER, RESTART_S, run_series, Series, series_parser,
+    SETTLE_S, WATCHDOG)
 from pam_actuation.messages import Contraction, Pressure, VALVE_NAMES, ValveSignal
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
@@ -298,11 +299,16 @@ def _times(times_s):
     return f'{statistics.median(times_s) * 1e3:.0f} / {max(times_s) * 1e3:.0f} ms'
 
 
+def command_line():
+    """Return the parser of the command line."""
+    return series_parser(CASES, 'second_sender.jsonl', __doc__, 'second_senders', times=20)
+
+
 def main():
     """Play, print the table; exit code 1 if anything was not as it must be."""
     if sys.argv[1:2] == [STRANGER]:
         return stranger(sys.argv[2])
-    return run_series(SecondSenders, table, CASES, 'second_sender.jsonl', __doc__, times=20)
+    return run_series(command_line(), __file__, SecondSenders, table)
 
 
 if __name__ == '__main__':

@@ -37,6 +37,7 @@ from pam_actuation.rigging import session
 from pam_actuation.rigging.plan import make_plan
 from pam_actuation.rigging.transitions import termination_as_interrupt
 from recording_load import experiment_text
+import results_page
 from tqdm import tqdm
 
 ALLOWED_GROWTH = 0.01
@@ -149,14 +150,27 @@ def judge(samples, bag, loops):
     return good
 
 
-def main():
-    """Run and judge."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--seconds', type=float, default=3600.0)
     parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
+    results_page.add_write(parser, 'loop_timing')
+    return parser
+
+
+def main():
+    """Run and judge."""
+    parser = command_line()
     args = parser.parse_args()
     if args.seconds < SHORTEST_S:
         parser.error(f'--seconds {args.seconds:g} is too short, give at least {SHORTEST_S:g}')
+    with results_page.printed(args, __file__):
+        return run(args)
+
+
+def run(args):
+    """Run the rig, print the tables; return the exit code."""
     with tempfile.TemporaryDirectory() as folder:
         plan = make_plan(experiment_text(args.seconds), 'dmsp_5_300_realistic',
                          f'sofc_{args.valve}', args.valve, bag := str(Path(folder) / 'bag'))

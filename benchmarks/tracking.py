@@ -44,6 +44,7 @@ from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_sim import load_rig
 from pam_sim.units import GRAVITY_M_PER_S2
+import results_page
 
 RIG = 'dmsp_5_300_realistic'
 FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
@@ -135,7 +136,7 @@ def show_sines(valve, controllers):
     """Print error per frequency and controller."""
     rig = load_rig(RIG, valve=valve)
     loops = [closed_loop(rig, sine(f)) for f in FREQUENCIES_HZ]
-    print(f'\n### Sine, {valve}: RMSE (largest error; part that repeats) of cycle {CYCLES} [mm]\n')
+    print(f'\n## Sine, {valve}: RMSE (largest error; part that repeats) of cycle {CYCLES} [mm]\n')
     print('| controller | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
     print('|---|' + '---|' * len(FREQUENCIES_HZ))
     for one in controllers:
@@ -171,7 +172,7 @@ def show_steps(valve, controllers):
     rig = load_rig(RIG, valve=valve)
     loops = [closed_loop(rig, steps(), seed) for seed in (SEED, *STEP_SEEDS)]
     shares = []
-    print(f'\n### Step of 10 mm, {valve}\n')
+    print(f'\n## Step of 10 mm, {valve}\n')
     print('| controller | step | up: end [mm] | overshoot [%] | settled [s] '
           '| down: end [mm] | overshoot [%] | settled [s] |')
     print('|---|' + '---|' * 7)
@@ -207,7 +208,7 @@ def show_gait(valve, controllers):
     stroke_m = np.ptp(loop.reference_m[round(6.0 * loop.rate_hz):])
     end = round((experiment.duration_s - 0.5) * loop.rate_hz)
     stride = round(loop.rate_hz / 0.8)
-    print(f'\n### Knee gait at 0.8 Hz, {valve}: stroke {stroke_m * 1e3:.1f} mm\n')
+    print(f'\n## Knee gait at 0.8 Hz, {valve}: stroke {stroke_m * 1e3:.1f} mm\n')
     print('| controller | first stride [mm] | tenth stride [mm] | of the stroke [%] |')
     print('|---|---|---|---|')
     for one in controllers:
@@ -222,7 +223,7 @@ def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
     """Print how the same taught rules fare on rigs they were not taught on."""
     nominal = load_rig(RIG, valve=valve)
     experiment = sine(frequency_hz, CYCLES, 0.012, 0.006)
-    print(f'\n### {count} random rigs, {valve}: RMSE of cycle {CYCLES} at {frequency_hz:g} Hz, '
+    print(f'\n## {count} random rigs, {valve}: RMSE of cycle {CYCLES} at {frequency_hz:g} Hz, '
           '+-6 mm about 12 mm\n')
     print('| controller | nominal [mm] | median | worst | median/nominal | worst/nominal '
           '| worst ratio to frozen rules | highest pressure [kPa] |')
@@ -259,7 +260,7 @@ def show_changes(valve, controllers):
             'external_force_n': lambda t: GRAVITY_M_PER_S2 if t >= begins_s else 0.0},
         'supply -15 %': {
             'supply_pa': lambda t: supply_pa * (0.85 if t >= begins_s else 1.0)}}
-    print(f'\n### Change in cycle {change + 1} at {frequency_hz:g} Hz, +-6 mm about 12 mm, '
+    print(f'\n## Change in cycle {change + 1} at {frequency_hz:g} Hz, +-6 mm about 12 mm, '
           f'{valve}: RMSE per cycle [mm]\n')
     print('| controller | change | cycle before | 1 after | 2 | 3 | 4 | 5 | 6 | 10 |')
     print('|---|' + '---|' * 9)
@@ -277,14 +278,26 @@ def show_changes(valve, controllers):
 PARTS = ('sine', 'step', 'gait', 'rigs', 'change')
 
 
-def main():
-    """Print the tables as Markdown."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--part', default=','.join(PARTS), help='tables, by commas')
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--controller', default='', help='only those whose name has this in it')
     parser.add_argument('--rigs', type=int, default=200, help='number of random rigs')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'tracking')
+    return parser
+
+
+def main():
+    """Print the tables as Markdown."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        show(args)
+
+
+def show(args):
+    """Print the tables that were asked for."""
     chosen = [one for one in CONTROLLERS if args.controller.lower() in one.name.lower()]
     for part in args.part.split(','):
         for valve in args.valve.split(','):

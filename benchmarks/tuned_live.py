@@ -24,6 +24,7 @@ simulation the median over five seeds of the sensor noise, and the largest.
 
 import argparse
 import os
+import sys
 import tempfile
 
 import numpy as np
@@ -35,6 +36,7 @@ from pam_actuation.report.metrics import run_metrics
 from pam_actuation.rigging.session import run_experiment
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
+import results_page
 
 RIG = 'dmsp_5_300_realistic'
 SEARCHED = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
@@ -59,15 +61,27 @@ def errors_mm(bag):
     return np.sqrt([squares.mean(), squares[-3:].mean()])
 
 
-def main():
-    """Tune, run live and simulated, print the table as Markdown."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--experiments', default='sine_half_hz,sine_quarter_hz_short')
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--rollouts', type=int, default=3000)
     parser.add_argument('--jobs', type=int, default=-1)
     parser.add_argument('--domain-id', type=int, default=None, help='ROS domain')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'tuned_live')
+    return parser
+
+
+def main():
+    """Tune, run live and simulated, print the table as Markdown."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        show(args)
+
+
+def show(args):
+    """Print what was tuned, and one line per experiment, valve and way."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for valve in args.valve.split(','):
@@ -90,7 +104,7 @@ def main():
                         rows[-1] += (f'| {error:.3f} | {mid[k]:.3f}, {simulated[:, k].max():.3f} '
                                      f'| {error / mid[k]:.2f} ')
                     rows[-1] += '|'
-                    print(rows[-1], flush=True)
+                    print(rows[-1], file=sys.stderr, flush=True)
     print('\n| experiment | valve | tuned table | live, all cycles [mm] | simulated | ratio '
           '| live, last three [mm] | simulated | ratio |')
     print('|---|---|---|---|---|---|---|---|---|')

@@ -26,6 +26,7 @@ the next. The force law it calls is the compiled one, everything else is Python.
 are made of a joint as well, its peer with both muscles and the limb.
 """
 
+import argparse
 import os
 import time
 
@@ -42,6 +43,7 @@ from pam_sim.joint import load_joint
 from pam_sim.muscle.laws.sarosi import tension_n
 from pam_sim.records import fields, values_of
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import results_page
 from scipy.integrate import solve_ivp
 
 EXPERIMENT, JOINT_EXPERIMENT = 'tuning_half_hz', 'joint_tuning'
@@ -153,7 +155,7 @@ def joint_with_solve_ivp(joint, controller, experiment, rtol=1e-6):
 def of_a_joint(cores):
     """Print both tables of a joint."""
     experiment = load_experiment(JOINT_EXPERIMENT)
-    print(f'\n### Rollouts of {experiment.duration_s:g} s a minute, realistic joint\n')
+    print(f'\n## Rollouts of {experiment.duration_s:g} s a minute, realistic joint\n')
     print(f'| controller | valve | 1 thread | {cores} threads | ms of processor time each |')
     print('|---|---|---|---|---|')
     for valve in ('ppr', 'hsv'):
@@ -173,7 +175,7 @@ def of_a_joint(cores):
     angle, seconds = joint_with_solve_ivp(
         joint, load_controller('sofc_joint_ppr', joint), experiment)
     away = float(np.max(np.abs(angle - compiled)))
-    print('\n### The same joint, nominal and without noise, one thread\n')
+    print('\n## The same joint, nominal and without noise, one thread\n')
     print('| who | ms of processor time each | largest difference of the angle |')
     print('|---|---|---|')
     print(f'| pam_actuation | {busy_ms:.2f} | – |')
@@ -182,11 +184,24 @@ def of_a_joint(cores):
     print(f'\nRatio {1e3 * seconds / busy_ms:,.0f}.')
 
 
+def command_line():
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    results_page.add_write(parser, 'tuning_speed')
+    return parser
+
+
 def main():
     """Print the tables as Markdown."""
-    cores = os.cpu_count()
+    with results_page.printed(command_line().parse_args(), __file__):
+        of_a_rig(os.cpu_count())
+        of_a_joint(os.cpu_count())
+
+
+def of_a_rig(cores):
+    """Print both tables of a single muscle."""
     experiment = load_experiment(EXPERIMENT)
-    print(f'### Rollouts of {experiment.duration_s:g} s a minute, realistic rig\n')
+    print(f'## Rollouts of {experiment.duration_s:g} s a minute, realistic rig\n')
     print(f'| controller | valve | 1 thread | {cores} threads '
           '| ms of processor time each |')
     print('|---|---|---|---|---|')
@@ -208,14 +223,13 @@ def main():
     compiled = loop.run(controller).contraction_m
     contraction, seconds = with_solve_ivp(rig, controller, experiment)
     away = 1e6 * float(np.max(np.abs(contraction - compiled)))
-    print('\n### The same PID loop on the nominal rig, without noise, one thread\n')
+    print('\n## The same PID loop on the nominal rig, without noise, one thread\n')
     print('| who | rollouts a minute | largest difference of the contraction |')
     print('|---|---|---|')
     print(f'| pam_actuation | {own:,.0f} | – |')
     print(f'| scipy.integrate.solve_ivp in a Python loop | {60.0 / seconds:,.1f} '
           f'| {away:.2f} um |')
     print(f'\nRatio {own * seconds / 60.0:,.0f}.')
-    of_a_joint(cores)
 
 
 if __name__ == '__main__':
