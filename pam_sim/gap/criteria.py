@@ -162,6 +162,10 @@ class Criteria:
         1.5, 'normal deviations', 'ranking',
         'The same for one that explains clearly less.',
         'One-sided 7 %.')
+    rough_tolerance: float = _criterion(
+        0.05, 'of the number', 'ranking',
+        'Tolerance from which on a number of load or valve stands before a sensor error.',
+        'More than twice the tolerance of a number from a data sheet; design choice.')
     same_form_share: float = _criterion(
         0.002, 'of what the best adds', 'ranking',
         'Shares this near are equal: no formulation is that true.',

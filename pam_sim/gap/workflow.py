@@ -150,7 +150,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     judge(result, outcome, estimator, validation, base, final, materiality, certify is not None)
     own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
     result.subsystems = subsystem_verdicts(
-        result, outcome.named, rig, own_runs, criteria, materiality)
+        result, outcome.named, own_runs, criteria, materiality)
     result.where = locate(rig, validation.recording, validation.before, validation.floor)
     result.traces = validation.traces()
     result.fingerprint = fingerprint(estimator, base, final)

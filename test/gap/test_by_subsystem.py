@@ -71,12 +71,12 @@ def test_a_subsystem_without_a_gap_has_none():
 def given(verdict, valve=QUIET, muscle=MUSCLE, effects=(), parameters=(), named=(), doubt=0.0):
     """Return the verdicts by subsystem of such gaps and names."""
     result = GapResult(verdict, '', noise={'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1},
-                       effects=[{'name': name, 'subsystem': subsystem_of(name, nominal())}
+                       effects=[{'name': name, 'subsystem': subsystem_of(name)}
                                 for name in effects], parameters=list(parameters))
     gaps = {'valve': {'pressure': valve}, 'muscle': muscle}
     runs = SimpleNamespace(gaps=gaps, spread=lambda: {
         (s, signal): doubt for s, one in gaps.items() for signal in one})
-    return subsystem_verdicts(result, list(named), nominal(), runs, CRITERIA, 1.0)
+    return subsystem_verdicts(result, list(named), runs, CRITERIA, 1.0)
 
 
 def test_every_name_stands_in_its_own_subsystem():
@@ -91,8 +91,8 @@ def test_every_name_stands_in_its_own_subsystem():
     assert (found['load'].verdict, found['load'].names) == ('parameter', ('mass_kg',))
     assert found['sensor'].names == ('contraction_bias',)
     assert found['sensor'].signal == 'contraction'
-    assert subsystem_of('K_m', nominal()) == 'valve'
-    assert subsystem_of('force_map_gain', nominal()) == 'muscle'
+    assert subsystem_of('K_m') == 'valve'
+    assert subsystem_of('force_map_gain') == 'muscle'
 
 
 def test_what_is_left_is_unknown_only_beyond_the_doubt_about_numbers():

@@ -22,17 +22,15 @@ from pam_sim.effects.registry import effects, get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.result import GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.verify.own_runs import largest, OwnRuns
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.gap.verify.validation import share_left
-from pam_sim.load import LOADS
-from pam_sim.rig import Rig
-from pam_sim.valve import hsv, ppr
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
 
-def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, runs: OwnRuns,
+def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRuns,
                        criteria: Criteria, materiality: float) -> dict[str, SubsystemVerdict]:
     """
     Return what is said of every subsystem, the valve first.
@@ -43,8 +41,6 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, ru
         With verdict, effects, parameters and the noise of the sensors.
     named : list of NamedEffect
         What was added to the model.
-    rig : pam_sim.Rig
-        The given model.
     runs : OwnRuns
         On the certify data.
     criteria : Criteria
@@ -53,7 +49,7 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, ru
         From how many deviations of a sensor on a gap matters.
 
     """
-    names = _names(result, named, rig)
+    names = _names(result, named)
     found = {}
     for s in SUBSYSTEMS:
         own = _own(s, names.get(s, ()), runs.gaps)
@@ -82,21 +78,19 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], rig: Rig, ru
             for s, one in found.items()}
 
 
-def subsystem_of(name: str, rig: Rig) -> str:
+def subsystem_of(name: str) -> str:
     """Return the subsystem of an effect or of a parameter of a rig."""
     if name in effects():
         return get_effect(name).subsystem
-    if name in {p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)}:
-        return 'valve'
-    return 'load' if name in {p.name for p in LOADS[rig.load].PARAMETERS} else 'muscle'
+    return subsystem_of_number(name)
 
 
-def _names(result: GapResult, named: list[NamedEffect], rig: Rig) -> dict[str, tuple[str, ...]]:
+def _names(result: GapResult, named: list[NamedEffect]) -> dict[str, tuple[str, ...]]:
     """Return what is named by subsystem, with all names of a set under that of its first."""
     sets = {w.name: w.names for w in named}
     found: dict[str, list[str]] = {}
     for name in (*(e['name'] for e in result.effects), *(p.name for p in result.parameters)):
-        found.setdefault(subsystem_of(name, rig), []).extend(sets.get(name, (name,)))
+        found.setdefault(subsystem_of(name), []).extend(sets.get(name, (name,)))
     return {s: tuple(dict.fromkeys(names)) for s, names in found.items()}
 
 

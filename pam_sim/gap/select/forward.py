@@ -14,15 +14,17 @@
 
 """Forward selection: one effect after another, the best on held-out blocks, then the rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from pam_sim.effects.registry import effects
+from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
+from pam_sim.gap.select.order import is_sensor_error
 from pam_sim.gap.select.refit import fit_with, other_formulations
-from pam_sim.gap.select.rival import NamedEffect
-from pam_sim.gap.select.rivals import rivals_of
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.select.rivals import numbers_before_sensors, rivals_of
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
@@ -50,15 +52,41 @@ def forward_selection(context: SearchContext, current: Fit, named: list[NamedEff
 def _round(context: SearchContext, current: Fit, open_problems: Sequence[SubsystemProblem],
            closed: dict[str, Fit]) -> list[NamedEffect]:
     """Return what is added in the open subsystems; ``closed`` tells at which fit one was not."""
-    rivals, fitted = rivals_of(context, current, open_problems)
-    joint = context.ranking.joint_winner(rivals, current, open_problems, fitted)
+    joint, winners = _winners(context, current, open_problems)
     if joint is not None:
         return [joint]
-    winners = [context.ranking.winner(rivals, current, p, fitted) for p in open_problems]
-    added = [w for w in winners if w and not mends_a_formulation(context, w, current)]
+    added = [w for w in winners if not mends_a_formulation(context, w, current)]
     won = {w.subsystem for w in added}
     closed.update((p.subsystem, current) for p in open_problems if p.subsystem not in won)
     return [w for i, w in enumerate(added) if w.name not in [o.name for o in added[:i]]]
+
+
+def _winners(context: SearchContext, current: Fit, problems: Sequence[SubsystemProblem],
+             pool: Iterable[Candidate] | None = None
+             ) -> tuple[NamedEffect | None, list[NamedEffect]]:
+    """
+    Return (what explains several subsystems or None, what wins in each of them).
+
+    An error of a sensor wins only where the numbers of load and valve were tried as well.
+    """
+    rivals, fitted = rivals_of(context, current, problems, pool)
+    joint, winners = _ranked(context, current, problems, rivals, fitted)
+    if any(is_sensor_error(w.name) for w in (joint, *winners) if w):
+        more = numbers_before_sensors(context, current, problems, {r.name for r in rivals})
+        rivals, fitted = [*rivals, *more], [*fitted, *more]
+        context.set_levels(rivals, problems)
+        joint, winners = _ranked(context, current, problems, rivals, fitted)
+    return joint, winners
+
+
+def _ranked(context: SearchContext, current: Fit, problems: Sequence[SubsystemProblem],
+            rivals: Sequence[Rival], fitted: Sequence[Rival]
+            ) -> tuple[NamedEffect | None, list[NamedEffect]]:
+    joint = context.ranking.joint_winner(rivals, current, problems, fitted)
+    if joint is not None:
+        return joint, []
+    winners = [context.ranking.winner(rivals, current, p, fitted) for p in problems]
+    return None, [w for w in winners if w is not None]
 
 
 def mends_a_formulation(context: SearchContext, winner: NamedEffect, current: Fit) -> bool:
@@ -91,9 +119,8 @@ def _reopened(context: SearchContext, current: Fit, closed: dict[str, Fit]
     for problem in problems:
         s = problem.subsystem
         if closed.get(s, current) is not current and context.is_open(problem, current):
-            rivals, fitted = rivals_of(context, current, [problem], shared)
-            winner = context.ranking.winner(rivals, current, problem, fitted)
-            if winner is not None:
+            _, winners = _winners(context, current, [problem], shared)
+            if winners:
                 del closed[s]
-                return [winner]
+                return winners
     return []

@@ -29,6 +29,7 @@ from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import is_limit, same_as
 from pam_sim.gap.select.comparison import gap, preference, share
+from pam_sim.gap.select.order import in_order, uncertain_numbers
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
@@ -116,9 +117,11 @@ class Ranking:
         close = top - criteria.close_share * max(top - before, 0.0)
         as_good = {r.name for r in tied if is_same(r) or (
                    r.t[s] < criteria.likely_sd and r.share[s] > close)}
-        return [r for r in tied
+        tied = [r for r in tied
                 if not any(is_limit(simple, r.name) for simple in as_good)
                 and same_as(r.name) not in names]
+        return in_order(tied, ranked, s, uncertain_numbers(self.estimator.problems, criteria),
+                        criteria.close_share * max(top - before, 0.0))
 
     def _polish(self, rivals: Sequence[Rival]) -> bool:
         """Let those go on that have not yet; return whether there were any."""

@@ -24,6 +24,7 @@ from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import is_limit, split_refinements
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
+from pam_sim.gap.select.order import numbers_of_rig
 from pam_sim.gap.select.ranking import least_gain
 from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.screening import screen, Screened
@@ -82,12 +83,35 @@ def rivals_of(context: SearchContext, current: Fit, problems: Sequence[Subsystem
 def _free_numbers(context: SearchContext, current: Fit,
                   problems: Sequence[SubsystemProblem]) -> list[Rival]:
     """Return a fit for every number that is far from its prior, without that prior."""
-    far = [name for problem in problems for name, z in current.prior_deviations(problem).items()
-           if abs(z) > context.criteria.hint_sd]
+    return _with_free(context, current, [
+        name for problem in problems for name, z in current.prior_deviations(problem).items()
+        if abs(z) > context.criteria.hint_sd])
+
+
+def numbers_before_sensors(context: SearchContext, current: Fit,
+                           problems: Sequence[SubsystemProblem], tried: Collection[str]
+                           ) -> list[Rival]:
+    """
+    Return a fit for every number of load and valve that was not tried, without its prior.
+
+    Before an error of a sensor is named: where the misfit is large, the weight of the errors is
+    low, and a number that is far off still stays near its prior.
+    """
+    names = [k.name for k in numbers_of_rig(problems)
+             if k.name not in tried and k.name not in current.hypothesis.numbers]
+    found = _with_free(context, current, names)
+    for r in found:
+        r.found, r.polished = context.estimator.polish(r.found), True
+        r.share = context.ranking.shares(r.found)
+    return found
+
+
+def _with_free(context: SearchContext, current: Fit, names: Sequence[str]) -> list[Rival]:
+    """Return a fit for every name of a number, with it free."""
     h = current.hypothesis
     return parallel_map(lambda name: _rival(context, context.estimator.fit(
         Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False), name),
-        far)
+        names)
 
 
 def other_starts(rivals: Sequence[Rival], contending: Iterable[Screened],

@@ -18,8 +18,10 @@ from typing import Protocol, TypeVar
 
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
+from pam_sim.load import LOADS
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve import hsv, ppr
 
 SENSOR_CHANGES = ('bias', 'gain', 'lag')
 
@@ -71,6 +73,14 @@ def undone(signal: str, changes: SensorChanges, value: Reading, rate: Reading) -
     if lag_s is not None:
         value = value + lag_s * rate
     return value
+
+
+def subsystem_of_number(name: str) -> str:
+    """Return the subsystem of a number of a rig: ``valve``, ``load`` or ``muscle``."""
+    if any(name == p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)):
+        return 'valve'
+    of_load = {p.name for load in LOADS.values() for p in load.PARAMETERS}
+    return 'load' if name in of_load else 'muscle'
 
 
 def acts_on(effect: str, subsystem: str) -> bool:
