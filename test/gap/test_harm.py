@@ -82,7 +82,8 @@ def validation(after, drift_pa=0.0, noise=300.0, floor=300.0):
 
 @pytest.mark.parametrize('after, more, worse', [
     (2.9, {}, False), (3.0, {}, False), (3.1, {}, True), (3.1, {'drift_pa': 2e3}, False),
-    (3.1, {'floor': 2.7e3}, False), (3.1, {'noise': 6e4}, False)])
+    (3.1, {'floor': 2.7e3}, False), (3.01, {}, False), (3.01, {'noise': 200.0}, True),
+    (3.1, {'noise': 6e4}, False)])
 def test_worse_is_what_noise_stamps_and_start_do_not_explain(after, more, worse):
     assert (validation(after, **more).worse() == ['pressure']) == worse
 

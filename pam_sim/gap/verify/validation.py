@@ -179,8 +179,8 @@ class Validation:
         """
         Return the signals of which the final model leaves more than the calibrated one.
 
-        Beyond the error of the floor, and by more than noise, stamps and the start of this
-        recording may raise the squared errors.
+        Beyond the error of the floor, by one deviation of the sensor, and by more than noise,
+        stamps and the start of this recording may raise the squared errors.
         """
         found, criteria = [], self.estimator.criteria
         for s, gap in self.signals().items():
@@ -190,7 +190,8 @@ class Validation:
                 s] * float(np.sqrt(np.mean(between ** 2))) / math.sqrt(between.size))
             rise = gap.rmse_after ** 2 - gap.rmse_refit ** 2
             if (gap.rmse_after > criteria.floor_error * self.highest_floor[s]
-                    and rise > criteria.certain_sd * doubt):
+                    and rise > max(criteria.certain_sd * doubt,
+                                   (criteria.hint_sd * self.noise[s]) ** 2)):
                 found.append(s)
         return found
 
