@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 SMALLEST = 5                    # members differential evolution needs
 MEMBERS = 24                    # fewer settle too early, also with few settings
+BUDGET_USED = 'budget used up'
 _NEAR = 0.12                    # spread of the cloud about the start, in widths of the box
 
 
@@ -94,7 +95,7 @@ def minimise(costs_of: Callable[..., Any], start: FloatArray, members: int, gene
         recombination=0.8, callback=lambda *_, **__: bool(patience) and best['since'] >= patience)
     stopped = bool(patience) and best['since'] >= patience
     return Found(found.x, float(found.fun),
-                 f'no progress in {patience} generations' if stopped else 'budget used up')
+                 f'no progress in {patience} generations' if stopped else BUDGET_USED)
 
 
 def _first_generation(start: FloatArray, members: int, seed: int) -> FloatArray:

@@ -32,7 +32,7 @@ from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.tuning.initial_rules import initial_rules
 from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_actuation.tuning.problem import cost_of, Problem, rebuild
-from pam_actuation.tuning.search import default_members, minimise, SMALLEST
+from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
 from pam_actuation.tuning.workers import Workers
 from pam_sim.annotations import FloatArray
@@ -151,6 +151,8 @@ class TuneResult:
     def text(self) -> str:
         """Return the outcome for people."""
         verdict = 'better' if self.improved else 'not better: settings left as they were'
+        if not self.improved and self.ended == BUDGET_USED:
+            verdict += '; more --rollouts may find better ones'
         lines = [
             f'{self.rollouts} rollouts in {self.seconds:.1f} s '
             f'({self.simulated_s / max(self.seconds, 1e-9):,.0f} times real time), {self.ended}; '

@@ -14,6 +14,8 @@
 
 """Offline tuning: improves on runs it did not see, same seed same result."""
 
+from dataclasses import replace
+
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
@@ -60,6 +62,11 @@ def test_tuning_improves_held_out_runs_and_reports(rig, tmp_path):
     assert load_controller(tmp_path / 'tuned.yaml').settings == result.controller.settings
     assert 'lead_s' in result.text()
     assert result.to_dict()['improved'] is True
+    # Only where the budget ended the search can a larger one help.
+    assert '--rollouts' not in result.text() and result.ended == 'budget used up'
+    assert 'more --rollouts may find better' in replace(result, improved=False).text()
+    patient = replace(result, improved=False, ended='no progress in 30 generations')
+    assert 'not better' in patient.text() and '--rollouts' not in patient.text()
 
 
 def test_same_seed_same_result_with_any_number_of_jobs(rig):
