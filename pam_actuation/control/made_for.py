@@ -155,7 +155,8 @@ def check_made_for(tree: 'Located', rig: 'JointRig | Rig',
     sentence = f'made for another rig: {", ".join(found)}'
     if not accept:
         raise InputError(
-            f'the controller was {sentence}; tune one for this rig, or run it all the same with '
-            f'--accept-other-rig (of a node: accept_other_rig:=true)',
+            f'the controller was {sentence}; name its rig (with --rig or --model), tune one for '
+            f'this rig, or run it all the same with --accept-other-rig (of a node: '
+            f'accept_other_rig:=true)',
             tree.where('made_for' if 'made_for' in tree else 'rig' if 'rig' in tree else None))
     return facts or {}, sentence

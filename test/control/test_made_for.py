@@ -64,7 +64,7 @@ def test_a_file_for_another_muscle_is_refused_with_what_differs(name, tuned, sma
             load_controller(path, small)
         said = str(found.value)
         for words in (f'large_{k}.yaml:', '250 mm length (here 300)', '10 mm bore (here 5)',
-                      '--accept-other-rig', 'accept_other_rig:=true'):
+                      'name its rig (with --rig', '--accept-other-rig', 'accept_other_rig:=true'):
             assert words in said, said
         assert '\n' not in said
 
