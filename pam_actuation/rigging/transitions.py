@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 import signal
 import threading
+import time
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 TRANSITION_TIMEOUT_S = 15.0
 STOP_TIMEOUT_S = 5.0          # to deactivate: the driver, which vents, comes after others
 CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
+COMPILES = ('; the first start on a machine compiles: run `python3 -m pam_actuation.warm_up` '
+            'once, then try again')
 
 
 class SessionFailed(Exception):
@@ -54,12 +57,14 @@ def change(client: 'RigClient', processes: Iterable[NodeProcess], transition: st
     Raises
     ------
     SessionFailed
-        A node ended or refused.
+        A node ended, refused, or was too slow.
 
     """
     by_name = {process.full_name: process for process in processes}
+    begin_s = time.monotonic()
     refused = client.change_states(
         by_name, transition, timeout_s, lambda full_name: by_name[full_name].running)
+    is_late = time.monotonic() - begin_s >= timeout_s
     # A node that ended explains more than one that only did not answer.
     for full_name in sorted(refused, key=lambda name: by_name[name].running):
         process = by_name[full_name]
@@ -67,7 +72,9 @@ def change(client: 'RigClient', processes: Iterable[NodeProcess], transition: st
             raise SessionFailed(process.how_it_ended())
         last = process.last_line()
         raise SessionFailed(
-            f'{process.label} did not {transition}' + (f': {last}' if last else ''))
+            f'{process.label} did not {transition}'
+            + (f' within {timeout_s:g} s' if is_late else '') + (f': {last}' if last else '')
+            + (COMPILES if is_late and transition == 'configure' else ''))
 
 
 @contextmanager

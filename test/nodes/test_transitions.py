@@ -1,0 +1,57 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What is said of a node that does not make a transition."""
+
+import time
+
+from pam_actuation.rigging.transitions import change, SessionFailed
+import pytest
+
+
+class Node:
+    """A process that runs and has written one line."""
+
+    full_name, label, running = '/muscle/controller', 'controller', True
+
+    def last_line(self):
+        return 'reading the rig'
+
+
+class Client:
+    """Nobody makes the transition: nobody answers in time, or all refuse at once."""
+
+    def __init__(self, answers):
+        self.answers = answers
+
+    def change_states(self, names, transition, timeout_s, alive):
+        time.sleep(0.0 if self.answers else timeout_s)
+        return list(names)
+
+
+def said(transition, answers, timeout_s):
+    with pytest.raises(SessionFailed) as found:
+        change(Client(answers), [Node()], transition, timeout_s)
+    return str(found.value)
+
+
+def test_a_node_that_is_too_slow_to_configure_may_be_compiling():
+    text = said('configure', False, 0.02)
+    assert text.startswith('controller did not configure within 0.02 s: reading the rig; ')
+    assert 'python3 -m pam_actuation.warm_up' in text
+
+
+def test_other_failures_do_not_name_the_compiler():
+    assert said('configure', True, 60.0) == 'controller did not configure: reading the rig'
+    assert said('activate', False, 0.02) == (
+        'controller did not activate within 0.02 s: reading the rig')
