@@ -24,6 +24,8 @@ from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
+from pam_sim.gap.result import GapResult
+from pam_sim.run import Run
 
 MODEL = 'dmsp_5_300_hanging_mass'
 TRUTH = """rig: dmsp_5_300_hanging_mass
@@ -46,17 +48,36 @@ EFFECTS = ('hysteresis', 'coulomb_friction', 'guide_friction', 'creep', 'viscous
            'end_taper', 'parallel_spring', 'bladder_stiffness')
 
 
+def example(folder: Path) -> tuple[list[Run], GapResult]:
+    """
+    Make the two recordings of the example in a folder, and the answer with its report in ``gap``.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty folder.
+
+    Returns
+    -------
+    list of Run
+        The recording that is fitted and the one kept aside.
+    GapResult
+
+    """
+    (folder / 'truth.yaml').write_text(TRUTH, encoding='utf-8')
+    rig = load_rig(folder / 'truth.yaml')
+    runs = []
+    for name, experiment, seed in RECORDINGS:
+        simulate_experiment(load_experiment(experiment), rig, None, folder / name, seed=seed)
+        runs.append(load_run(folder / name))
+    return runs, write_gap(runs[:1], MODEL, folder / 'gap', runs[1], seconds=BUDGET_S)
+
+
 def draw(folder: Path) -> dict[str, str]:
     """Run the example, draw its figures into a folder; return what the page states."""
     with tempfile.TemporaryDirectory() as place:
         place = Path(place)
-        (place / 'truth.yaml').write_text(TRUTH, encoding='utf-8')
-        rig = load_rig(place / 'truth.yaml')
-        runs = []
-        for name, experiment, seed in RECORDINGS:
-            simulate_experiment(load_experiment(experiment), rig, None, place / name, seed=seed)
-            runs.append(load_run(place / name))
-        result = write_gap(runs[:1], MODEL, place / 'gap', runs[1], seconds=BUDGET_S)
+        runs, result = example(place)
         corrected = load_rig(place / 'gap' / 'model.yaml')
     _errors(runs[1], corrected, folder)
     shares = _screened(runs[0], folder)
