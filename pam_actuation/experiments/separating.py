@@ -98,7 +98,8 @@ def menu(valve: str) -> Menu:
 def next_experiment(
         rig: Rig, rivals: Sequence[Rival], recorded: Collection[str],
         noise: Mapping[str, float],
-        out_of_time: Callable[[], bool] = lambda: False) -> dict[str, Any] | None:
+        out_of_time: Callable[[], bool] = lambda: False,
+        pieces: Collection[str] = ()) -> dict[str, Any] | None:
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
@@ -114,16 +115,18 @@ def next_experiment(
         Standard deviation of the sensors, by signal.
     out_of_time : callable
         Returns whether to stop looking.
+    pieces : sequence of str
+        What of the menu is tried; all by default.
 
     """
     found: list[tuple[tuple[bool, float, float], str, bool]] = []
     truth = rivals[0][1].with_(sensors=_sensors(noise))
-    pieces = menu(rig.valve)
-    for name in pieces:
+    known = menu(rig.valve)
+    for name in pieces or known:
         if out_of_time() and found:
             break
         try:
-            run = simulated(_experiment(pieces, [name]), truth)
+            run = simulated(_experiment(known, [name]), truth)
             apart = {False: separation(run, rig, rivals, 'force' in recorded)}
             if 'force' not in recorded:
                 apart[True] = separation(run, rig, rivals, True)
@@ -138,7 +141,7 @@ def next_experiment(
     (_, _, sigma), best, with_cell = max(found)
     # The rig's own forms blur a part of what is told: the next best piece follows.
     others = [f[:2] for f in found if f[1] != best and f[2] == with_cell]
-    plain = _experiment(pieces, [best, *([max(others)[1]] if others else [])])
+    plain = _experiment(known, [best, *([max(others)[1]] if others else [])])
     needs = ['pressure', 'contraction', *(['force'] if with_cell else [])]
     names = [r[0] for r in rivals]
     text = (f'{plain["description"]}. Run with {names[0]} as the truth, the first part leaves '

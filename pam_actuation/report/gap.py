@@ -46,6 +46,7 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, recorded_valve
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.select.memory import MEMORY
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
@@ -96,7 +97,9 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
     result = find_gap(runs, rig, certify, **options)
     if len(result.rivals) > 1:
         result.next_experiment = next_experiment(
-            rig, result.rivals, tuple(result.signals), result.noise)
+            rig, result.rivals, tuple(result.signals), result.noise,
+            pieces=('speeds',) if result.at_one_speed and set(MEMORY) <= {
+                rival[0] for rival in result.rivals} else ())
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     save_gap(result, certify or runs[0], out_dir, of)
     return result

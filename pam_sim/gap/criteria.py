@@ -166,6 +166,10 @@ class Criteria:
         0.05, 'of the number', 'ranking',
         'Tolerance from which on a number of load or valve stands before a sensor error.',
         'More than twice the tolerance of a number from a data sheet; design choice.')
+    second_speed: float = _criterion(
+        2.0, 'times as quick', 'ranking',
+        'Strokes this much quicker than others are a second speed.',
+        'Design choice.')
     same_form_share: float = _criterion(
         0.002, 'of what the best adds', 'ranking',
         'Shares this near are equal: no formulation is that true.',

@@ -192,6 +192,8 @@ class GapResult:
         explains, ``t`` by which the best is better.
     noise : dict of str -> float
         Standard deviation of the sensors, by signal.
+    at_one_speed : bool
+        Whether creep and hysteresis are a set for want of a second speed.
 
     """
 
@@ -217,6 +219,7 @@ class GapResult:
     rivals: list[Any] = field(default_factory=list)
     noise: dict[str, float] = field(default_factory=dict)
     evidence: list[dict[str, Any]] = field(default_factory=list)
+    at_one_speed: bool = False
 
     def text(self) -> str:
         """Return the result in lines for a person."""

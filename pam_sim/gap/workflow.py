@@ -21,6 +21,7 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.health import check_health
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.speeds import moves_at_one_speed
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
@@ -31,6 +32,7 @@ from pam_sim.gap.report.location import locate
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.context import context_of
+from pam_sim.gap.select.memory import as_sets, MEMORY
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verdict import fill, judge
@@ -115,9 +117,10 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         return is_material(refitted if is_number else own, refitted, materiality,
                            criteria=criteria)
 
-    outcome = search(context_of(
+    context = context_of(
         estimator, criteria.seen_gap, criteria.least_gap * min(materiality, 1.0), effects,
-        lambda: time.perf_counter() > deadline, matters))
+        lambda: time.perf_counter() > deadline, matters)
+    outcome = search(context)
     progress(0.8)
     estimator.use = (FIT, SELECT)
     # What a fit does not touch stays as calibrated now.
@@ -127,6 +130,11 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     def validated(final: Fit) -> Validation:
         return Validation(held_out, certify is not None, estimator, base, final, seed)
 
+    one_speed = moves_at_one_speed(recordings, criteria)
+    # A proof at another speed tells creep from hysteresis, one at the same speed does not.
+    same_speed = one_speed and moves_at_one_speed([*recordings, held_out], criteria)
+    if one_speed and not same_speed:
+        outcome.named = as_sets(context, outcome.named, final)
     validation, first = validated(final), final
     outcome.named, final = refute(
         outcome.named, estimator, base, final, validation, certify is not None)
@@ -144,10 +152,13 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         validation = validated(final)
     outcome.named, final, validation, harms = without_harm(
         outcome.named, estimator, base, final, validation, validated)
+    if same_speed:
+        outcome.named = as_sets(context, outcome.named, final)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     fill(result, estimator, outcome, final, validation)
     judge(result, outcome, estimator, validation, base, final, materiality, certify is not None)
+    result.at_one_speed = one_speed and set(MEMORY) <= set(result.ambiguity_set)
     own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
     result.subsystems = subsystem_verdicts(
         result, outcome.named, own_runs, criteria, materiality)

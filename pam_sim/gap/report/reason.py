@@ -26,6 +26,7 @@ from pam_sim.gap.verify.harm import Harm
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
 LEAST_SHARE = 0.005
+ONE_SPEED = 'Creep and hysteresis both remember; only a second speed tells which it is.'
 WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 
@@ -44,12 +45,14 @@ def _told(result: GapResult, outcome: Outcome) -> str:
         missed = _sizes(result.signals, 'rmse_refit')
         return f'The calibrated model misses {missed}{_nearest(outcome)}.{_mistaken(outcome)}'
     # Of several that are named, some may be certain.
-    open_sets = [w.names for w in outcome.named if len(w.names) > 1]
+    open_sets = list({frozenset(w.names): w.names for w in outcome.named
+                      if len(w.names) > 1}.values())
     doubtful = {name for names in open_sets for name in names}
     if result.verdict == 'ambiguous':
         apart = ', nor '.join(join(names) for names in open_sets)
         certain = _found(result, lambda name: name not in doubtful)
-        parts = [f'These data cannot tell {apart} apart.', 'Likeliest:',
+        parts = [f'These data cannot tell {apart} apart.', *([ONE_SPEED] if (
+                     result.at_one_speed) else []), 'Likeliest:',
                  *_found(result, lambda name: name in doubtful),
                  *(['Certain:', *certain] if certain else [])]
     else:
