@@ -238,7 +238,7 @@ class GapResult:
         return _finite({
             'schema': SCHEMA, 'verdict': self.verdict,
             'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
-            'effects': self.effects,
+            'proposal': None, 'effects': self.effects,
             'parameters': [p.to_dict() for p in self.parameters],
             'ambiguity_set': self.ambiguity_set, 'next_experiment': self.next_experiment,
             'where': [w.to_dict() for w in self.where],

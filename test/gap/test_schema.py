@@ -41,6 +41,7 @@ def test_it_names_the_keys_of_an_empty_report_and_refuses_others():
     result = GapResult('no_gap', 'Nothing is missing.')
     assert_form(result)
     assert set(result.to_dict()) == set(report_schema()['properties'])
+    assert result.to_dict()['proposal'] is None
     result.verdict = 'perhaps'
     with pytest.raises(ValidationError, match='perhaps'):
         assert_form(result)

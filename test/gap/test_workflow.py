@@ -213,9 +213,9 @@ def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
     found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
-        'schema', 'verdict', 'subsystems', 'effects', 'parameters', 'ambiguity_set',
-        'next_experiment', 'where', 'signals', 'unexplained_fraction', 'fingerprint',
-        'minimum_detectable', 'runtime_s', 'simulations', 'reason'}
+        'schema', 'verdict', 'subsystems', 'proposal', 'effects', 'parameters',
+        'ambiguity_set', 'next_experiment', 'where', 'signals', 'unexplained_fraction',
+        'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason'}
     assert set(found['subsystems']) == {'valve', 'muscle'}
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {
