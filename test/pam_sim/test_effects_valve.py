@@ -290,7 +290,81 @@ def test_thermal_closes_the_balances_of_mass_and_energy(fidelity):
     assert abs(np.sum(left)) < 1e-7 * turned_over
 
 
-@pytest.mark.parametrize('name', ['flow_limit', 'valve_hysteresis'])
+@pytest.mark.parametrize('delay_s, vent_later_s, edges_s', [
+    (0.08, 0.08, (0.04, 0.12)), (0.08, -0.08, (0.12, 0.04)), (0.0604, 0.0, (0.0604, 0.0604)),
+    (0.0302, 0.0103, (0.02505, 0.03535)), (0.01, 0.05, (0.0, 0.035))])
+def test_each_edge_of_a_command_is_late_by_the_delay_of_its_direction(
+        delay_s, vent_later_s, edges_s):
+    at = np.arange(3000) * 1e-3
+    start = {'initial_pressure_pa': P_ATM_PA + 300e3}
+    rig = held('ppr', ('valve_dead_time_by_direction', {
+        'delay_s': delay_s, 'vent_later_s': vent_later_s}))
+    report = effects()['valve_dead_time_by_direction'].report(
+        rig.effect('valve_dead_time_by_direction').parameters, rig)
+    for first, then, edge_s, name in ((3.0, 5.0, edges_s[0], 'fill_delay_s'),
+                                      (5.0, 3.0, edges_s[1], 'vent_delay_s')):
+        start['initial_pressure_pa'] = P_ATM_PA + 100e3 * first
+        response = rig.simulate(np.where(at < 0.5, first, then), **start)
+        since = np.maximum(response.time_s - 0.5 - edge_s, 0.0)
+        expected = P_ATM_PA + 1e5 * (then + (first - then) * np.exp(-since / 0.060))
+        assert np.max(np.abs(response.pressure_pa - expected)) < 1000.0      # of one step
+        assert report[name][0] == pytest.approx(edge_s)
+
+
+def test_equal_delays_are_the_plain_dead_time_to_the_bit():
+    signal = 3.0 + np.random.default_rng(5).uniform(-2.0, 2.0, 60).repeat(20)
+    both = [held('ppr', (name, values)).simulate(signal).outputs for name, values in (
+        ('valve_dead_time', {'delay_s': 0.0374}),
+        ('valve_dead_time_by_direction', {'delay_s': 0.0374, 'vent_later_s': 0.0}))]
+    assert np.array_equal(*both)
+
+
+@pytest.mark.parametrize('vent_later_s, length_s', [(-0.040, 0.0), (0.040, 0.070)])
+def test_a_short_pulse_is_swallowed_or_held_by_the_difference_of_the_delays(
+        vent_later_s, length_s):
+    signal = np.where(np.abs(np.arange(1000) - 514.5) < 15.0, 5.0, 3.0)       # 30 ms
+    response = held('ppr', ('valve_dead_time_by_direction', {
+        'delay_s': 0.05, 'vent_later_s': vent_later_s}), T_m=0.001).simulate(
+            signal, initial_pressure_pa=P_ATM_PA + 300e3)
+    above = np.sum(response.pressure_pa > P_ATM_PA + 400e3) * 1e-3
+    assert above == pytest.approx(length_s, abs=1e-9)
+
+
+def test_a_dead_time_by_direction_beyond_its_memory_is_refused():
+    rig = held('ppr', ('valve_dead_time_by_direction', {'delay_s': 0.4, 'vent_later_s': 0.4}))
+    with pytest.raises(InputError, match='make a delay of 0.2 s; .* at most 0.1022 s'):
+        rig.simulate(np.full(10, 4.0), dt_s=1e-4)
+
+
+def test_the_vent_closes_above_the_set_point_and_bleeds():
+    closing, rate = 18e3, 9e3
+    rig = held('ppr', ('vent_bleed', {
+        'closing_pressure_pa': closing, 'bleed_rate_pa_per_s': rate}))
+    down = rig.simulate(np.full(4000, 2.0), initial_pressure_pa=P_ATM_PA + 400e3)
+    above, t = down.pressure_pa - P_ATM_PA - 200e3, down.time_s
+    # The lag towards the closing pressure, less what is bled within its time constant.
+    aim = closing - 0.060 * rate
+    closed = 0.060 * np.log((200e3 - aim) / (closing - aim))
+    expected = np.where(t < closed, aim + (200e3 - aim) * np.exp(-t / 0.060),
+                        closing - rate * (t - closed))
+    bleeding = t < closed + (closing - 0.060 * rate) / rate
+    assert np.max(np.abs(above - expected)[bleeding]) < 20.0
+    assert 0.0 <= above[-1] < 5.0
+    up = [r.simulate(np.full(400, 4.0), initial_pressure_pa=P_ATM_PA + 200e3).pressure_pa
+          for r in (rig, held('ppr'))]
+    assert np.array_equal(*up)
+
+
+def test_a_bleed_quicker_than_the_lag_is_the_lag():
+    quick = held('ppr', ('vent_bleed', {
+        'closing_pressure_pa': 20e3, 'bleed_rate_pa_per_s': 1e7}))
+    down = [r.simulate(np.full(400, 2.0), initial_pressure_pa=P_ATM_PA + 400e3).pressure_pa
+            for r in (quick, held('ppr'))]
+    assert np.max(np.abs(down[0] - down[1])) < 1e-3
+
+
+@pytest.mark.parametrize('name', [
+    'flow_limit', 'valve_hysteresis', 'vent_bleed', 'valve_dead_time_by_direction'])
 def test_effects_of_the_regulator_leave_the_switching_valves_alone(name):
     signal = duties('random', 300)
     ours = held('hsv', (name, {})).simulate(signal)
