@@ -25,8 +25,8 @@ _INDEX = """# Command line
 
 One page for each verb of `pam`, made from its parser. `pam VERB --help` says the same.
 
-Exit codes: 0 done, 1 there is a finding, 2 bad input, 130 interrupted. With `--json` a verb
-prints its result as JSON. An error is then JSON too:
+Exit codes: 0 answered or done, 1 something is wrong with the data or the run, 2 bad input,
+130 interrupted. With `--json` a verb prints its result as JSON. An error is then JSON too:
 `{"error": "one sentence", "exit_code": 2}`.
 
 """

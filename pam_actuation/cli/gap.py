@@ -66,7 +66,7 @@ def add_arguments(parser: Parser) -> None:
 
 
 def run(args: argparse.Namespace) -> int | None:
-    """Find the gap; exit code 1 where there is one."""
+    """Find the gap; exit code 1 only where the data cannot be used or cannot be right."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.gap import FILES, write_gap
     from pam_actuation.report.origin import is_of, origin
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int | None:
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
     emit(args, result.to_dict(), '\n'.join(
         [result.text(), f'results: {args.out}', *_next_lines(result, args.out)]))
-    return EXIT_DONE if result.verdict == 'no_gap' else EXIT_FINDING
+    return EXIT_FINDING if result.verdict == 'refused' else EXIT_DONE
 
 
 def _next_lines(result: 'GapResult', out: str) -> list[str]:

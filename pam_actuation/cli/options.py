@@ -32,7 +32,7 @@ from pam_sim.errors import did_you_mean
 from pam_sim.files import shown
 
 EXIT_DONE = 0
-EXIT_FINDING = 1        # the verb worked and found something the user should look at
+EXIT_FINDING = 1        # something is wrong with the data or the run
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 LONGEST_NAME_BYTES = 255      # of one file or folder, on every file system in use

@@ -19,6 +19,7 @@ from types import SimpleNamespace
 from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli import gap as gap_verb
+from pam_actuation.cli.main import main
 from pam_actuation.report.gap import next_command
 from pam_actuation.report.sections.gap import gap_section
 from pam_sim import load_rig
@@ -162,3 +163,18 @@ def test_another_run_of_the_same_clock_is_a_proof(run):
     other = recorded(nominal(), voltages(4.0), seed=1, jitter_s=0.0)
     find_gap(recorded(nominal(), voltages(4.0), seed=2, jitter_s=0.0), nominal(), other,
              effects=['leakage'], seconds=1.0)
+
+
+@pytest.mark.parametrize('verdict, implausible, code', [
+    *((v, [], 0) for v in ('no_gap', 'parameter', 'effects', 'partial', 'ambiguous', 'unknown')),
+    ('refused', [], 1), ('effects', ['pressure: it cannot be right.'], 1)])
+def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
+        monkeypatch, tmp_path, capsys, verdict, implausible, code):
+    run = SimpleNamespace(implausible=implausible, unusable=())
+    monkeypatch.setattr('pam_actuation.bags.load.load_run', lambda path, namespace=None: run)
+    monkeypatch.setattr('pam_actuation.report.origin.origin', lambda *given: '')
+    monkeypatch.setattr('pam_actuation.report.gap.write_gap',
+                        lambda *given, **more: GapResult(verdict, 'Because.'))
+    assert main(['gap', 'bag', '--out', str(tmp_path / 'gap')]) == code
+    said = capsys.readouterr().out
+    assert f'{verdict}: Because.' in said and all(one in said for one in implausible)
