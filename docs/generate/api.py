@@ -29,6 +29,8 @@ _SETTINGS = Config(
     napoleon_use_rtype=False, napoleon_use_param=False,
     napoleon_custom_sections=[('Attributes', 'params_style')])
 _LITERAL = re.compile(r'(``(?! ).+?``)', re.S)
+# A role that Python knows, such as :func:`name`: its name is shown as a literal.
+_ROLE = re.compile(r':(?:mod|class|func|meth|data|attr|exc|obj):`~?([^`]+)`')
 # What reStructuredText would take for the begin or end of markup in a plain sentence.
 _MARKUP = re.compile(r'[|`]|\*(?=\S)|(?<=\S)\*|(?<=\w)_(?!\w)')
 _INDEX = """Python interface
@@ -163,7 +165,7 @@ def _escaped(text):
     for paragraph in text.split('\n\n'):
         if not (literal and paragraph.startswith((' ', '\t'))):
             literal = paragraph.endswith('::')
-            parts = _LITERAL.split(paragraph)
+            parts = _LITERAL.split(_ROLE.sub(r'``\1``', paragraph))
             parts[::2] = [_MARKUP.sub(r'\\\g<0>', part) for part in parts[::2]]
             paragraph = ''.join(parts)
         paragraphs.append(paragraph)

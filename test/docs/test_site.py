@@ -17,6 +17,7 @@
 from html.parser import HTMLParser
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 from urllib.parse import unquote, urlsplit
@@ -74,6 +75,13 @@ def test_the_site_has_its_parts(site, pages):
                  'reference/api/pam_sim.html', 'reference/topics/force.html'):
         assert (site / name).is_file()
     assert len(pages) > 100
+
+
+def test_no_markup_is_left_in_the_text(pages):
+    left = {f'{path.name}: {found[0]}' for path in pages
+            if (found := re.search(r':(?:mod|class|func|meth|data|attr|exc|obj|ref|doc):`[^<]*',
+                                   path.read_text(encoding='utf-8')))}
+    assert not left
 
 
 def test_links_lead_to_pages_and_places_that_exist(site, pages):
