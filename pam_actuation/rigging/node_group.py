@@ -38,7 +38,7 @@ from pam_sim.errors import InputError
 if TYPE_CHECKING:
     from pam_actuation.rigging.client import RigClient
 
-START_TIMEOUT_S = 60.0        # a busy machine compiles for long
+START_TIMEOUT_S = 150.0       # the first start compiles: two minutes on a small machine
 VENT_S = 0.6                  # for the air, before watchdogs and plant stop
 
 
