@@ -16,11 +16,13 @@
 """Entry point of ``pam``: finds the verbs, parses, runs, turns mistakes into exit code 2."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import importlib
 import os
 import sys
 from typing import TYPE_CHECKING
+import warnings
 
 from pam_actuation import interrupts
 
@@ -104,7 +106,8 @@ def _run_verb(argv: list[str] | None, begin: Callable[[], object] = lambda: None
         return ended.code if isinstance(ended.code, int) else EXIT_BAD_INPUT
     begin()
     try:
-        code = args.call(args)
+        with _no_numerical_warnings():
+            code = args.call(args)
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
         # A verb that did its work on data that cannot be right has found something.
         return EXIT_FINDING if code == EXIT_DONE and getattr(args, 'implausible', ()) else code
@@ -119,6 +122,19 @@ def _run_verb(argv: list[str] | None, begin: Callable[[], object] = lambda: None
     except OSError as error:  # the file system refuses where nobody looked before
         place = f'{shown(str(error.filename))}: ' if error.filename else ''
         return complain(f'{place}{reason(error)}', EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
+
+
+@contextmanager
+def _no_numerical_warnings() -> Iterator[None]:
+    """
+    Keep warnings of NumPy and SciPy from people: a result that is not finite is told as such.
+
+    ``python -W`` and ``PYTHONWARNINGS`` show them.
+    """
+    with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter('ignore', RuntimeWarning)
+        yield
 
 
 if __name__ == '__main__':

@@ -99,7 +99,7 @@ def next_experiment(
         rig: Rig, rivals: Sequence[Rival], recorded: Collection[str],
         noise: Mapping[str, float],
         out_of_time: Callable[[], bool] = lambda: False,
-        pieces: Collection[str] = ()) -> dict[str, Any] | None:
+        pieces: Collection[str] = (), may_add_cell: bool = True) -> dict[str, Any] | None:
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
@@ -117,6 +117,8 @@ def next_experiment(
         Returns whether to stop looking.
     pieces : sequence of str
         What of the menu is tried; all by default.
+    may_add_cell : bool
+        Whether a load cell that was not recorded may be asked for.
 
     """
     found: list[tuple[tuple[bool, float, float], str, bool]] = []
@@ -128,7 +130,7 @@ def next_experiment(
         try:
             run = simulated(_experiment(known, [name]), truth)
             apart = {False: separation(run, rig, rivals, 'force' in recorded)}
-            if 'force' not in recorded:
+            if may_add_cell and 'force' not in recorded:
                 apart[True] = separation(run, rig, rivals, True)
         except InputError:
             continue

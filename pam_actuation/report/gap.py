@@ -44,7 +44,7 @@ from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_text
 from pam_sim.gap import find_gap
-from pam_sim.gap.data.health import check_health, recorded_valve
+from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.select.memory import MEMORY
 from pam_sim.gap.subsystems.simulation import free_run
@@ -99,10 +99,21 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise,
             pieces=('speeds',) if result.at_one_speed and set(MEMORY) <= {
-                rival[0] for rival in result.rivals} else ())
+                rival[0] for rival in result.rivals} else (),
+            may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     save_gap(result, certify or runs[0], out_dir, of)
     return result
+
+
+def may_have_cell(rig: Rig) -> bool:
+    """
+    Return whether a rig may have a load cell.
+
+    One that states noise or quantisation of other sensors and none of the force has none.
+    """
+    stated = {name.split('_')[0] for name, value in rig.sensors.items() if value > 0.0}
+    return 'force' in stated or not stated & {'pressure', 'contraction'}
 
 
 def model_for(run: 'Run', model: 'StrPath | Rig') -> Rig:

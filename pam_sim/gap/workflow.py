@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 import time
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
@@ -101,13 +101,14 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=remarks,
                          runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
     driven = rig.load != 'hanging_mass'
-    recordings = [Recording(run, rig.valve, driven) for run in runs]
+    recordings = [Recording(without_dead(run), rig.valve, driven) for run in runs]
     estimator = Estimator(rig, subsystem_problems(
         rig, recordings, certify is None, seed, criteria), criteria=criteria)
     progress(0.1)
     deadline = started + seconds
     # Its valve signal alone: what was measured on it stays untouched until the validation.
-    held_out = Recording(certify, rig.valve, driven) if certify else recordings[0]
+    held_out = (Recording(without_dead(certify), rig.valve, driven) if certify
+                else recordings[0])
 
     def matters(found: Fit, without: Fit) -> bool:
         bare = held_without(found, without.hypothesis.names)

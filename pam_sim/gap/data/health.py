@@ -18,8 +18,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
+from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
 from pam_sim.run import Run
+
+OPTIONAL = ('force',)        # signals without which a comparison is possible
 
 
 @dataclass
@@ -27,13 +29,15 @@ class Health:
     """
     Outcome of the check.
 
-    ``problems`` forbid a comparison, ``remarks`` weaken it; both are sentences.
+    ``problems`` forbid a comparison, ``remarks`` weaken it; both are sentences. ``signals`` are
+    those that are compared, ``dead`` those whose sensor gives nothing.
     """
 
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     valve: str = ''
     signals: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
     rate_hz: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -76,7 +80,10 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
     if health.problems:
         return health
     health.remarks += getattr(run, 'implausible', ())
-    health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
+    health.dead = dead_signals(run)
+    health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values
+                           and s not in health.dead)
+    health.remarks += [_dead(run, s) for s in health.dead]
     for needed in ('pressure', 'contraction'):
         if needed not in health.signals:
             health.problems.append(f'the recording has no {needed}')
@@ -90,6 +97,36 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
         _check_motion(run, health, criteria)
         _check_saturation(run, health, criteria)
     return health
+
+
+def dead_signals(run: Run) -> tuple[str, ...]:
+    """
+    Return the signals that may be missing, and whose recorded value never changes at all.
+
+    A load cell that is not connected is recorded as 0 N. Its errors are no gap of a model.
+    """
+    found = []
+    for signal in OPTIONAL:
+        values = run.topics[signal].values.get(FIELD[signal]) if signal in run else None
+        if values is not None and len(values) and np.all(values == values[0]):
+            found.append(signal)
+    return tuple(found)
+
+
+def without_dead(run: Run) -> Run:
+    """Return a run without its dead signals."""
+    dead = dead_signals(run)
+    if not dead:
+        return run
+    return Run({name: series for name, series in run.topics.items() if name not in dead},
+               run.metadata, run.namespace, run.path)
+
+
+def _dead(run: Run, signal: str) -> str:
+    factor, unit = READABLE[signal]
+    value = factor * float(run.topics[signal].values[FIELD[signal]][0])
+    return (f'the {signal} is {value:.4g} {unit} in every message, as of a sensor that is not '
+            'connected, so it is not used')
 
 
 def recorded_valve(run: Run) -> str:

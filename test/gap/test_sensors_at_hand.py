@@ -1,0 +1,122 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A sensor that the rig has not, or that is not connected, is neither used nor asked for."""
+
+import warnings
+
+from gap_runs import assert_form, nominal, recorded, voltages
+import numpy as np
+from pam_actuation.cli import main as cli_main
+from pam_actuation.experiments import separating
+from pam_actuation.report import gap as gap_report
+from pam_sim import load_rig
+from pam_sim.gap import find_gap
+from pam_sim.gap.data.health import check_health, dead_signals, without_dead
+from pam_sim.gap.result import GapResult
+import pytest
+
+NAMES = ['coulomb_friction', 'force_bias']
+
+
+def rubbing():
+    return nominal().with_(effects=[{'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}])
+
+
+def with_force(run, value):
+    """Return the run with every reading of the load cell the same."""
+    column = run.topics['force'].values['force_n']
+    run.topics['force'].values['force_n'] = np.full(len(column), value)
+    return run
+
+
+@pytest.fixture(scope='module')
+def dead():
+    return with_force(recorded(rubbing(), voltages(12.0)), 0.0)
+
+
+@pytest.mark.parametrize('certify_too', [False, True])
+def test_a_load_cell_that_reads_0_n_has_no_bias(dead, certify_too):
+    certify = recorded(rubbing(), voltages(10.0, seed=5), seed=8) if certify_too else None
+    result = find_gap(dead, nominal(), certify, effects=NAMES)
+    assert_form(result)
+    assert [e['name'] for e in result.effects] == ['coulomb_friction']
+    told = [r for r in result.remarks if 'not used' in r]
+    assert told == ['the force is 0 N in every message, as of a sensor that is not connected, so '
+                    'it is not used']
+    assert ('force' in result.signals) == certify_too      # there the cell works
+    assert told[0] in result.text()
+
+
+def test_a_dead_sensor_is_one_that_never_changes(dead):
+    alive = recorded(nominal(), voltages(6.0))
+    assert dead_signals(alive) == () and without_dead(alive) is alive
+    assert check_health(alive, 'ppr').signals == ('pressure', 'contraction', 'force')
+    assert dead_signals(with_force(recorded(nominal(), voltages(6.0)), 3.7)) == ('force',)
+    health = check_health(dead, 'ppr')
+    assert health.usable and health.dead == ('force',)
+    assert health.signals == ('pressure', 'contraction')
+    assert 'force' not in without_dead(dead) and 'force' in dead
+
+
+def sensors(**noise):
+    return nominal().with_(sensors=noise)
+
+
+@pytest.mark.parametrize('rig, may', [
+    (nominal(), True), (load_rig('dmsp_5_300_realistic'), True),
+    (sensors(pressure_noise_pa=300.0, contraction_noise_m=1e-5), False),
+    (sensors(pressure_noise_pa=300.0, force_step_n=0.1), True)])
+def test_a_rig_that_states_its_other_sensors_has_no_load_cell(rig, may):
+    assert gap_report.may_have_cell(rig) == may
+
+
+@pytest.mark.parametrize('may', [True, False])
+def test_the_next_experiment_needs_no_sensor_the_rig_has_not(monkeypatch, may):
+    """With a load cell every rival would be told; without one, a little."""
+    monkeypatch.setattr(separating, 'simulated', lambda plain, rig: plain)
+    monkeypatch.setattr(separating, 'separation', lambda run, rig, rivals, with_force: (
+        (50.0, 2.0) if with_force else (0.2, 0.1)))
+    rivals = [(name, nominal(), None, ()) for name in ('end_taper', 'bladder_stiffness')]
+    found = separating.next_experiment(
+        nominal(), rivals, ('pressure', 'contraction'), {}, may_add_cell=may)
+    assert ('force' in found['needs']) == ('load cell' in found['why']) == may
+    assert ('force' in found['experiment']['needs']) == may
+
+
+def test_who_asks_says_what_the_rig_has(monkeypatch, dead, tmp_path):
+    asked = []
+    monkeypatch.setattr(gap_report, 'find_gap', lambda runs, rig, certify, **more: GapResult(
+        'ambiguous', '', rivals=['one', 'other']))
+    monkeypatch.setattr(gap_report, 'next_experiment',
+                        lambda *given, **more: asked.append(more['may_add_cell']))
+    monkeypatch.setattr(gap_report, 'save_gap', lambda *given: None)
+    plain = without_dead(dead)
+    for run, rig in ((plain, nominal()), (dead, nominal()),
+                     (plain, sensors(contraction_noise_m=1e-5))):
+        gap_report.write_gap([run], rig, tmp_path)
+    assert asked == [True, False, False]
+
+
+def test_warnings_of_numpy_do_not_reach_people(monkeypatch):
+    def run(args):
+        return int(np.isfinite(np.log(np.zeros(1))).any())     # divides by zero: a warning
+
+    monkeypatch.setattr('pam_actuation.cli.experiments.run', run)
+    for options, count in (([], 0), (['error'], 1)):
+        monkeypatch.setattr('sys.warnoptions', options)
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter('always')
+            assert cli_main.main(['experiments']) == 0
+        assert len(seen) == count
