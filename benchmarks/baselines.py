@@ -61,7 +61,7 @@ def preset(kind, valve):
 
 def baselines():
     """Return (name, function of a rig that builds the controller) of every baseline."""
-    return [(f'{name}, tuned', lambda rig, kind=kind: load_controller(
+    return [(name, lambda rig, kind=kind: load_controller(
         preset(kind, rig.valve), rig)) for kind, name in KINDS.items()]
 
 

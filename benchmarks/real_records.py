@@ -62,6 +62,7 @@ MIDDLE_BAR = np.linspace(1.0, 5.4, 23)
 INJECTED = (('coulomb_friction', 'force_n', 15.0), ('coulomb_friction', 'force_n', 6.0),
             ('end_taper', 'k_minus_1', 0.2), ('end_taper', 'k_minus_1', 0.07),
             ('threshold_pressure', 'pressure_pa', 15e3))
+TABLED = 'pressure', 'contraction'
 KNOWN_NOW = 0.02             # tolerance of what the first look has calibrated
 
 
@@ -131,16 +132,18 @@ def mm_off(rig, run):
 
 
 def told(result):
-    """Return a result in one line."""
-    parts = [f'{e["name"]} (' + ', '.join(
-        f'{n} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to {q["ci95"][1]:.3g}'
-        for n, q in e['equivalent'].items()) + ')' for e in result.effects]
-    parts += [f'{p.name} {p.value:.4g} {p.unit}' for p in result.parameters]
-    sizes = '; '.join(
-        f'{n} {s.rmse_before:.3g}, {s.rmse_refit:.3g}, {s.rmse_after:.3g} {s.unit}, '
-        f'floor {s.noise_floor:.3g}' for n, s in result.signals.items())
-    return (f'{result.verdict}: {"; ".join(parts) or "-"}; set {result.ambiguity_set}; rms '
-            f'before, calibrated, final: {sizes}; unexplained {result.unexplained_fraction:.2f}')
+    """Return a result as cells of the table."""
+    parts = [f'`{e["name"]}`: ' + ', '.join(
+        f'{n} {q["value"]:.3g} {q["unit"]}'.removesuffix(' -')
+        + f' (95 % {q["ci95"][0]:.3g} to {q["ci95"][1]:.3g})'
+        for n, q in e['equivalent'].items()) for e in result.effects]
+    parts += [f'`{p.name}` {p.value:.4g} {p.unit}' for p in result.parameters]
+    sizes = [', '.join(f'{size:.3g}' for size in (s.rmse_before, s.rmse_refit, s.rmse_after))
+             + f' {s.unit}' for s in (result.signals[name] for name in TABLED)]
+    return ' | '.join((
+        result.verdict, '; '.join(parts) or '–',
+        ', '.join(f'`{name}`' for name in result.ambiguity_set) or '–', *sizes,
+        f'{result.unexplained_fraction:.2f}'))
 
 
 def injected(rig, run, name, parameter, size):
@@ -186,12 +189,13 @@ def show(args):
     first, second = (cycle(loop, k, zero, slope, seed=k) for k in (1, 2))
     stepped = step_run(steps, zero, slope)
     found = find_gap(first, rig, second, MUSCLE_NAMES, args.seconds)
-    print('| looked at | answer |\n|---|---|')
+    print('| looked at | verdict | found | set | '
+          + ' | '.join(f'{n}, rms before, calibrated, final' for n in TABLED)
+          + ' | unexplained |\n|---|---|---|---|---|---|---|')
     print('| loop, first cycle, judged on the second |', told(found), '|', flush=True)
     better = load_rig(found.model_yaml)
-    for label, run in (('second cycle', second), ('steps', stepped)):
-        print(f'| {label}, contraction at recorded pressure | off by {mm_off(rig, run):.2f} mm '
-              f'before, {mm_off(better, run):.2f} mm after |', flush=True)
+    offs = [f'- {label}: {mm_off(rig, run):.2f} mm before, {mm_off(better, run):.2f} mm after'
+            for label, run in (('second cycle', second), ('steps', stepped))]
     result = find_gap(stepped, rig, None, VALVE_NAMES, args.seconds)
     print('| steps, names of the valve |', told(result), '|', flush=True)
     better = replace(better, tolerance=dict.fromkeys(better.tolerance, KNOWN_NOW))
@@ -200,6 +204,7 @@ def show(args):
         result = find_gap(looks[0], better, looks[1], MUSCLE_NAMES, args.seconds)
         print(f'| loop, {name} {parameter} {size:g} injected, from the found model |',
               told(result), '|', flush=True)
+    print('\nContraction at the recorded pressure is off by, rms:\n\n' + '\n'.join(offs))
 
 
 if __name__ == '__main__':
