@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from pam_sim.plant import Plant
     from pam_sim.response import Response
 
+_HALVINGS = 52              # of the stroke, to the last bit
+
 
 @dataclass(frozen=True)
 class EffectSetting:
@@ -242,7 +244,7 @@ class Rig:
         contraction_m : float or ndarray
             Contraction to hold, m.
         load_n : float or ndarray, optional
-            Tension to hold, N; by default the weight of a hanging mass.
+            Tension to hold, N; by default weight and spring of a hanging mass.
 
         Raises
         ------
@@ -251,7 +253,7 @@ class Rig:
 
         """
         if load_n is None:
-            load_n = self._weight_n()
+            load_n = self.tension_n(np.asarray(contraction_m, float))
         pressure = P_ATM_PA + self.muscle.law.law.holding_pressure_pa(
             np.asarray(load_n, float) / self.parameters['force_map_gain'],
             np.asarray(contraction_m, float) / self.muscle.length_m)
@@ -280,17 +282,42 @@ class Rig:
 
         """
         if load_n is None:
-            load_n = self._weight_n()
+            if self.parameters.get('spring_n_per_m', 0.0) > 0.0:
+                return self._rest_with_spring_m(pressure_pa)
+            load_n = self.tension_n(0.0)
         strain = self.muscle.law.law.max_strain(
             np.maximum(np.asarray(pressure_pa, float) - P_ATM_PA, 0.0),
             np.asarray(load_n, float) / self.parameters['force_map_gain'])
         contraction = self.muscle.length_m * np.minimum(strain, self.muscle.max_strain)
         return float(contraction) if np.ndim(contraction) == 0 else contraction
 
-    def _weight_n(self) -> float:
+    def tension_n(self, contraction_m: Number) -> Number:
+        """
+        Return the tension [N] that the load asks for at rest at a contraction [m].
+
+        Weight, and what the spring beside it adds; scalar or array.
+
+        Raises
+        ------
+        InputError
+            A load without weight.
+
+        """
         if 'mass_kg' not in self.parameters:
             raise InputError(f'load `{self.load}` has no weight; give load_n', self.name)
-        return self.parameters['mass_kg'] * GRAVITY_M_PER_S2
+        return (self.parameters['mass_kg'] * GRAVITY_M_PER_S2
+                + self.parameters['spring_n_per_m'] * contraction_m)
+
+    def _rest_with_spring_m(self, pressure_pa: FloatArray | float) -> FloatArray | float:
+        """Return the contraction at rest against weight and spring, by bisection."""
+        given_pa = np.asarray(pressure_pa, float)
+        low = np.zeros(given_pa.shape)
+        high = low + self.muscle.stroke_m
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            beyond = self.static_contraction_m(given_pa, self.tension_n(middle)) > middle
+            low, high = np.where(beyond, middle, low), np.where(beyond, high, middle)
+        return float(low) if np.ndim(low) == 0 else low
 
     # -- dynamics --------------------------------------------------------------------------
     @property

@@ -17,6 +17,7 @@
 from pam_sim.load import LOADS
 from pam_sim.muscle.muscle import MUSCLE_PARAMETERS
 from pam_sim.parameters import Parameter
+from pam_sim.sensors.zeros import ZEROS
 from pam_sim.valve import hsv, ppr
 
 VALVES = ('ppr', 'hsv')
@@ -24,4 +25,4 @@ VALVES = ('ppr', 'hsv')
 
 def rig_parameters(load: str) -> tuple[Parameter, ...]:
     """Return the Parameters a rig with this load has, in the order of model files."""
-    return (*MUSCLE_PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS)
+    return (*MUSCLE_PARAMETERS, *LOADS[load].PARAMETERS, *ppr.PARAMETERS, *hsv.PARAMETERS, *ZEROS)

@@ -37,7 +37,8 @@ from pam_sim.joint import model_file as joint_file, parameters as joint
 from pam_sim.load import LOADS
 from pam_sim.muscle import muscle
 from pam_sim.muscle.registry import laws
-from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
+from pam_sim.tolerance import SD_KEYS
 from pam_sim.units import allowed_range
 from pam_sim.valve import hsv, ppr
 
@@ -95,6 +96,8 @@ def rig_page():
     for module in (ppr, hsv):
         parts += [f'Numbers of the valve `{module.NAME}`:', parameters(module.PARAMETERS)]
     parts += [
+        'Zeros of the sensors:', parameters(ZEROS),
+        '## `tolerance`', 'Where the tolerance of a number is a mapping:', keys(SD_KEYS),
         '## `muscle`', 'Where `muscle` is a mapping:', keys(muscle.KEYS),
         parameters(muscle.DIMENSIONS),
         '## `law`', 'Where `law` is a mapping:', keys(muscle.LAW_KEYS),

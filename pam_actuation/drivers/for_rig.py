@@ -28,7 +28,7 @@ import numpy as np
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
@@ -64,6 +64,9 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     dead_time_s = _effect(rig, 'valve_dead_time', 'delay_s')
     told = {
         'ppr.gain_pa_per_v': values['K_m'],
+        'ppr.lowest_v': values['ppr_lowest_v'],
+        'ppr.highest_v': values['ppr_highest_v'],
+        'ppr.atmospheric_v': values['ppr_lowest_v'] - values['ppr_zero_pa'] / values['K_m'],
         'ppr.time_constant_s': values['T_m'],
         'ppr.dead_time_s': dead_time_s,
         'hsv.period_s': values['pwm_period_s'],
@@ -130,11 +133,12 @@ def _volume(rig: 'Rig', gauge_pa: float) -> float:
 def _swing_hz(rig: 'Rig', gauge_pa: float) -> float:
     """Return the natural frequency [Hz] of the load at constant pressure."""
     x_m = rig.static_contraction_m(P_ATM_PA + gauge_pa)
-    weight_n = rig.parameters['mass_kg'] * GRAVITY_M_PER_S2
-    h_n = 0.01 * weight_n
+    held_n = rig.tension_n(x_m)
+    h_n = 0.01 * held_n
     # dF/dx at constant pressure from two static points of the same pressure.
-    up = rig.static_contraction_m(P_ATM_PA + gauge_pa, weight_n - h_n)
-    down = rig.static_contraction_m(P_ATM_PA + gauge_pa, weight_n + h_n)
+    up = rig.static_contraction_m(P_ATM_PA + gauge_pa, held_n - h_n)
+    down = rig.static_contraction_m(P_ATM_PA + gauge_pa, held_n + h_n)
     if up <= down or x_m <= 0.0:
         return _UNKNOWN_SWING_HZ
-    return math.sqrt(2.0 * h_n / (up - down) / rig.parameters['mass_kg']) / (2.0 * math.pi)
+    stiffness = 2.0 * h_n / (up - down) + rig.parameters['spring_n_per_m']
+    return math.sqrt(stiffness / rig.parameters['mass_kg']) / (2.0 * math.pi)

@@ -37,6 +37,7 @@ _RIG = check_parameters(OF_THE_RIG, {})
 
 PARAMETERS = record(
     'v_per_pa',             # volts per pascal gauge
+    'atmospheric_v',        # volts at which the pressure is atmospheric
     'lowest_v',
     'highest_v',
     'largest_change_v',     # in a step, infinite = free
@@ -54,7 +55,7 @@ OUTPUT = record(
 
 @compiled
 def _step(state: np.record, par: np.record, p_cmd_pa: float, out: np.record) -> None:
-    wanted = (p_cmd_pa - P_ATM_PA) * par.v_per_pa
+    wanted = (p_cmd_pa - P_ATM_PA) * par.v_per_pa + par.atmospheric_v
     volts = min(max(wanted, par.lowest_v), par.highest_v)
     out.saturated = 0.0
     if wanted > par.highest_v:
@@ -95,6 +96,7 @@ class PprConfig:
     What the law knows of the regulator.
 
     ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is ``lowest_v``..``highest_v``;
+    ``atmospheric_v`` is the input at which the gauge pressure is 0;
     ``slew_v_per_s`` limits the change (0 = no limit); ``period_s`` is the time between two steps;
     ``time_constant_s`` is the lag of the regulator and ``dead_time_s`` its pure delay. They serve
     only to judge whether a pressure reading should have moved, and how far it is behind during the
@@ -104,6 +106,8 @@ class PprConfig:
     gain_pa_per_v: float = number(
         _RIG['K_m'], 1e3, 1e7, 'static gain K_m of the regulator')
     lowest_v: float = number(0.0, -10.0, 10.0, 'lowest input of the regulator')
+    atmospheric_v: float = number(
+        0.0, -10.0, 10.0, 'input at which the gauge pressure of the regulator is 0')
     highest_v: float = number(MAX_VOLTAGE_V, 0.1, 24.0, 'highest input of the regulator')
     slew_v_per_s: float = number(0.0, 0.0, 1e6, 'limit of the input change, 0 = none')
     period_s: float = number(0.005, 0.001, 0.01, 'time between two signals')
@@ -114,7 +118,8 @@ class PprConfig:
         """Return the parameter array of ``ppr_step``."""
         slew = self.slew_v_per_s * self.period_s if self.slew_v_per_s > 0.0 else math.inf
         return values_of(PARAMETERS, {
-            'v_per_pa': 1.0 / self.gain_pa_per_v, 'lowest_v': self.lowest_v,
+            'v_per_pa': 1.0 / self.gain_pa_per_v, 'atmospheric_v': self.atmospheric_v,
+            'lowest_v': self.lowest_v,
             'highest_v': self.highest_v, 'largest_change_v': slew})
 
 

@@ -27,6 +27,7 @@ from pam_actuation.valves.chain import Bench, STEP_S
 from pam_actuation.valves.energy import normal_litres, pulse_energy_j, supplied_kg
 from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import voltage_v
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -165,7 +166,7 @@ def measure_flow(rig: 'Rig') -> dict[str, Any]:
     vent: list[float] = []
     for start in OPEN_LOOP_PA:
         if rig.valve == 'ppr':
-            voltage = start / rig.parameters['K_m']
+            voltage = voltage_v(start, rig.parameters)
             end = rig.simulate(np.full(_steps(2.0), voltage),
                                initial_pressure_pa=P_ATM_PA + start).true_pressure_pa[-1]
             fill.append(float(end - P_ATM_PA) / voltage)

@@ -33,14 +33,14 @@ from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 from pam_sim.valve.hsv import clip_duty
-from pam_sim.valve.ppr import set_point_pa
+from pam_sim.valve.ppr import set_point_of
 
 
 def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     if numbers.valve == 'ppr':
         voltage, *_ = numbers.signal
-        return {'set_point_pa': set_point_pa(
-            voltage, numbers.parameters['K_m'], numbers.parameters['p_atm'])}
+        return {'set_point_pa': set_point_of(
+            voltage, numbers.parameters, numbers.parameters['p_atm'])}
     fill, vent = numbers.signal
     return {'fill_opening': clip_duty(fill), 'vent_opening': clip_duty(vent)}
 

@@ -24,13 +24,13 @@ from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
-from pam_sim.valve.ppr import set_point_pa
+from pam_sim.valve.ppr import set_point_of
 
 
 def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     voltage, *_ = numbers.signal
-    return {'set_point_pa': set_point_pa(
-        voltage, numbers.parameters['K_m'], numbers.parameters['p_atm'])}
+    return {'set_point_pa': set_point_of(
+        voltage, numbers.parameters, numbers.parameters['p_atm'])}
 
 
 EFFECT = Effect(

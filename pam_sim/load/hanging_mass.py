@@ -15,7 +15,9 @@
 """
 A mass hanging on a vertical guide rail, with inelastic end stops.
 
-    m dv/dt = F(p, eps) - c v - m g - F_ext        for 0 < x < 0.25 L0
+    m dv/dt = F(p, eps) - c v - m g - k x - F_ext        for 0 < x < 0.25 L0
+
+The spring k beside the mass is relaxed at zero contraction; the nominal rig has none.
 """
 
 from pam_sim.compiled import inlined
@@ -23,14 +25,17 @@ from pam_sim.parameters import Parameter
 
 NAME = 'hanging_mass'
 SENTENCE = 'A mass hangs on the muscle on a vertical rail, between inelastic end stops.'
-EQUATION = ('m dv/dt = F - c v - m g - F_ext for 0 < x < max_strain L0, '
-            'F_cell = m (dv/dt + g) + F_ext')
+EQUATION = ('m dv/dt = F - c v - m g - k x - F_ext for 0 < x < max_strain L0, '
+            'F_cell = m (dv/dt + g) + k x + F_ext')
 SOURCE = 'Rig of the chapter, Fig. 4.5; Newton.'
 MOVES_FREELY = True
 NEEDS_CONTRACTION = False
 
 PARAMETERS = (
     Parameter('mass_kg', 'kg', 5.0, 0.1, 500.0, 0.02, 'Hanging mass.', 'rig of the seed chapter'),
+    Parameter('spring_n_per_m', 'N/m', 0.0, 0.0, 1e6, 0.0,
+              'Stiffness k of a spring beside the mass, relaxed at zero contraction.',
+              'the rig of the chapter has none'),
 )
 
 

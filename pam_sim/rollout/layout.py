@@ -80,6 +80,7 @@ PARAMETERS = record(
     'damping_n_s_per_m',
     'mass_kg',
     'weight_n',
+    'spring_n_per_m',               # beside the mass
     'max_contraction_m',
     'thread_squared_m2',
     'inverse_4_pi_n2',
@@ -89,9 +90,15 @@ PARAMETERS = record(
     'critical_ratio',
     'supply_pa',                    # absolute
     'gain_ppr_pa_per_v',
+    'lowest_ppr_v',
+    'highest_ppr_v',
+    'at_lowest_ppr_pa',             # absolute
     'time_constant_s',
     'decay_half',                   # exp(-substep / 2 T_m)
     'pwm_period_s',
+    'pressure_zero_pa',             # of the readings
+    'contraction_zero_m',
+    'force_zero_n',
     'inverse_length_per_m',
     'inverse_mass_per_kg',
     'inverse_rt_kg_per_j',

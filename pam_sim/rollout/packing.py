@@ -30,7 +30,7 @@ from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.places import FLAGS, law_codes, LAW_PLACE, PLACES, STATE_SIZE
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
-from pam_sim.valve import hsv
+from pam_sim.valve import hsv, ppr
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
     if not (0.0 <= contraction <= top if moves else math.isfinite(contraction)):
         raise InputError(f'`initial_contraction_m` is {contraction:g}; allowed 0 to {top:g} m')
     if signal is None:
-        signal = ((min(max((pressure - P_ATM_PA) / value['K_m'], 0.0), 6.0),)
-                  if rig.valve == 'ppr' else (0.0, 0.0))
+        signal = ((ppr.voltage_v(pressure - P_ATM_PA, value),) if rig.valve == 'ppr'
+                  else (0.0, 0.0))
     else:
         signal = np.atleast_1d(np.asarray(signal, dtype=float))
         lower, upper, unit = rig.signal_range
@@ -111,7 +111,8 @@ def _substep(rig: 'Rig', dt_s: float) -> float:
     value = rig.parameters
     fastest = 0.0                # 1/s, of lag, damping and swing
     if LOADS[rig.load].MOVES_FREELY:
-        stiffness = value['force_map_gain'] * rig.muscle.stiffness_n_per_m
+        stiffness = (value['force_map_gain'] * rig.muscle.stiffness_n_per_m
+                     + value['spring_n_per_m'])
         fastest = max(value['damping_n_s_per_m'] / value['mass_kg'],
                       2.0 * math.sqrt(stiffness / value['mass_kg']))
     if rig.valve == 'ppr':
@@ -149,6 +150,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'damping_n_s_per_m': value['damping_n_s_per_m'],
         'mass_kg': mass,
         'weight_n': mass * GRAVITY_M_PER_S2,
+        'spring_n_per_m': value.get('spring_n_per_m', 0.0),
         'max_contraction_m': muscle.stroke_m,
         'thread_squared_m2': thread_squared,
         'inverse_4_pi_n2': inverse_4_pi_n2,
@@ -158,9 +160,15 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'critical_ratio': value['b'],
         'supply_pa': value['supply_pa'],
         'gain_ppr_pa_per_v': value['K_m'],
+        'lowest_ppr_v': value['ppr_lowest_v'],
+        'highest_ppr_v': value['ppr_highest_v'],
+        'at_lowest_ppr_pa': P_ATM_PA + value['ppr_zero_pa'],
         'time_constant_s': value['T_m'],
         'decay_half': math.exp(-0.5 * numbers.substep_s / value['T_m']),
         'pwm_period_s': value['pwm_period_s'],
+        'pressure_zero_pa': value['pressure_zero_pa'],
+        'contraction_zero_m': value['contraction_zero_m'],
+        'force_zero_n': value['force_zero_n'],
         'inverse_length_per_m': 1.0 / length_m,
         'inverse_mass_per_kg': 1.0 / mass,
         'inverse_rt_kg_per_j': 1.0 / _RT_J_PER_KG,

@@ -76,9 +76,9 @@ def muscle_force(tension: float, p: float, x: float, v: float, dx: float, elapse
 @inlined
 def load_force(x: float, v: float, dx: float, elapsed: float, external: float, beyond: bool,
                state: np.record, par: np.record) -> float:
-    """Return the force of weight, external load and load effects against contraction [N]."""
+    """Return the force of weight, spring, external load and load effects on the load [N]."""
     return hooks.load_force(
-        par.weight_n + external, x, v, dx, elapsed, beyond, state, par)
+        par.weight_n + external + par.spring_n_per_m * x, x, v, dx, elapsed, beyond, state, par)
 
 
 @inlined
@@ -118,7 +118,8 @@ def ppr_pressures(voltage: float, h: float, beyond: bool, state: np.record,
     p = state.pressure_pa
     x = state.contraction_m
     target, time_constant = hooks.set_point(
-        set_point_pa(voltage, par.gain_ppr_pa_per_v, par.atmosphere_pa),
+        set_point_pa(voltage, par.gain_ppr_pa_per_v, par.lowest_ppr_v, par.highest_ppr_v,
+                     par.at_lowest_ppr_pa),
         par.time_constant_s, p, x, beyond, state, par)
     if not (beyond and par.used.pressure_rate > 0.0):
         decay = par.decay_half
@@ -417,9 +418,9 @@ def observe(force: float, a: float, beyond: bool, state: np.record, par: np.reco
     seen.vented_kg = state.vented_kg
     seen.acceleration_m_per_s2 = a
     read_p, read_x, read_f = hooks.sensor(p, x, force, beyond, state, par)
-    seen.pressure_pa = read_p
-    seen.contraction_m = read_x
-    seen.force_n = read_f
+    seen.pressure_pa = read_p + par.pressure_zero_pa
+    seen.contraction_m = read_x + par.contraction_zero_m
+    seen.force_n = read_f + par.force_zero_n
 
 
 @inlined

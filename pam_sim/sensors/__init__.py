@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensors: noise, quantisation and stamp jitter; bias, gain and lag are effects."""
+"""Sensors: noise, quantisation, stamp jitter and zeros; bias, gain and lag are effects."""
 
 from pam_sim.sensors.chain import SENSOR_PARAMETERS, SensorChain
+from pam_sim.sensors.zeros import ZEROS
 
-__all__ = ['SENSOR_PARAMETERS', 'SensorChain']
+__all__ = ['SENSOR_PARAMETERS', 'SensorChain', 'ZEROS']

@@ -24,6 +24,8 @@ from pam_sim.units import P_ATM_PA
 from pam_sim.valve import hsv, ppr
 
 SENSOR_CHANGES = ('bias', 'gain', 'lag')
+_ZERO_OF = {'pressure': 'pressure_zero_pa', 'contraction': 'contraction_zero_m',
+            'force': 'force_zero_n'}
 
 Reading = TypeVar('Reading', float, FloatArray)
 SensorChanges = tuple[float | None, ...]
@@ -53,12 +55,19 @@ def true_value(signal: str, rig: Rig, value: Reading, rate: Reading) -> Reading:
 
 
 def sensor_changes(signal: str, rig: Rig) -> SensorChanges:
-    """Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none."""
+    """
+    Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none.
+
+    The bias holds the zero of the sensor, a number of the rig, too.
+    """
     found = {}
     for setting in rig.effects:
         fitting = get_effect(setting.name).fitting
         if fitting.sensor_signal == signal and setting.parameters:
             found[fitting.sensor_change] = next(iter(setting.parameters.values()))
+    zero = rig.parameters[_ZERO_OF[signal]]
+    if zero != 0.0:
+        found['bias'] = found.get('bias', 0.0) + zero
     return tuple(found.get(change) for change in SENSOR_CHANGES)
 
 
@@ -76,9 +85,11 @@ def undone(signal: str, changes: SensorChanges, value: Reading, rate: Reading) -
 
 
 def subsystem_of_number(name: str) -> str:
-    """Return the subsystem of a number of a rig: ``valve``, ``load`` or ``muscle``."""
+    """Return the subsystem of a number of a rig: ``valve``, ``load``, ``muscle``, ``sensor``."""
     if any(name == p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)):
         return 'valve'
+    if name in _ZERO_OF.values():
+        return 'sensor'
     of_load = {p.name for load in LOADS.values() for p in load.PARAMETERS}
     return 'load' if name in of_load else 'muscle'
 

@@ -29,6 +29,7 @@ from pam_sim.gap.subsystems.effects import true_value
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import MAX_VOLTAGE_V
 
 # Feeding a measured pressure: a regulator this fast follows it exactly enough.
 FAST_T_S = 0.001
@@ -103,7 +104,8 @@ def pressure_driven(rig: Rig) -> Rig:
     """Return the rig with a regulator that follows its command at once."""
     kept = [e for e in rig.effects if get_effect(e.name).subsystem in ('muscle', 'load', 'sensor')]
     return rig.with_(valve='ppr', effects=kept, parameters={
-        'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S})
+        'K_m': FAST_GAIN_PA_PER_V, 'T_m': FAST_T_S, 'ppr_lowest_v': 0.0,
+        'ppr_highest_v': MAX_VOLTAGE_V, 'ppr_zero_pa': 0.0})
 
 
 def simulate(rig: Rig, recording: Recording, valve_signal: FloatArray, start_error_pa: float = 0.0
