@@ -32,7 +32,7 @@ LAYERS = (
     ('nodes',),
     ('cli', 'demo', 'warm_up'))
 # What studies a rig or lists all there is; the physics below knows none of it.
-ABOVE_THE_PHYSICS = ('characterise', 'gap', 'catalogue')
+ABOVE_THE_PHYSICS = ('identify', 'characterise', 'gap', 'catalogue')
 
 
 def modules():

@@ -37,6 +37,7 @@ GROUPS = {
         'export': 'write a bag as a table: CSV, Parquet, MAT, HDF5'},
     'Make a controller or a model better': {
         'tune': 'tune a controller on a model',
+        'identify': 'determine the unknown numbers of a rig',
         'gap': 'find what a model misses, name it and add it',
         'characterise': 'make static surfaces from runs under fixed loads',
         'valves': 'compare the valve types on one rig'},

@@ -47,6 +47,7 @@ NUMBERS = {
     ('characterise', '--length-m'): '0.01 to 20 m',
     ('characterise', '--bore-m'): '0.0001 to 0.2 m',
     ('characterise', '--dead-volume-m3'): '0 to 1 m^3',
+    ('identify', '--added-kg'): '0 to 500 kg', ('identify', '--seed'): '0 to 4294967295',
     ('gap', '--seconds'): '1 s or more', ('gap', '--materiality'): '0.01 to 1000',
     ('valves', '--seed'): '0 to 4294967295', ('valves', '--hold'): '2 to 3600 s',
     ('rules', '--top'): '0 or more'}

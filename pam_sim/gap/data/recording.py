@@ -55,6 +55,8 @@ class Recording:
         Its valve.
     driven : bool
         Contraction is an input of the model (isometric or driven load), no output.
+    held_m : float
+        The contraction where none is recorded [m].
 
     Attributes
     ----------
@@ -69,12 +71,15 @@ class Recording:
 
     """
 
-    def __init__(self, run: Run, valve: str, driven: bool = False) -> None:
+    def __init__(self, run: Run, valve: str, driven: bool = False, held_m: float = 0.0
+                 ) -> None:
         self.valve = valve
         self.driven = driven
         known = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
         self.signals = tuple(s for s in known if not (driven and s == 'contraction'))
-        used = [run.topics[s].stamp_ns for s in known + ('valve_signal',)]
+        command = run.topics.get('valve_signal')
+        used = [run.topics[s].stamp_ns for s in known]
+        used += [] if command is None else [command.stamp_ns]
         self.start_ns = max(int(np.min(s)) for s in used)
         end_ns = min(int(np.max(s)) for s in used)
         self.steps = int((end_ns - self.start_ns) * 1e-9 / GRID_S)
@@ -87,7 +92,11 @@ class Recording:
             self.stamp_ns[signal] = stamp[inside]
             self.time_s[signal] = seconds[inside]
             self.measured[signal] = value[inside]
-        stamped = [_ordered(run.topics['valve_signal'], name) for name in VALVE_FIELDS[valve]]
+        if 'contraction' not in known:
+            self.time_s['contraction'] = self.time_s['pressure']
+            self.measured['contraction'] = np.full(self.time_s['pressure'].size, held_m)
+        stamped = [] if command is None else [
+            _ordered(command, name) for name in VALVE_FIELDS[valve]]
         self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
         self.external_force_n = None
         if 'external_force' in run:

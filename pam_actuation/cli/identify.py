@@ -1,0 +1,81 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam identify``: the unknown numbers of a rig from recordings."""
+
+import argparse
+import json
+from pathlib import Path
+
+from pam_actuation.cli.common import (
+    add_overwrite_option, add_seed_option, emit, EXIT_DONE, note_implausible, progress)
+from pam_actuation.cli.options import number, out_path, Parser, source
+
+HELP = 'Determine the unknown numbers of a rig, and say which the recordings do not determine.'
+EXAMPLE = 'pam identify runs/first --rig my_rig.yaml --unknown mass_kg spring_n_per_m'
+FILES = ('identify.json', 'rig.yaml', 'next_experiment.yaml')
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('run', type=source, nargs='+', help='recorded bags')
+    parser.add_argument('--rig', type=source, required=True, metavar='NAME|FILE',
+                        help='rig with the numbers that are known; `tolerance` says which are '
+                        'unknown')
+    parser.add_argument('--unknown', type=source, nargs='+', default=[], metavar='NUMBER',
+                        help='further unknown numbers: a parameter of the rig such as mass_kg, '
+                        'spring_n_per_m, pressure_zero_pa, contraction_zero_m, force_zero_n, or '
+                        'EFFECT.PARAMETER')
+    parser.add_argument('--added-kg', type=number(0.0, 500.0, 'kg'), nargs='+', default=[],
+                        metavar='KG', help='known mass that hung on the load in addition, one '
+                        'for each bag (default: none)')
+    parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
+                        help='folder for rig.yaml with the numbers found, identify.json and '
+                        'next_experiment.yaml')
+    parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
+    add_seed_option(parser, 'seed of the starts of the fit')
+    add_overwrite_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify, write what was found, and say what to measure next."""
+    from pam_actuation.bags.load import load_run
+    from pam_sim import load_rig
+    from pam_sim.files import check_folder, whole_files, write_text
+    from pam_sim.identify import identify
+    from pam_sim.located_yaml import dump_yaml
+    if args.out is not None:
+        check_folder(args.out, FILES, args.overwrite)
+    rig = load_rig(args.rig)
+    runs = [load_run(path, namespace=args.namespace) for path in args.run]
+    note_implausible(args, runs)
+    with progress(args, 1.0, '', 'identify') as bar:
+        found = identify(runs, rig, args.unknown, args.added_kg, args.seed,
+                         progress=lambda done: bar.update(done - bar.n))
+    lines = [found.text()]
+    if args.out is not None:
+        with whole_files(args.out) as folder:
+            write_text(folder / 'identify.json', json.dumps(found.to_dict(), indent=2) + '\n')
+            write_text(folder / 'rig.yaml', found.rig.to_yaml())
+            if found.next_experiment is not None:
+                write_text(folder / 'next_experiment.yaml',
+                           dump_yaml(found.next_experiment['experiment']))
+        lines.append(f'results: {args.out}')
+        if found.next_experiment is not None:
+            lines.append(f'next: pam run {Path(args.out) / "next_experiment.yaml"}')
+        else:
+            lines.append(f'next: pam gap {" ".join(args.run)} --model '
+                         f'{Path(args.out) / "rig.yaml"} --out gap')
+    emit(args, found.to_dict(), '\n'.join(lines))
+    return EXIT_DONE

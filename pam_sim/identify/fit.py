@@ -1,0 +1,231 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Fit the unknown numbers to recordings.
+
+The fit begins at the best of many starts spread over the ranges: a mass that is wrong by a factor
+of ten leaves no slope to follow. Weights are the noise floors, lowered by misfit and memory of
+what is left, so that an incomplete model does not seem to know its numbers better than it does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.data.split import FIT, SELECT, UNUSED
+from pam_sim.gap.fit.solver import simulated_errors, tempering
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.identify.numbers import Number, with_values
+from pam_sim.rig import Rig
+from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import qmc
+
+STARTS = 64                  # of the first look, each simulated once
+FOLLOWED = 3                 # of them fitted
+BETTER = 0.01                # of the sum of logarithms of misfits
+ROUNDS = 4                   # of weights and errors
+SETTLED = 0.2                # relative change of the weights that ends the rounds
+STEP = 1e-6                  # of a slope, in coordinates: a bend would look like information
+COARSE = 2e5                 # times that, of effects and of times of the measurement
+EVALUATIONS = 30
+# Of an unknown number from one end of its range to the other, in deviations: what the data leave
+# open ends near the value that the rig file has.
+TIE_BREAKER = 0.3
+FOLLOWED_STEPS = 6           # of a profile, with the slopes of the solution
+GAIN, TIGHT = 0.02, 1e-9     # of the cost, which ends them; least room of a number
+
+
+@dataclass
+class Weighted:
+    """
+    The errors of all subsystems as one least-squares problem.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+    problems : list of SubsystemProblem
+    numbers : list of Number
+        Unknown ones first.
+    temper : list of numpy.ndarray
+        By how much the weight of each signal is lowered, by subsystem.
+
+    """
+
+    rig: Rig
+    problems: Sequence[SubsystemProblem]
+    numbers: Sequence[Number]
+    temper: list[FloatArray] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Start from full weights."""
+        self.temper = self.temper or [np.ones(len(p.signals)) for p in self.problems]
+        ends = np.array([n.bounds() for n in self.numbers])
+        self.low, self.high = ends[:, 0], ends[:, 1]
+        self.prior = np.array([
+            TIE_BREAKER / (high - low) if n.unknown else 1.0
+            for n, (low, high) in zip(self.numbers, ends)])
+
+    def values(self, x: FloatArray) -> dict[str, float]:
+        """Return the values of the numbers by name."""
+        return {n.name: n.value(float(c)) for n, c in zip(self.numbers, x)}
+
+    def errors(self, x: FloatArray, problem: SubsystemProblem) -> FloatArray:
+        """Return the errors of one subsystem in floors."""
+        values = self.values(x)
+        rig = with_values(self.rig, self.numbers, values)
+        z = np.array([(values.get(k.name, k.value) - k.value) / k.sd for k in problem.known])
+        return np.where(problem.part == UNUSED, 0.0, simulated_errors(problem, rig, z))
+
+    def _scaled(self, errors: FloatArray, place: int) -> FloatArray:
+        return errors / np.sqrt(self.temper[place][self.problems[place].signal])
+
+    def residuals(self, x: FloatArray) -> FloatArray:
+        """Return the weighted errors, then the priors."""
+        return np.concatenate([
+            self._scaled(self.errors(x, p), k) for k, p in enumerate(self.problems)]
+            + [self.prior * x])
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of ``residuals``, each from the subsystems a number acts in."""
+        base = [self.errors(x, p) for p in self.problems]
+        rows = []
+        for j, number in enumerate(self.numbers):
+            step = STEP if x[j] + STEP <= self.high[j] else -STEP
+            if not number.unknown and (number.effect or number.subsystem):
+                step *= COARSE              # a time needs whole steps of the grid
+            moved = np.array(x)
+            moved[j] += step
+            own = (np.arange(x.size) == j) * self.prior
+            rows.append(np.concatenate([
+                self._scaled(self.errors(moved, p) - base[k], k) / step
+                if number.acts_in(p) else np.zeros(base[k].size)
+                for k, p in enumerate(self.problems)] + [own]))
+        return np.array(rows).T
+
+    def solve(self, x: FloatArray, held: BoolArray | None = None,
+              evaluations: int = EVALUATIONS) -> tuple[FloatArray, float]:
+        """
+        Return (solution, cost) from a start; numbers in the mask ``held`` stay.
+
+        The cost is the sum of the squared residuals.
+        """
+        free = np.ones(x.size, bool) if held is None else ~held
+        if not free.any():
+            return x, float(np.sum(self.residuals(x) ** 2))
+        x = np.array(x, float)
+
+        def whole(part: FloatArray) -> FloatArray:
+            full = np.array(x)
+            full[free] = part
+            return full
+
+        margin = 1e-9 * (self.high - self.low)
+        start = np.clip(x, self.low + margin, self.high - margin)[free]
+        found = least_squares(
+            lambda part: self.residuals(whole(part)), start,
+            lambda part: self.slopes(whole(part))[:, free],
+            (self.low[free], self.high[free]), x_scale='jac', ftol=1e-6, xtol=1e-6,
+            max_nfev=evaluations)
+        return whole(found.x), 2.0 * float(found.cost)
+
+    def follow(self, x: FloatArray, held: BoolArray, slopes: FloatArray
+               ) -> tuple[FloatArray, float]:
+        """
+        Return (solution, cost) near a solution whose slopes are known; ``held`` numbers stay.
+
+        Each iteration costs one simulation: the slopes are those given.
+        """
+        free = np.flatnonzero(~held)
+        best, residuals = x, self.residuals(x)
+        cost = float(residuals @ residuals)
+        for _ in range(FOLLOWED_STEPS):
+            step = lsq_linear(slopes[:, free], -residuals, (
+                np.minimum(self.low[free] - best[free], -TIGHT),
+                np.maximum(self.high[free] - best[free], TIGHT))).x
+            moved = np.array(best)
+            moved[free] = np.clip(best[free] + step, self.low[free], self.high[free])
+            fresh = self.residuals(moved)
+            if float(fresh @ fresh) >= cost:
+                break
+            gained, cost = cost - float(fresh @ fresh), float(fresh @ fresh)
+            best, residuals = moved, fresh
+            if gained < GAIN:
+                break
+        return best, cost
+
+    def retemper(self, x: FloatArray) -> bool:
+        """Set the weights after the errors; return whether they had settled."""
+        fresh = [tempering(p, self.errors(x, p), (FIT, SELECT)) for p in self.problems]
+        settled = all(bool(np.all(np.abs(new / old - 1.0) < SETTLED))
+                      for new, old in zip(fresh, self.temper))
+        self.temper = fresh
+        return settled
+
+    def misfit(self, x: FloatArray) -> float:
+        """Return a measure that compares far starts: sum of the logarithms of the misfits."""
+        total = 0.0
+        for p in self.problems:
+            errors = self.errors(x, p)
+            for s in range(len(p.signals)):
+                chosen = errors[(p.signal == s) & (p.part != UNUSED)]
+                total += float(np.log(np.mean(chosen ** 2)))
+        return total
+
+
+def settle(weighted: Weighted, x: FloatArray) -> FloatArray:
+    """Return the solution near a start, once weights and errors agree."""
+    for _ in range(ROUNDS):
+        if weighted.retemper(x):
+            break
+        x, _ = weighted.solve(x)
+    return x
+
+
+def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
+    """
+    Return the best coordinates of the numbers; the weights settle on the way.
+
+    Parameters
+    ----------
+    weighted : Weighted
+        Its weights are changed.
+    seed : int
+        Of the spread of the starts.
+
+    """
+    unknown = [j for j, n in enumerate(weighted.numbers) if n.unknown]
+    starts = [np.zeros(len(weighted.numbers))]
+    if unknown:
+        spread = qmc.Sobol(len(unknown), seed=seed).random(STARTS)
+        for row in spread:
+            x = np.zeros(len(weighted.numbers))
+            x[unknown] = weighted.low[unknown] + row * (
+                weighted.high[unknown] - weighted.low[unknown])
+            starts.append(x)
+    # Where other values fit no better, those of the rig file stay.
+    ranked = [starts[0], *sorted(starts[1:], key=weighted.misfit)]
+    best: FloatArray = ranked[0]
+    least = np.inf
+    start: FloatArray
+    for start in ranked[:FOLLOWED + 1]:
+        for evaluations in (EVALUATIONS // 2, EVALUATIONS):
+            # From full weight: a poor start would lower the weight that could lead away from it.
+            weighted.temper = [np.ones(len(p.signals)) for p in weighted.problems]
+            start, _ = weighted.solve(start, evaluations=evaluations)
+        misfit = weighted.misfit(start)
+        if misfit < least - BETTER:
+            best, least = start, misfit
+    return settle(weighted, best)

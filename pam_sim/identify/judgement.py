@@ -1,0 +1,165 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which numbers the data determine, which only together, and which not at all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+import math
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.identify.numbers import Number
+from pam_sim.identify.profile import Interval, NORMAL_95
+
+DETERMINED, TOGETHER, UNDETERMINED = 'determined', 'only together', 'not determined'
+# Ratio of the ends of an interval; or its share of the range, of a zero and of a size.
+NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SIZES = 1.5, 0.02, 0.005
+KNOWN = 0.5                  # standard deviation of what is worth telling, in coordinates
+ROUND = 0.03                 # how near to a whole number a power is one
+GENTLE = 1e-12
+
+
+@dataclass(frozen=True)
+class Combination:
+    """
+    What is known of several numbers that are not known one by one.
+
+    For ``product`` False: the sum of ``weights[name] * value`` is ``value``. For True the product
+    of ``value ** weights[name]`` is. The first weight is 1.
+
+    Parameters
+    ----------
+    weights : dict of str -> float
+    value, half_width : float
+        With the 95 % half width; of a product relative.
+    product : bool
+
+    """
+
+    weights: dict[str, float]
+    value: float
+    half_width: float
+    product: bool
+
+    def text(self) -> str:
+        """Return the combination as a formula."""
+        if self.product:
+            terms = ' · '.join(name if w == 1.0 else f'{name}^{w:.3g}'
+                               for name, w in self.weights.items())
+            return f'{terms} = {self.value:.4g} ± {100.0 * self.half_width:.2g} %'
+        terms = ' + '.join(name if w == 1.0 else f'{w:.4g}·{name}'
+                           for name, w in self.weights.items()).replace('+ -', '- ')
+        return f'{terms} = {self.value:.4g} ± {self.half_width:.2g}'
+
+
+def is_narrow(number: Number, low: float, high: float) -> bool:
+    """Tell whether an interval is short beside the range of the number."""
+    if low > 0.0 and high / low <= NARROW_RATIO:
+        return True
+    share = NARROW_SHARE if number.lower < 0.0 else NARROW_SHARE_OF_SIZES
+    return not number.is_scale and high - low <= share * (number.upper - number.lower)
+
+
+def judge(numbers: Sequence[Number], intervals: Sequence[Interval], x: FloatArray,
+          information: FloatArray) -> tuple[list[str], list[Combination]]:
+    """
+    Return (status of each unknown number, combinations).
+
+    Parameters
+    ----------
+    numbers : list of Number
+        The unknown ones.
+    intervals : list of Interval
+        Theirs.
+    x : numpy.ndarray
+        Their coordinates at the solution.
+    information : numpy.ndarray, shape (K, K)
+        Of the unknown numbers, all others accounted for.
+
+    """
+    statuses = []
+    for j, (number, interval) in enumerate(zip(numbers, intervals)):
+        if is_narrow(number, interval.low, interval.high):
+            statuses.append(DETERMINED)
+            continue
+        # With the other unknown numbers given, would it be known?
+        alone = NORMAL_95 / math.sqrt(max(float(information[j, j]), GENTLE))
+        low, high = number.value(float(x[j]) - alone), number.value(float(x[j]) + alone)
+        statuses.append(TOGETHER if is_narrow(number, low, high) else UNDETERMINED)
+    group = [j for j, status in enumerate(statuses) if status == TOGETHER]
+    if len(group) == 1:         # the others are known well enough to leave it to itself
+        statuses[group[0]] = UNDETERMINED
+        group = []
+    covariance = np.linalg.inv(information + GENTLE * np.eye(len(numbers)))
+    return statuses, _combinations([numbers[j] for j in group], x[group],
+                                   np.linalg.inv(covariance[np.ix_(group, group)]))
+
+
+def _combinations(numbers: Sequence[Number], x: FloatArray, information: FloatArray
+                  ) -> list[Combination]:
+    """
+    Return what is known of numbers together: of pairs where that is enough, else of all.
+
+    Sizes are combined by their logarithms, since what scales together in physics is a product.
+    """
+    if not numbers:
+        return []
+    values = np.array([n.value(float(c)) for n, c in zip(numbers, x)])
+    product = all(n.lower >= 0.0 for n in numbers) and bool(np.all(values > 0.0))
+    # What one unit of a coordinate is, in logarithms or in the number's own unit.
+    units = np.array([
+        (1.0 if n.is_scale else n.step / v) if product else (v if n.is_scale else n.step)
+        for n, v in zip(numbers, values)])
+    covariance = np.linalg.inv(information + GENTLE * np.eye(len(numbers)))
+    pairs = []
+    for i, j in combinations(range(len(numbers)), 2):
+        pairs.append(_best_known([i, j], covariance, units))
+    joined = [{k} for k in range(len(numbers))]
+    found = []
+    for sd, places, axis in sorted(pairs, key=lambda pair: pair[0]):
+        groups = [next(g for g in joined if k in g) for k in places]
+        if sd > KNOWN or groups[0] is groups[1]:
+            continue
+        groups[0] |= groups[1]
+        joined.remove(groups[1])
+        found.append(_combination(numbers, values, places, axis, sd, product))
+    if not found and len(numbers) > 2:
+        sd, places, axis = _best_known(range(len(numbers)), covariance, units)
+        if sd < KNOWN:
+            found.append(_combination(numbers, values, places, axis, sd, product))
+    return found
+
+
+def _best_known(places: Sequence[int], covariance: FloatArray, units: FloatArray
+                ) -> tuple[float, Sequence[int], FloatArray]:
+    """Return (standard deviation, places, weights) of the best known sum of coordinates."""
+    variance, axes = np.linalg.eigh(covariance[np.ix_(places, places)])
+    return math.sqrt(max(float(variance[0]), 0.0)), places, axes[:, 0] / units[list(places)]
+
+
+def _combination(numbers: Sequence[Number], values: FloatArray, places: Sequence[int],
+                 axis: FloatArray, sd: float, product: bool) -> Combination:
+    weights = {numbers[k].name: float(a / axis[0]) for k, a in zip(places, axis)}
+    half = abs(NORMAL_95 * sd / float(axis[0]))
+    chosen = [float(values[k]) for k in places]
+    if not product:
+        return Combination(weights, sum(v * w for v, w in zip(chosen, weights.values())), half,
+                           False)
+    # Powers of physics are whole.
+    weights = {name: float(round(w)) if abs(w - round(w)) < ROUND and round(w) else w
+               for name, w in weights.items()}
+    return Combination(
+        weights, math.prod(v ** w for v, w in zip(chosen, weights.values())), half, True)

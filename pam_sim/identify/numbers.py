@@ -1,0 +1,188 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The numbers of an identification: those that are unknown, and those known to a deviation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from pam_sim.effects.registry import get_effect
+from pam_sim.errors import did_you_mean, InputError
+from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.parameters import Parameter
+from pam_sim.rig import EffectSetting, Rig
+
+# Zeros of sensors and the spring of a load are effects; people name what they do not know.
+SHORT_NAMES = {
+    'spring_n_per_m': 'parallel_spring.stiffness_n_per_m',
+    'pressure_zero_pa': 'pressure_bias.bias_pa',
+    'contraction_zero_m': 'contraction_bias.bias_m',
+    'force_zero_n': 'force_bias.bias_n'}
+# A range over more than this factor is one of scales: its middle is that of the logarithms.
+SCALE_RATIO = 5.0
+LARGEST_LOGARITHM = 50.0
+FARTHEST_SD = 6.0            # of a number with a prior
+
+
+@dataclass(frozen=True)
+class Number:
+    """
+    A number that is fitted.
+
+    Parameters
+    ----------
+    name : str
+        As people call it: of a parameter of the rig, or a key of ``SHORT_NAMES``.
+    effect, parameter : str
+        Where it stands: effect ('' for the rig itself) and parameter.
+    unit, description : str
+    start, lower, upper : float
+        SI.
+    sd : float
+        Standard deviation of the prior, ``inf`` for an unknown one.
+    subsystem : str
+        Of a number of the measurement alone, such as a latency; '' for one of the rig.
+
+    """
+
+    name: str
+    effect: str
+    parameter: str
+    unit: str
+    start: float
+    lower: float
+    upper: float
+    sd: float = math.inf
+    subsystem: str = ''
+    description: str = ''
+
+    @property
+    def unknown(self) -> bool:
+        """Tell whether there is no prior but the range."""
+        return math.isinf(self.sd)
+
+    @property
+    def is_scale(self) -> bool:
+        """Tell whether it is fitted by its logarithm."""
+        return self.unknown and self.lower > 0.0 and self.upper / self.lower > SCALE_RATIO
+
+    @property
+    def step(self) -> float:
+        """Return what one unit of the coordinate means, in the number's unit (1 for scales)."""
+        if self.is_scale:
+            return 1.0
+        return 0.05 * (self.upper - self.lower) if self.unknown else self.sd
+
+    def value(self, coordinate: float) -> float:
+        """Return the value of a coordinate, within the range."""
+        found = (self.start * math.exp(min(coordinate, LARGEST_LOGARITHM)) if self.is_scale
+                 else self.start + self.step * coordinate)
+        return min(max(found, self.lower), self.upper)
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        if self.is_scale:
+            return math.log(value / self.start)
+        return (value - self.start) / self.step
+
+    def bounds(self) -> tuple[float, float]:
+        """Return the lowest and highest coordinate."""
+        low, high = self.coordinate(self.lower), self.coordinate(self.upper)
+        return (low, high) if self.unknown else (max(low, -FARTHEST_SD), min(high, FARTHEST_SD))
+
+    def acts_in(self, problem: SubsystemProblem) -> bool:
+        """Tell whether it changes what a subsystem gives."""
+        if self.effect:
+            return (acts_on(self.effect, problem.subsystem)
+                    or get_effect(self.effect).fitting.sensor_signal == 'contraction')
+        return any(k.name == self.name for k in problem.known) and (
+            not self.subsystem or self.subsystem == problem.subsystem)
+
+
+def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
+    """
+    Return the unknown numbers of a rig, those its file says and those named.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+    names : sequence of str
+        A parameter of the rig, a key of ``SHORT_NAMES``, or ``EFFECT.PARAMETER``.
+
+    Raises
+    ------
+    InputError
+        There is no such number.
+
+    """
+    parameters = {p.name: p for p in rig.parameter_list}
+    found: dict[str, Number] = {}
+    for name in (*rig.unknown, *names):
+        if name in parameters:
+            p = parameters[name]
+            value = rig.parameters[name]
+            found[name] = Number(name, '', name, p.unit, value if value > 0.0 or p.lower <= 0.0
+                                 else p.default, p.lower, p.upper, description=p.description)
+            continue
+        effect_name, dot, key = SHORT_NAMES.get(name, name).partition('.')
+        if not dot:
+            known = [*parameters, *SHORT_NAMES]
+            raise InputError(
+                f'`{name}` is no number of the rig{did_you_mean(name, known)}; allowed: '
+                f'{", ".join(known)}, or EFFECT.PARAMETER', 'unknown number')
+        found[name] = _of_effect(rig, name, effect_name, key)
+    return list(found.values())
+
+
+def _of_effect(rig: Rig, name: str, effect_name: str, key: str) -> Number:
+    effect = get_effect(effect_name, 'unknown number')
+    by_name = {p.name: p for p in effect.parameters}
+    if key not in by_name:
+        raise InputError(f'`{key}` is no parameter of {effect_name}'
+                         f'{did_you_mean(key, by_name)}; allowed: {", ".join(by_name)}', name)
+    p: Parameter = by_name[key]
+    here = next((e for e in rig.effects if e.name == effect_name), None)
+    start = here.parameters.get(key, p.default) if here is not None else (
+        max(0.0, p.lower) if key in effect.amplitude else p.default)
+    return Number(name, effect_name, key, p.unit, float(start), p.lower, p.upper,
+                  description=p.description)
+
+
+def known_numbers_of(problems: Sequence[SubsystemProblem], unknown: Sequence[Number]
+                     ) -> list[Number]:
+    """Return the numbers with a prior that act in the subsystems, each once."""
+    taken = {n.name for n in unknown}
+    found: dict[str, Number] = {}
+    for problem in problems:
+        for k in problem.known:
+            if k.name not in taken and not k.unknown:
+                found.setdefault(k.name, Number(
+                    k.name, '', k.name, k.unit, k.value, k.lower, k.upper, k.sd,
+                    '' if k.of_rig else problem.subsystem))
+    return list(found.values())
+
+
+def with_values(rig: Rig, numbers: Sequence[Number], values: Mapping[str, float]) -> Rig:
+    """Return the rig with the values of the numbers that stand in it."""
+    parameters, effects = {}, {e.name: e for e in rig.effects}
+    for n in numbers:
+        if n.effect:
+            here = effects.get(n.effect)
+            kept = dict(here.parameters) if here is not None else {}
+            effects[n.effect] = EffectSetting(n.effect, {**kept, n.parameter: values[n.name]})
+        elif not n.subsystem:
+            parameters[n.name] = values[n.name]
+    return rig.with_(parameters=parameters, effects=list(effects.values()))

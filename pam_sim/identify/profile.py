@@ -1,0 +1,138 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How well each number is known: the interval in which its profile likelihood stays near the best.
+
+The profile of a number is the least cost that the others reach while it is held. Its 95 % interval
+ends where that cost is 3.84 above the least one (Raue et al. 2009, Bioinformatics 25(15), 1923).
+An end that lies at the end of the range is open: the data do not exclude what is beyond.
+"""
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.identify.fit import Weighted
+
+RISE_95 = 3.841              # 95 % of chi squared with one degree of freedom
+NORMAL_95 = 1.96
+FARTHER = 2.0                # next try, where the cost has not risen enough
+FLAT, FLAT_FARTHER = 0.1, 10.0       # the same, where it has hardly risen
+TRIES = 9
+EVALUATIONS = 8
+BETTER = 0.1                 # of the cost
+CLOSE = 0.15                 # of the wanted rise
+NUMERICS = 2e-3              # relative; steps of the grid and of slopes limit every number
+
+
+@dataclass(frozen=True)
+class Interval:
+    """
+    Where a number may be.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends, SI.
+    open_low, open_high : bool
+        Whether an end is that of the range.
+    points : tuple of (float, float)
+        Values tried and by how much the cost rose, in rising order.
+
+    """
+
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+    points: tuple[tuple[float, float], ...]
+
+
+def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArray,
+            slopes: FloatArray) -> tuple[Interval, FloatArray | None]:
+    """
+    Return (interval of one number, a better solution that was met on the way or None).
+
+    Parameters
+    ----------
+    weighted : Weighted
+        With settled weights.
+    x : numpy.ndarray
+        The solution.
+    place : int
+        Which number.
+    covariance : numpy.ndarray, shape (K, K)
+        At the solution; where the look for the ends begins, and how the others follow.
+    slopes : numpy.ndarray, shape (N, K)
+        Of the residuals at the solution.
+
+    """
+    number = weighted.numbers[place]
+    least = float(np.sum(weighted.residuals(x) ** 2))
+    held = np.arange(x.size) == place
+    points = {0.0: 0.0}
+    lowest: list[Any] = [least, None]
+    follow = covariance[:, place] / max(covariance[place, place], 1e-300)
+
+    def rise(shift: float, near: FloatArray) -> tuple[float, FloatArray]:
+        start = np.array(near)
+        start[place] = x[place] + shift
+        solved, cost = weighted.follow(start, held, slopes)
+        if cost - least > RISE_95:          # in a bent valley the slopes lead astray
+            solved, cost = weighted.solve(solved, held, EVALUATIONS)
+        if cost < lowest[0] - BETTER:
+            lowest[:] = [cost, solved]
+        points[shift] = cost - least
+        return cost - least, solved
+
+    ends, opened = [], []
+    for sign, limit in ((-1.0, weighted.low[place]), (1.0, weighted.high[place])):
+        room = abs(limit - x[place])
+        shift = min(NORMAL_95 * float(np.sqrt(covariance[place, place])), room)
+        inner, inner_rise, outer = 0.0, 0.0, None
+        near, end, is_open = x, room, True
+        for _ in range(TRIES):
+            if shift <= 1e-9:
+                break
+            guess = near + follow * (sign * shift - (near[place] - x[place]))
+            height, solved = rise(sign * shift, np.clip(guess, weighted.low, weighted.high))
+            if abs(height / RISE_95 - 1.0) < CLOSE:
+                end, is_open = shift, False
+                break
+            if height < RISE_95:
+                inner, inner_rise, near = shift, max(height, 0.0), solved
+                if shift >= room:
+                    break
+                end, is_open = room, True
+            else:
+                outer = (shift, height)
+            if outer is None:
+                shift = min(shift * (FLAT_FARTHER if height < FLAT else FARTHER), room)
+                continue
+            # The root of the rise is nearly straight.
+            low, high = np.sqrt(inner_rise), np.sqrt(outer[1])
+            part = (np.sqrt(RISE_95) - low) / max(high - low, 1e-12)
+            shift = inner + float(np.clip(part, 0.1, 0.9)) * (outer[0] - inner)
+            end, is_open = shift, False
+        # A coordinate of a scale is relative already.
+        least_width = NUMERICS * (1.0 if number.is_scale else abs(
+            number.value(float(x[place]))) / number.step)
+        ends.append(number.value(float(x[place] + sign * math.hypot(end, least_width))))
+        opened.append(is_open)
+    interval = Interval(ends[0], ends[1], opened[0], opened[1], tuple(
+        (number.value(float(x[place] + shift)), points[shift]) for shift in sorted(points)))
+    return interval, lowest[1]

@@ -1,0 +1,172 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a recording can tell: of the valve, of muscle and load, or of the muscle alone."""
+
+from collections.abc import Mapping, Sequence
+import copy
+from dataclasses import dataclass
+
+import numpy as np
+from pam_sim.errors import InputError
+from pam_sim.gap.data.noise import noise_sd, SMALLEST
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.signals import VALVE_FIELDS
+from pam_sim.gap.subsystems.mechanics import MechanicsProblem
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.valve import ValveProblem
+from pam_sim.response import Response
+from pam_sim.rig import Rig
+from pam_sim.run import Run
+
+LEAST_SAMPLES = 20
+LEAST_DURATION_S = 1.0
+STILL_SHARE = 0.003          # of the stroke; a contraction that moves less is held by something
+SHORT_S, LONG_S = 0.05, 0.4  # windows of a pressure that moves, and of one that rests
+MOVING_PA = 20e3             # a pressure that moves more would move a free muscle
+
+
+@dataclass(frozen=True)
+class Offer:
+    """
+    What one recording offers.
+
+    Parameters
+    ----------
+    path : str
+        Of the recording.
+    recording : Recording
+    valve, mechanics : bool
+        Whether command and pressure, or pressure and what the muscle does, are there.
+    kind : str
+        For people.
+    added_kg : float
+        Known mass that hung on the load in addition.
+
+    """
+
+    path: str
+    recording: Recording
+    valve: bool
+    mechanics: bool
+    kind: str
+    added_kg: float = 0.0
+
+
+class LoadedMechanics(MechanicsProblem):
+    """Muscle and load, with known masses hung on the load in some of the recordings."""
+
+    def __init__(self, rig: Rig, offers: Sequence[Offer]) -> None:
+        self._added_kg = [one.added_kg for one in offers]
+        super().__init__(rig, [with_quiet_pressure(one.recording) for one in offers],
+                         holds_certify=False)
+
+    def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
+        added = self._added_kg[index]
+        if added:
+            rig = rig.with_(parameters={'mass_kg': rig.parameters['mass_kg'] + added})
+        return super()._simulate(rig, index, numbers)
+
+
+def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
+    """
+    Return what a recording offers.
+
+    Parameters
+    ----------
+    run : Run
+    rig : pam_sim.Rig
+    added_kg : float
+        Known mass on the load in addition to that of the rig.
+
+    Raises
+    ------
+    InputError
+        There is no pressure, or neither a command nor a contraction or force.
+
+    """
+    where = run.path or 'recording'
+    if 'pressure' not in run or len(run['pressure']) < LEAST_SAMPLES:
+        raise InputError(
+            f'has no `pressure` of at least {LEAST_SAMPLES} messages; every number is found '
+            'from the pressure', where)
+    command = 'valve_signal' in run and all(
+        name in run['valve_signal'].values for name in VALVE_FIELDS[rig.valve])
+    contraction, force = (
+        name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))
+    held = rig.load != 'hanging_mass' or (force and _is_held(run, rig))
+    isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
+    mechanics = (force and (contraction or isometric_m is not None)) if held else contraction
+    valve = command and (rig.valve == 'ppr' or contraction or isometric_m is not None)
+    if not (valve or mechanics):
+        needs = 'a `force`' if held else 'a `contraction`'
+        raise InputError(f'has a pressure alone: {needs} tells of muscle and load, a '
+                         f'`valve_signal` of the valve', where)
+    recording = Recording(run, rig.valve, held, 0.0 if isometric_m is None else isometric_m)
+    if recording.grid_s[-1] < LEAST_DURATION_S:
+        raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '
+                         f'at least {LEAST_DURATION_S:g} s are needed', where)
+    kinds = [word for word, there in (
+        ('valve', valve), ('muscle at a held length' if held else 'muscle and load', mechanics))
+        if there]
+    return Offer(where, recording, valve, mechanics, ' and '.join(kinds), added_kg)
+
+
+def with_quiet_pressure(recording: Recording) -> Recording:
+    """
+    Return a recording whose measured pressure has less noise, for use as an input.
+
+    Noise of the input moves the simulated muscle, and how much depends on mass and damping: a
+    recording at rest would seem to tell them. Where the pressure rests it is averaged over a long
+    window, where it moves over a short one.
+    """
+    from scipy.ndimage import uniform_filter1d       # slow to import
+    from scipy.signal import savgol_filter
+    p = recording.measured['pressure']
+    period_s = float(np.median(np.diff(recording.time_s['pressure'])))
+    short, wide = (2 * int(0.5 * window / period_s) + 1 for window in (SHORT_S, LONG_S))
+    if p.size <= wide or short < 5:
+        return recording
+    quick = savgol_filter(p, short, 2)
+    slow = uniform_filter1d(p, wide, mode='nearest')
+    noise = max(noise_sd(p), SMALLEST['pressure'])
+    moves = uniform_filter1d(((quick - slow) / noise) ** 2, wide, mode='nearest')
+    share = np.exp(-moves)
+    calm = share * slow + (1.0 - share) * quick
+    if np.std(slow) < noise:            # at rest: all that is left is noise
+        calm = np.full(p.size, np.mean(p))
+    quiet = copy.copy(recording)
+    quiet.measured = {**recording.measured, 'pressure': calm}
+    return quiet
+
+
+def _is_held(run: Run, rig: Rig) -> bool:
+    """Tell whether the length stays while the pressure moves."""
+    if 'contraction' not in run or not len(run['contraction']):
+        return False
+    moved = float(np.ptp(np.percentile(run['contraction']['contraction_m'], (1, 99))))
+    pressed = float(np.ptp(run['pressure']['pressure_pa']))
+    return moved < STILL_SHARE * rig.muscle.stroke_m and pressed > MOVING_PA
+
+
+def problems_of(rig: Rig, offers: Sequence[Offer]) -> list[SubsystemProblem]:
+    """Return the subsystems of several recordings, the valve first."""
+    found: list[SubsystemProblem] = []
+    valve = [one.recording for one in offers if one.valve]
+    if valve:
+        found.append(ValveProblem(rig, valve, holds_certify=False))
+    mechanics = [one for one in offers if one.mechanics]
+    if mechanics:
+        found.append(LoadedMechanics(rig, mechanics))
+    return found

@@ -1,0 +1,146 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What an identification found, as data and as text for people."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from pam_sim.identify.judgement import Combination, DETERMINED
+from pam_sim.identify.numbers import Number
+from pam_sim.identify.profile import Interval
+from pam_sim.rig import Rig
+from pam_sim.short_repr import short_repr
+
+# For people: factor from SI and unit.
+READABLE = {'Pa': (1e-3, 'kPa'), 'Pa/V': (1e-3, 'kPa/V'), 'm': (1e3, 'mm'), 's': (1e3, 'ms'),
+            'N/m': (1e-3, 'N/mm')}
+
+
+@dataclass(frozen=True)
+class Found:
+    """
+    One unknown number.
+
+    Parameters
+    ----------
+    number : Number
+    value : float
+        The likeliest one, SI.
+    interval : Interval
+        95 %.
+    status : str
+        ``determined``, ``only together`` or ``not determined``.
+
+    """
+
+    number: Number
+    value: float
+    interval: Interval
+    status: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data; an open end of the interval is null."""
+        n, i = self.number, self.interval
+        return {'name': n.name, 'effect': n.effect or None, 'parameter': n.parameter,
+                'unit': n.unit, 'status': self.status, 'value': self.value,
+                'ci95': [None if i.open_low else i.low, None if i.open_high else i.high],
+                'allowed': [n.lower, n.upper],
+                'profile': [{'value': v, 'rise': r} for v, r in i.points]}
+
+    def text(self) -> str:
+        """Return it as a line."""
+        factor, unit = READABLE.get(self.number.unit, (1.0, self.number.unit))
+        unit = '' if unit == '-' else f' {unit}'
+        i = self.interval
+        low = 'below' if i.open_low else f'{factor * i.low:.4g}'
+        high = 'beyond' if i.open_high else f'{factor * i.high:.4g}'
+        span = 'anywhere in its range' if i.open_low and i.open_high else (
+            f'95 %: {low} to {high}{unit}')
+        return (f'{self.number.name:24} {self.status:15} {factor * self.value:.4g}{unit} ({span})')
+
+
+@short_repr
+@dataclass
+class Identification:
+    """
+    The unknown numbers of a rig after some recordings.
+
+    Attributes
+    ----------
+    rig : pam_sim.Rig
+        With the numbers that are determined, and how well they are known.
+    found : list of Found
+    combinations : list of Combination
+    records : list of dict
+        Path and kind of each recording.
+    signals : dict
+        Name -> unit, ``rmse_before`` and ``rmse_after``, SI.
+    incomplete : bool
+        Whether more than noise is left: the model misses an effect.
+    next_experiment : dict or None
+        ``why``, ``determines`` (names), ``experiment`` (for ``pam run``) and ``added_kg``.
+    remarks : list of str
+
+    """
+
+    rig: Rig
+    found: list[Found]
+    combinations: list[Combination]
+    records: list[dict[str, Any]]
+    signals: dict[str, dict[str, Any]]
+    incomplete: bool
+    next_experiment: dict[str, Any] | None = None
+    remarks: list[str] = field(default_factory=list)
+
+    def __getitem__(self, name: str) -> Found:
+        """Return one number by its name."""
+        return {one.number.name: one for one in self.found}[name]
+
+    @property
+    def open_names(self) -> list[str]:
+        """Return the names of the numbers that are not determined."""
+        return [one.number.name for one in self.found if one.status != DETERMINED]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data for JSON."""
+        return {'schema': 1, 'numbers': [one.to_dict() for one in self.found],
+                'combinations': [{'weights': c.weights, 'value': c.value,
+                                  'half_width': c.half_width, 'product': c.product,
+                                  'text': c.text()} for c in self.combinations],
+                'records': self.records, 'signals': self.signals,
+                'incomplete': self.incomplete, 'next_experiment': self.next_experiment,
+                'remarks': self.remarks}
+
+    def text(self) -> str:
+        """Return the whole for a terminal."""
+        lines = [f'{r["path"]}: {r["kind"]}' for r in self.records]
+        lines += [one.text() for one in self.found]
+        lines += [f'known together: {c.text()}' for c in self.combinations]
+        for name, s in self.signals.items():
+            factor, unit = READABLE.get(s['unit'], (1.0, s['unit']))
+            lines.append(f'{name}: {factor * s["rmse_before"]:.3g} {unit} off before, '
+                         f'{factor * s["rmse_after"]:.3g} {unit} after (rms)')
+        if self.incomplete:
+            lines.append('more than noise is left: the model misses an effect, and the intervals '
+                         'allow for those of the library (next: pam gap)')
+        lines += [f'remark: {one}' for one in self.remarks]
+        if self.next_experiment is not None:
+            lines.append(f'what to measure next: {self.next_experiment["why"]}')
+        return '\n'.join(lines)
+
+
+def half_width(one: Found) -> float:
+    """Return half of the interval of a number, in its unit."""
+    return 0.5 * (one.interval.high - one.interval.low)

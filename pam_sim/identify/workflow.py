@@ -1,0 +1,180 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From recordings to the unknown numbers of a rig."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
+from pam_sim.gap.data.signals import UNIT
+from pam_sim.gap.data.split import UNUSED
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.identify.advice import next_experiment
+from pam_sim.identify.fit import fit, settle, Weighted
+from pam_sim.identify.judgement import DETERMINED, judge
+from pam_sim.identify.numbers import (
+    known_numbers_of, Number, unknown_numbers, with_values)
+from pam_sim.identify.possible import is_incomplete, possible_effects
+from pam_sim.identify.profile import Interval, NORMAL_95, profile
+from pam_sim.identify.records import offer_of, problems_of
+from pam_sim.identify.result import Found, half_width, Identification
+from pam_sim.rig import Rig
+from pam_sim.run import Run
+from pam_sim.tolerance import AbsoluteSd, UNKNOWN
+
+RETURNS = 4                  # to the fit, where a profile met a better solution
+NOWHERE = 1e-9               # information of a number that nothing depends on
+
+
+def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
+             added_kg: Sequence[float] = (), seed: int = 0, advise: bool = True,
+             progress: Callable[[float], object] = lambda done: None) -> Identification:
+    """
+    Determine the unknown numbers of a rig.
+
+    Parameters
+    ----------
+    runs : pam_sim.run.Run or list of Run
+        Each offers what it holds: command and pressure tell of the valve, pressure and
+        contraction of muscle and load, pressure and force at a held length of the muscle.
+    rig : pam_sim.Rig
+        Its unknown numbers are looked for, from the values it has.
+    unknown : sequence of str
+        Further ones: a parameter of the rig, ``spring_n_per_m``, ``pressure_zero_pa``,
+        ``contraction_zero_m``, ``force_zero_n`` or ``EFFECT.PARAMETER``.
+    added_kg : sequence of float
+        Known masses that hung on the load in addition, one per run; none by default.
+    seed : int
+        Of the starts.
+    advise : bool
+        Whether to look for an experiment that determines the rest.
+    progress : callable
+        Told the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Identification
+        Equal inputs give equal results.
+
+    Raises
+    ------
+    InputError
+        Nothing is unknown, there is no such number, or a recording offers nothing.
+
+    """
+    runs = [runs] if isinstance(runs, Run) else list(runs)
+    if added_kg and len(added_kg) != len(runs):
+        raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
+                         '0 for none', 'added mass')
+    rig = rig.with_(tolerance={name: UNKNOWN for name in unknown if name in rig.parameters})
+    wanted = unknown_numbers(rig, unknown)
+    if not wanted:
+        raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
+                         rig.name)
+    offers = [offer_of(run, rig, mass) for run, mass in zip(
+        runs, added_kg or [0.0] * len(runs))]
+    problems = problems_of(rig, offers)
+    acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
+    numbers = [*acting, *known_numbers_of(problems, acting)]
+    weighted = Weighted(rig, problems, numbers)
+    before = _rms(weighted, np.zeros(len(numbers)))
+    x = fit(weighted, seed)
+    progress(0.3)
+    incomplete = is_incomplete(weighted, x)
+    if incomplete:
+        possible = possible_effects(rig, problems, numbers)
+        weighted = Weighted(rig, problems, [*numbers, *possible])
+        x = np.concatenate([x, np.zeros(len(possible))])
+        for _ in range(2):          # full weights first, as in the fit
+            x, _ = weighted.solve(x)
+        x = settle(weighted, x)
+    progress(0.6)
+    count = len(acting)
+    x, covariance, intervals = _profiles(
+        weighted, x, count, lambda done: progress(0.6 + 0.3 * done))
+    information = np.linalg.inv(covariance[:count, :count])
+    statuses, combinations = judge(acting, intervals, x[:count], information)
+    found = [Found(n, n.value(float(c)), i, s)
+             for n, c, i, s in zip(acting, x, intervals, statuses)]
+    result = Identification(
+        _identified(rig, found), found, combinations,
+        [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
+        _signals(before, _rms(weighted, x)), incomplete)
+    result.remarks += [
+        f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
+        for n in wanted if n not in acting]
+    if advise and (result.open_names or len(acting) < len(wanted)):
+        with_force = any('force' in one.recording.signals for one in offers)
+        result.next_experiment = next_experiment(
+            with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
+            offers, with_force)
+    progress(1.0)
+    return result
+
+
+def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[[float], object]
+              ) -> tuple[FloatArray, FloatArray, list[Interval]]:
+    """Return (solution, covariance, interval of each of the first numbers)."""
+    for left in reversed(range(RETURNS)):
+        slopes = weighted.slopes(x)
+        covariance = np.linalg.inv(slopes.T @ slopes + NOWHERE * np.eye(x.size))
+        intervals: list[Interval] = []
+        for j in range(count):
+            interval, better = profile(weighted, x, j, covariance, slopes)
+            intervals.append(interval)
+            progress((j + 1) / count)
+            if better is not None and left:
+                x, _ = weighted.solve(better)
+                break
+        else:
+            break
+    return x, covariance, intervals
+
+
+def _what_shows(number: Number) -> str:
+    if number.effect == 'force_bias':
+        return 'record a force'
+    valve = number.parameter in ('K_m', 'T_m', 'C', 'b', 'supply_pa', 'V_dead')
+    return 'record a `valve_signal`' if valve else 'record a contraction'
+
+
+def _identified(rig: Rig, found: Sequence[Found]) -> Rig:
+    """Return the rig with what was found; what is not determined stays unknown."""
+    rig = with_values(rig, [one.number for one in found],
+                      {one.number.name: one.value for one in found})
+    return rig.with_(tolerance={
+        one.number.name: AbsoluteSd(half_width(one) / NORMAL_95) for one in found
+        if not one.number.effect and one.status == DETERMINED})
+
+
+def _rms(weighted: Weighted, x: FloatArray) -> dict[str, float]:
+    found = {}
+    for p in weighted.problems:
+        errors = weighted.errors(x, p)
+        for s, name in enumerate(p.signals):
+            found[name] = _floor(p, name) * float(np.sqrt(np.mean(
+                errors[(p.signal == s) & (p.part != UNUSED)] ** 2)))
+    return found
+
+
+def _floor(problem: SubsystemProblem, signal: str) -> float:
+    return problem.floor[signal]
+
+
+def _signals(before: dict[str, float], after: dict[str, float]) -> dict[str, dict[str, Any]]:
+    return {s: {'unit': UNIT[s], 'rmse_before': before[s], 'rmse_after': after[s]}
+            for s in before}

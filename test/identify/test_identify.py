@@ -1,0 +1,135 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which numbers recordings determine, which only together, which not at all."""
+
+import json
+
+from made_records import inside, record, RIG, spring
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.identify import identify
+from pam_sim.run import Run, Series
+import pytest
+
+
+def statuses(found):
+    return {one.number.name: one.status for one in found.found}
+
+
+def test_mass_and_spring_are_determined_from_contraction_and_known_muscle():
+    rig = RIG.with_(parameters={'mass_kg': 3.3}, effects=[spring(700.0)])
+    run = record(rig)
+    found = identify(run, RIG, ['mass_kg', 'spring_n_per_m'])
+    assert set(statuses(found).values()) == {'determined'} and not found.incomplete
+    assert inside(found['mass_kg'], 3.3) and inside(found['spring_n_per_m'], 700.0)
+    assert found.next_experiment is None
+    assert found.rig.parameters['mass_kg'] == pytest.approx(3.3, rel=0.01)
+    assert 0.0 < found.rig.prior_sd('mass_kg') < 0.05 and found.rig.unknown == ()
+    again = identify(run, RIG, ['mass_kg', 'spring_n_per_m'])
+    assert again.to_dict() == found.to_dict()
+
+
+def test_a_far_start_and_a_wide_range_end_at_the_same_mass():
+    run = record(RIG.with_(parameters={'mass_kg': 1.4}))
+    found = identify(run, RIG.with_(parameters={'mass_kg': 60.0}), ['mass_kg'])
+    assert inside(found['mass_kg'], 1.4) and found['mass_kg'].status == 'determined'
+
+
+def test_without_a_load_cell_load_and_strength_are_known_together_and_a_mass_more_tells():
+    rig = RIG.with_(parameters={'mass_kg': 6.0, 'force_map_gain': 1.15})
+    run = record(rig, keep=('pressure', 'contraction'), hold_s=1.2)
+    unknown = ['mass_kg', 'force_map_gain', 'damping_n_s_per_m']
+    found = identify(run, RIG, unknown)
+    assert {statuses(found)[n] for n in ('mass_kg', 'force_map_gain')} == {'only together'}
+    best = next(c for c in found.combinations if 'mass_kg' in c.weights)
+    assert best.product and best.weights == {'force_map_gain': 1.0, 'mass_kg': -1.0}
+    assert best.value == pytest.approx(1.15 / 6.0, rel=0.005)
+    assert 'mass_kg' in found.next_experiment['determines']
+    # What the advice says is done: with the load cell, or the same steps with more mass.
+    next_one = found.next_experiment
+    if next_one['needs_force']:
+        more, masses = record(rig, seed=2), ()
+    else:
+        heavy = rig.with_(parameters={'mass_kg': 6.0 + next_one['added_kg']})
+        more = record(heavy, keep=('pressure', 'contraction'), seed=2)
+        masses = (0.0, next_one['added_kg'])
+    found = identify([run, more], RIG, unknown, masses)
+    assert statuses(found)['mass_kg'] == 'determined' and inside(found['mass_kg'], 6.0)
+    assert inside(found['force_map_gain'], 1.15)
+
+
+def test_a_record_at_one_pressure_does_not_tell_mass_from_spring():
+    rig = RIG.with_(parameters={'mass_kg': 4.0}, effects=[spring(500.0)])
+    run = record(rig, gauge_pa=(300e3,), hold_s=4.0, keep=('pressure', 'contraction'))
+    cropped = Run(path='rest', topics={
+        name: Series(s.stamp_ns[400:], {k: v[400:] for k, v in s.values.items()}, s.unit)
+        for name, s in run.topics.items()})
+    found = identify(cropped, RIG, ['mass_kg', 'spring_n_per_m'])
+    assert 'determined' not in statuses(found).values()
+    assert 'spring_n_per_m' in found.next_experiment['determines']
+    assert set(statuses(identify([cropped, record(rig, seed=3)], RIG, [
+        'mass_kg', 'spring_n_per_m'])).values()) == {'determined'}
+    assert found.rig.unknown == ('mass_kg',)
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_a_valve_is_identified_from_command_and_pressure_alone():
+    rig = RIG.with_(parameters={'K_m': 117e3, 'T_m': 0.11})
+    run = record(rig, keep=('pressure',), zero_pa=-6e3)
+    found = identify(run, RIG, ['K_m', 'T_m', 'pressure_zero_pa', 'mass_kg'])
+    assert found.records[0]['kind'] == 'valve'
+    assert inside(found['K_m'], 117e3) and inside(found['T_m'], 0.11)
+    assert inside(found['pressure_zero_pa'], -6e3)
+    assert 'mass_kg' in found.remarks[0] and 'record a contraction' in found.remarks[0]
+
+
+def test_the_muscle_alone_is_identified_at_a_held_length_without_a_command():
+    rig = load_rig('dmsp_5_300_isometric').with_(
+        parameters={'contraction_m': 0.02, 'force_map_gain': 0.9})
+    run = record(rig, keep=('pressure', 'force'), command=False)
+    given = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.02})
+    found = identify(run, given, ['force_map_gain', 'force_zero_n'])
+    assert found.records[0]['kind'] == 'muscle at a held length'
+    assert inside(found['force_map_gain'], 0.9) and inside(found['force_zero_n'], 0.0)
+
+
+def test_a_missing_effect_widens_the_intervals_and_is_said():
+    rig = RIG.with_(parameters={'mass_kg': 3.3}, effects=[
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 4.0}}])
+    found = identify(record(rig), RIG, ['mass_kg'])
+    assert found.incomplete and 'the model misses an effect' in found.text()
+    assert inside(found['mass_kg'], 3.3)
+
+
+@pytest.mark.parametrize('change, said', [
+    (lambda run: run.topics.pop('pressure'), 'has no `pressure`'),
+    (lambda run: [run.topics.pop(n) for n in ('contraction', 'force', 'valve_signal')],
+     'a `contraction` tells of muscle and load, a `valve_signal` of the valve')])
+def test_a_recording_that_offers_nothing_is_refused(change, said):
+    run = record(RIG)
+    change(run)
+    with pytest.raises(InputError, match='bag') as caught:
+        identify(run, RIG, ['mass_kg'])
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize('unknown, masses, said', [
+    ([], (), 'no number is unknown'), (['mas_kg'], (), 'did you mean `mass_kg`'),
+    (['no_effect.size'], (), 'no_effect'), (['creep.sise'], (), 'creep'),
+    (['mass_kg'], (1.0, 2.0), '2 masses for 1 recordings')])
+def test_a_mistake_is_told(unknown, masses, said):
+    with pytest.raises(InputError) as caught:
+        identify(record(RIG, hold_s=0.3), RIG, unknown, masses)
+    assert said in str(caught.value)

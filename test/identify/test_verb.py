@@ -1,0 +1,78 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam identify`` as a command."""
+
+import json
+
+from made_records import RIG, spring
+from pam_actuation.bags.load import load_run
+from pam_actuation.cli.main import main
+from pam_sim import load_rig
+import pytest
+
+EXPERIMENT = """\
+name: stairs
+description: Steps of the pressure
+domain: pressure
+needs: [pressure, contraction]
+segments:
+  - step: {to_pa: 151325.0, duration_s: 0.6}
+  - step: {to_pa: 501325.0, duration_s: 0.6}
+  - step: {to_pa: 301325.0, duration_s: 0.6}
+"""
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('identify')
+    (folder / 'stairs.yaml').write_text(EXPERIMENT)
+    (folder / 'rig.yaml').write_text(RIG.with_(
+        parameters={'mass_kg': 3.3}, effects=[spring(700.0)],
+        sensors={'pressure_noise_pa': 500.0, 'contraction_noise_m': 2e-5, 'force_noise_n': 0.2}
+    ).to_yaml())
+    assert main(['simulate', str(folder / 'stairs.yaml'), '--rig', str(folder / 'rig.yaml'),
+                 '--out', str(folder / 'bag')]) == 0
+    return folder / 'bag'
+
+
+def test_what_is_found_is_written_and_loads(bag, tmp_path, capsys):
+    given = tmp_path / 'given.yaml'
+    given.write_text('rig: dmsp_5_300_hanging_mass\ntolerance: {mass_kg: unknown}\n')
+    out = tmp_path / 'found'
+    assert main(['identify', str(bag), '--rig', str(given), '--unknown', 'spring_n_per_m',
+                 '--out', str(out)]) == 0
+    said = capsys.readouterr().out
+    assert 'mass_kg' in said and 'determined' in said and 'next: pam gap' in said
+    data = json.loads((out / 'identify.json').read_text())
+    assert {n['name']: n['status'] for n in data['numbers']} == {
+        'mass_kg': 'determined', 'spring_n_per_m': 'determined'}
+    rig = load_rig(str(out / 'rig.yaml'))
+    assert rig.parameters['mass_kg'] == pytest.approx(3.3, rel=0.01)
+    assert not (out / 'next_experiment.yaml').exists()
+    assert main(['identify', str(bag), '--rig', str(given), '--out', str(out)]) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert load_run(str(bag)).topics
+
+
+@pytest.mark.parametrize('options, said', [
+    (['--rig', 'dmsp_5_300_hanging_mass'], 'no number is unknown'),
+    (['--rig', 'dmsp_5_300_hanging_mass', '--unknown', 'mas_kg'], 'did you mean `mass_kg`'),
+    (['--rig', 'dmsp_5_300_hanging_mass', '--unknown', 'mass_kg', '--added-kg', '-1'], '0 to 500'),
+    (['--rig', 'dmsp_99', '--unknown', 'mass_kg'], 'dmsp_99')])
+def test_a_mistake_is_one_line_and_exit_code_2(bag, options, said, capsys, tmp_path):
+    assert main(['identify', str(bag), *options, '--out', str(tmp_path / 'found')]) == 2
+    err = capsys.readouterr().err
+    assert said in err and len(err.strip().splitlines()) == 1
+    assert not (tmp_path / 'found').exists()
