@@ -25,8 +25,8 @@ from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval, NORMAL_95
 
 DETERMINED, TOGETHER, UNDETERMINED = 'determined', 'only together', 'not determined'
-# Ratio of the ends of an interval; or its share of the range, of a zero and of a size.
-NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SIZES = 1.5, 0.02, 0.005
+# Ratio of the ends of an interval; or its share of the range of a zero, or of a small size.
+NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SMALL = 1.5, 0.02, 0.2
 KNOWN = 0.5                  # standard deviation of what is worth telling, in coordinates
 ROUND = 0.03                 # how near to a whole number a power is one
 GENTLE = 1e-12
@@ -69,8 +69,10 @@ def is_narrow(number: Number, low: float, high: float) -> bool:
     """Tell whether an interval is short beside the range of the number."""
     if low > 0.0 and high / low <= NARROW_RATIO:
         return True
-    share = NARROW_SHARE if number.lower < 0.0 else NARROW_SHARE_OF_SIZES
-    return not number.is_scale and high - low <= share * (number.upper - number.lower)
+    if number.is_scale:
+        return False
+    return high - low <= (NARROW_SHARE_OF_SMALL * number.small if number.is_size
+                          else NARROW_SHARE * (number.upper - number.lower))
 
 
 def judge(numbers: Sequence[Number], intervals: Sequence[Interval], x: FloatArray,
@@ -120,9 +122,7 @@ def _combinations(numbers: Sequence[Number], x: FloatArray, information: FloatAr
     values = np.array([n.value(float(c)) for n, c in zip(numbers, x)])
     product = all(n.lower >= 0.0 for n in numbers) and bool(np.all(values > 0.0))
     # What one unit of a coordinate is, in logarithms or in the number's own unit.
-    units = np.array([
-        (1.0 if n.is_scale else n.step / v) if product else (v if n.is_scale else n.step)
-        for n, v in zip(numbers, values)])
+    units = np.array([n.slope(v) / (v if product else 1.0) for n, v in zip(numbers, values)])
     covariance = np.linalg.inv(information + GENTLE * np.eye(len(numbers)))
     pairs = []
     for i, j in combinations(range(len(numbers)), 2):

@@ -24,16 +24,14 @@ from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.parameters import Parameter
 from pam_sim.rig import EffectSetting, Rig
+from pam_sim.sensors.zeros import ZEROS
 
-# Zeros of sensors and the spring of a load are effects; people name what they do not know.
-SHORT_NAMES = {
-    'spring_n_per_m': 'parallel_spring.stiffness_n_per_m',
-    'pressure_zero_pa': 'pressure_bias.bias_pa',
-    'contraction_zero_m': 'contraction_bias.bias_m',
-    'force_zero_n': 'force_bias.bias_n'}
 # A range over more than this factor is one of scales: its middle is that of the logarithms.
 SCALE_RATIO = 5.0
+# A size that may be 0, as of a spring, is spread evenly up to here and by logarithms beyond.
+SMALL_SHARE = 1e-3           # of its range
 LARGEST_LOGARITHM = 50.0
+ZERO_NAMES = tuple(p.name for p in ZEROS)
 FARTHEST_SD = 6.0            # of a number with a prior
 
 
@@ -45,7 +43,7 @@ class Number:
     Parameters
     ----------
     name : str
-        As people call it: of a parameter of the rig, or a key of ``SHORT_NAMES``.
+        Of a parameter of the rig, or ``EFFECT.PARAMETER``.
     effect, parameter : str
         Where it stands: effect ('' for the rig itself) and parameter.
     unit, description : str
@@ -80,22 +78,43 @@ class Number:
         return self.unknown and self.lower > 0.0 and self.upper / self.lower > SCALE_RATIO
 
     @property
+    def is_size(self) -> bool:
+        """Tell whether it may be 0 or anything above, over a wide range."""
+        return self.unknown and self.lower == 0.0
+
+    @property
+    def small(self) -> float:
+        """Return what is small for a size, in its unit."""
+        return SMALL_SHARE * self.upper
+
+    @property
     def step(self) -> float:
-        """Return what one unit of the coordinate means, in the number's unit (1 for scales)."""
-        if self.is_scale:
-            return 1.0
+        """Return what one unit of the coordinate is where it is the same everywhere."""
         return 0.05 * (self.upper - self.lower) if self.unknown else self.sd
+
+    def slope(self, value: float) -> float:
+        """Return what one unit of the coordinate is at a value, in the number's unit."""
+        if self.is_scale:
+            return value
+        return math.hypot(value, self.small) if self.is_size else self.step
 
     def value(self, coordinate: float) -> float:
         """Return the value of a coordinate, within the range."""
-        found = (self.start * math.exp(min(coordinate, LARGEST_LOGARITHM)) if self.is_scale
-                 else self.start + self.step * coordinate)
+        if self.is_scale:
+            found = self.start * math.exp(min(coordinate, LARGEST_LOGARITHM))
+        elif self.is_size:
+            at = coordinate + math.asinh(self.start / self.small)
+            found = self.small * math.sinh(max(min(at, LARGEST_LOGARITHM), 0.0))
+        else:
+            found = self.start + self.step * coordinate
         return min(max(found, self.lower), self.upper)
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a value."""
         if self.is_scale:
             return math.log(value / self.start)
+        if self.is_size:
+            return math.asinh(value / self.small) - math.asinh(self.start / self.small)
         return (value - self.start) / self.step
 
     def bounds(self) -> tuple[float, float]:
@@ -108,6 +127,10 @@ class Number:
         if self.effect:
             return (acts_on(self.effect, problem.subsystem)
                     or get_effect(self.effect).fitting.sensor_signal == 'contraction')
+        if self.name in ZERO_NAMES:
+            signal = self.name.partition('_zero')[0]
+            return signal == 'pressure' or problem.subsystem != 'valve' and (
+                signal == 'contraction' or signal in problem.signals)
         return any(k.name == self.name for k in problem.known) and (
             not self.subsystem or self.subsystem == problem.subsystem)
 
@@ -120,7 +143,7 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
     ----------
     rig : pam_sim.Rig
     names : sequence of str
-        A parameter of the rig, a key of ``SHORT_NAMES``, or ``EFFECT.PARAMETER``.
+        A parameter of the rig, or ``EFFECT.PARAMETER``.
 
     Raises
     ------
@@ -137,12 +160,11 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
             found[name] = Number(name, '', name, p.unit, value if value > 0.0 or p.lower <= 0.0
                                  else p.default, p.lower, p.upper, description=p.description)
             continue
-        effect_name, dot, key = SHORT_NAMES.get(name, name).partition('.')
+        effect_name, dot, key = name.partition('.')
         if not dot:
-            known = [*parameters, *SHORT_NAMES]
             raise InputError(
-                f'`{name}` is no number of the rig{did_you_mean(name, known)}; allowed: '
-                f'{", ".join(known)}, or EFFECT.PARAMETER', 'unknown number')
+                f'`{name}` is no number of the rig{did_you_mean(name, parameters)}; allowed: '
+                f'{", ".join(parameters)}, or EFFECT.PARAMETER', 'unknown number')
         found[name] = _of_effect(rig, name, effect_name, key)
     return list(found.values())
 

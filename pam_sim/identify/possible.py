@@ -55,6 +55,8 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     are left out: of a sensor it is known that it was calibrated, unless its zero is asked for.
     """
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
+    if any(n.name == 'spring_n_per_m' for n in numbers):
+        there.add('parallel_spring')
     found = []
     for effect in effects().values():
         if (effect.variant_of or effect.subsystem == 'sensor' or effect.name in there

@@ -128,9 +128,8 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
             part = (np.sqrt(RISE_95) - low) / max(high - low, 1e-12)
             shift = inner + float(np.clip(part, 0.1, 0.9)) * (outer[0] - inner)
             end, is_open = shift, False
-        # A coordinate of a scale is relative already.
-        least_width = NUMERICS * (1.0 if number.is_scale else abs(
-            number.value(float(x[place]))) / number.step)
+        best = number.value(float(x[place]))
+        least_width = NUMERICS * abs(best) / number.slope(best)
         ends.append(number.value(float(x[place] + sign * math.hypot(end, least_width))))
         opened.append(is_open)
     interval = Interval(ends[0], ends[1], opened[0], opened[1], tuple(

@@ -22,6 +22,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import UNUSED
+from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.advice import next_experiment
 from pam_sim.identify.fit import fit, settle, Weighted
@@ -54,8 +55,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     rig : pam_sim.Rig
         Its unknown numbers are looked for, from the values it has.
     unknown : sequence of str
-        Further ones: a parameter of the rig, ``spring_n_per_m``, ``pressure_zero_pa``,
-        ``contraction_zero_m``, ``force_zero_n`` or ``EFFECT.PARAMETER``.
+        Further ones: a parameter of the rig, or ``EFFECT.PARAMETER``.
     added_kg : sequence of float
         Known masses that hung on the load in addition, one per run; none by default.
     seed : int
@@ -146,9 +146,9 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[
 
 
 def _what_shows(number: Number) -> str:
-    if number.effect == 'force_bias':
+    if number.name == 'force_zero_n':
         return 'record a force'
-    valve = number.parameter in ('K_m', 'T_m', 'C', 'b', 'supply_pa', 'V_dead')
+    valve = subsystem_of_number(number.name) == 'valve'
     return 'record a `valve_signal`' if valve else 'record a contraction'
 
 
