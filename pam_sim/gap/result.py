@@ -169,9 +169,6 @@ class GapResult:
         One or two sentences for a person.
     signals : dict of str -> SignalGap
         By signal name; signals that were not recorded are absent.
-    subsystems : dict of str -> SubsystemVerdict
-        By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
-        them is named.
     where : list of Share
         Shares of the squared gap by subsystem and by condition.
     parameters : list of Calibrated
@@ -194,13 +191,15 @@ class GapResult:
         Standard deviation of the sensors, by signal.
     at_one_speed : bool
         Whether creep and hysteresis are a set for want of a second speed.
+    subsystems : dict of str -> SubsystemVerdict
+        By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
+        them is named.
 
     """
 
     verdict: str
     reason: str
     signals: dict[str, SignalGap] = field(default_factory=dict)
-    subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
     where: list[Share] = field(default_factory=list)
     parameters: list[Calibrated] = field(default_factory=list)
     calibration: list[Calibrated] = field(default_factory=list)
@@ -220,6 +219,7 @@ class GapResult:
     noise: dict[str, float] = field(default_factory=dict)
     evidence: list[dict[str, Any]] = field(default_factory=list)
     at_one_speed: bool = False
+    subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
 
     def text(self) -> str:
         """Return the result in lines for a person."""
