@@ -135,7 +135,8 @@ setup(
     packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
     package_data={'pam_actuation': ['py.typed'], 'pam_sim': [
         'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
-        'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'gap/*.schema.json']},
+        'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'valve/regulators/*.yaml',
+        'gap/*.schema.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),

@@ -26,7 +26,7 @@ LAYERS = (
     ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'parallel', 'random_levels',
      'ros_missing', 'slow_rise', 'transport', 'control', 'drivers', 'loops', 'bags', 'hardware',
      'plant_loop'),
-    ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables'),
+    ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models'),
     ('rigging',),
     ('nodes',),

@@ -41,6 +41,8 @@ from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
 from pam_sim.tolerance import SD_KEYS
 from pam_sim.units import allowed_range
 from pam_sim.valve import hsv, ppr
+from pam_sim.valve.regulator_presets import (
+    get_regulator, KEYS as REGULATOR_KEYS, regulator_names)
 
 _HEAD = ('key', 'holds', 'default', 'allowed', 'meaning')
 _KINDS = {float: 'number', int: 'whole number', str: 'text', bool: 'true or false',
@@ -109,6 +111,13 @@ def rig_page():
               'Each entry of the list:', keys(model_file.EFFECT_KEYS)]
     for effect in effects().values():
         parts += [f'### `{effect.name}`', plain(effect.sentence), parameters(effect.parameters)]
+    parts += [
+        '## Regulators by name', '`pam rig new --regulator NAME` takes these numbers of data '
+        'sheets. Each is a file in `pam_sim/valve/regulators`:', keys(REGULATOR_KEYS),
+        _table(('name', 'sold as', 'Pa gauge', 'rests on'), [
+            (f'`{one.name}`', plain(one.sold_as),
+             f'{one.lowest_gauge_pa:g} to {one.highest_gauge_pa:g}', plain(one.rests_on))
+            for one in map(get_regulator, regulator_names())])]
     return _joined(parts)
 
 

@@ -28,6 +28,7 @@ GROUPS = {
         'run': 'run an experiment on live nodes and record it',
         'up': 'bring up the nodes of a rig, a joint or both knees',
         'import': 'make a bag of a table measured elsewhere: CSV, Parquet, MAT, HDF5',
+        'rig': 'write a commented file of a rig, known and unknown numbers, or check one',
         'demo': 'see everything once with live nodes, in about three minutes'},
     'Look at a recording': {
         'info': 'topics, rates, losses and plausibility',

@@ -25,7 +25,7 @@ import pytest
 NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
          'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
          'valves': ['compare'], 'rules': ['sofc_ppr'], 'import': ['table.csv'],
-         'export': ['bag', '--out', 'table.csv']}
+         'export': ['bag', '--out', 'table.csv'], 'rig': ['new']}
 WRONG_NUMBERS = {
     'number': ('-5', 'nan', 'inf', 'five', '3,5', '', '1e999'),
     'count': ('-5', 'nan', '2.5', 'five', '3,5', '', '99999999999999999999x')}
@@ -38,6 +38,8 @@ NUMBERS = {
     ('import', '--rate'): '0.1 to 1000000 Hz', ('import', '--every'): '1 to 1000000',
     ('import', '--from'): '0 s or more', ('import', '--to'): '0 s or more',
     ('export', '--rate'): '0.1 to 100000 Hz',
+    ('rig', '--length-mm'): '20 to 9000 mm', ('rig', '--bore-mm'): '1 to 100 mm',
+    ('rig', '--angle-deg'): '6 to 51 degrees',
     ('tune', '--rollouts'): '10 or more', ('tune', '--randomise'): '0 to 1000',
     ('tune', '--patience'): '0 or more', ('tune', '--jobs'): '1 to 1024, or -1 for one a core',
     ('tune', '--seed'): '0 to 4294967295',

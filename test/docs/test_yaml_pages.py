@@ -126,6 +126,7 @@ def test_every_parameter_of_driver_and_sensors_is_on_the_page(rows):
 
 @pytest.mark.parametrize('kind, folder', [
     ('rig', 'pam_sim/presets'), ('rig', 'pam_sim/muscle/sizes'),
+    ('rig', 'pam_sim/valve/regulators'),
     ('joint', 'pam_sim/joint/presets'), ('controller', 'config/controllers'),
     ('experiment', 'config/experiments')])
 def test_every_key_of_the_shipped_files_is_on_a_page(rows, kind, folder):

@@ -145,6 +145,10 @@ VERBS = {
     'export': [
         (BAG, INSIDE, Slot('--out', 'table to write', 'new.csv'),
          Slot('--rate', 'number above 0'), Slot('--topics', 'effects'))],
+    'rig': [
+        (Slot('', 'choice', 'new'), Slot('--out', 'page', 'new.yaml'),
+         Slot('--length-mm', 'number above 0'), Slot('--bore-mm', 'number above 0'),
+         Slot('--force-map', 'foreign table'))],
     'experiments': [(Slot('', 'experiment'),)],
     'models': [
         (Slot('', 'entry'), Slot('--html', 'page'), Slot('--markdown', 'page'))],

@@ -1,0 +1,230 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam rig``: write a commented rig file; look at one."""
+
+import argparse
+import sys
+from typing import Any, TYPE_CHECKING
+
+from pam_actuation.cli.common import (
+    add_overwrite_option, check_outputs, emit, EXIT_DONE)
+from pam_actuation.cli.options import number, out_path, Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.rig_files.description import Description
+    from pam_sim.rig import Rig
+
+HELP = """Write a commented rig file from options, or on a terminal from questions: pam rig new.
+
+Every number is known, known to ± one standard deviation, or unknown. pam rig check loads a
+file and says what it states."""
+EXAMPLE = 'pam rig new --muscle dmsp_10_250 --unknown mass_kg --out my_rig.yaml'
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('action', choices=('new', 'check'),
+                        help='new: write a file; check: load one and say what it states')
+    parser.add_argument('file', type=source, nargs='?', default=None, metavar='NAME|FILE',
+                        help='the rig to check')
+    parser.add_argument('--out', type=out_path, default='my_rig.yaml', metavar='FILE.yaml',
+                        help='file to write (default: %(default)s)')
+    parser.add_argument('--muscle', type=source, default=None, metavar='NAME',
+                        help='a muscle by name; "pam models" lists them (default: dmsp_5_300, or '
+                        'with --bore-mm the one of the nearest bore)')
+    parser.add_argument('--length-mm', type=number(20.0, 9000.0, 'mm'), default=None,
+                        metavar='MM', help='length of the muscle at rest')
+    parser.add_argument('--bore-mm', type=number(1.0, 100.0, 'mm'), default=None, metavar='MM',
+                        help='inner diameter at rest')
+    parser.add_argument('--angle-deg', type=number(6.0, 51.0, 'degrees'), default=None,
+                        metavar='DEG', help='angle between thread and axis at rest')
+    parser.add_argument('--force-map', type=source, default=None, metavar='FILE.csv',
+                        help='static table of the muscle, as "pam characterise" writes it')
+    parser.add_argument('--load', default='hanging_mass', metavar='NAME',
+                        help='hanging_mass, isometric or driven (default: %(default)s)')
+    parser.add_argument('--valve', metavar='ppr|hsv', default='ppr',
+                        help='regulator or pair of on/off valves (default: %(default)s)')
+    parser.add_argument('--regulator', type=source, default=None, metavar='NAME',
+                        help='a regulator by the name of its data sheet: festo_veaa_d2, d9, d11, '
+                        'smc_itv1030, smc_itv1050')
+    parser.add_argument('--regulator-volts', type=source, default=None, metavar='LOW:HIGH',
+                        help='range of its input, V; 4-20 mA through 500 ohm is 2:10')
+    parser.add_argument('--regulator-kpa', type=source, default=None, metavar='LOW:HIGH',
+                        help='gauge pressures at the ends of that range, kPa')
+    parser.add_argument('--known', action='append', default=[], metavar='NAME=VALUE',
+                        help='a number, SI, that is exact; may be repeated')
+    parser.add_argument('--about', action='append', default=[], metavar='NAME=VALUE±SD',
+                        help='a number with one standard deviation: mass_kg=1.2±0.3, 1.2±10%% or '
+                        '1.2+-0.3; may be repeated')
+    parser.add_argument('--unknown', action='append', default=[], metavar='NAME[=VALUE]',
+                        help='a number that may be anywhere in its range; with a value where the '
+                        'search begins; may be repeated')
+    add_overwrite_option(parser, 'the file that is there')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write a rig file, or look at one."""
+    from pam_sim.errors import InputError
+    if args.action == 'check':
+        if args.file is None:
+            raise InputError('name the rig to look at: pam rig check my_rig.yaml')
+        return _check(args)
+    if args.file is not None:
+        raise InputError(f'give the file to write with --out {args.file}', args.file)
+    return _new(args)
+
+
+def _new(args: argparse.Namespace) -> int:
+    from pam_actuation.rig_files.questions import ask_description
+    from pam_actuation.rig_files.text import rig_file
+    from pam_sim.errors import InputError
+    from pam_sim.files import write_text
+    if not args.out.endswith(('.yaml', '.yml')):
+        raise InputError('a rig file ends in .yaml', f'--out {args.out}')
+    check_outputs(args, args.out)
+    described = _described(args)
+    if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
+        described = ask_description(_read_line, print)
+    described.work_out()
+    text, rig = rig_file(described, args.out)
+    write_text(args.out, text)
+    following = _following(rig, args.out)
+    lines = [f'rig file: {args.out}', *_numbers_text(rig), f'next: {following}']
+    emit(args, {'file': args.out, **_numbers(rig), 'next': following}, '\n'.join(lines))
+    return EXIT_DONE
+
+
+def _read_line(question: str) -> str:
+    try:
+        return input(question)
+    except EOFError:
+        from pam_sim.errors import InputError
+        raise InputError('the answers ended before the questions; nothing was written') from None
+
+
+def _following(rig: 'Rig', out: str) -> str:
+    """Return the command that comes next."""
+    if rig.unknown:
+        return f'pam identify RUN --rig {out}'
+    return f'pam simulate pressure_identification --rig {out} --out runs/first'
+
+
+def _nothing_said(args: argparse.Namespace) -> bool:
+    said = (args.muscle, args.length_mm, args.bore_mm, args.angle_deg, args.force_map,
+            args.regulator, args.regulator_volts, args.regulator_kpa)
+    return (all(one is None for one in said) and not (args.known or args.about or args.unknown)
+            and args.load == 'hanging_mass' and args.valve == 'ppr')
+
+
+def _described(args: argparse.Namespace) -> 'Description':
+    """Return what the options say."""
+    import math
+    from pam_actuation.rig_files.description import Description
+    from pam_actuation.rig_files.numbers import read_range
+    from pam_sim.load import LOADS
+    from pam_sim.muscle.lookup_table import read_table
+    from pam_sim.muscle.muscle import get_muscle
+    from pam_sim.rig_parameters import VALVES
+    found = Description(args.muscle, load=_one_of('--load', args.load, LOADS),
+                        valve=_one_of('--valve', args.valve, VALVES), regulator=args.regulator)
+    if args.muscle is not None:
+        get_muscle(args.muscle)
+    for name, value, factor in (('length_m', args.length_mm, 1e-3), ('bore_m', args.bore_mm, 1e-3),
+                                ('braid_angle_rad', args.angle_deg, math.pi / 180.0)):
+        if value is not None:
+            found.dimensions[name] = round(value * factor, 12)
+    if args.force_map is not None:
+        read_table(args.force_map)
+        found.force_map = args.force_map
+    if args.regulator_volts is not None:
+        found.volts = read_range(args.regulator_volts, '--regulator-volts', 'V')
+    if args.regulator_kpa is not None:
+        low, high = read_range(args.regulator_kpa, '--regulator-kpa', 'kPa')
+        found.gauge_pa = 1e3 * low, 1e3 * high
+    _state_numbers(args, found)
+    return found
+
+
+def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
+    from pam_actuation.rig_files.numbers import FORMS, read_stated, split_statement, Stated
+    from pam_sim.errors import InputError
+    from pam_sim.sensors import SENSOR_PARAMETERS
+    from pam_sim.tolerance import UNKNOWN
+    known = {p.name: p for p in found.parameters}
+    sensors = {p.name: p for p in SENSOR_PARAMETERS}
+    for option, texts in (('--known', args.known), ('--about', args.about),
+                          ('--unknown', args.unknown)):
+        for text in texts:
+            where = f'{option} {text}'
+            names = {**known, **sensors} if option == '--known' else known
+            name, rest = split_statement(text, names, where)
+            if name in found.numbers or name in found.sensors:
+                raise InputError(f'`{name}` is stated twice', where)
+            if not rest and option != '--unknown':
+                raise InputError(f'`{name}` has no value; allowed {names[name].allowed}', where)
+            said = read_stated(rest, names[name], where) if rest else Stated()
+            exact = said.tolerance == 0.0
+            if (option == '--known') != exact and option != '--unknown' or (
+                    option == '--unknown' and rest and not exact):
+                wanted = {'--known': 'a number alone', '--about': 'a number with ±',
+                          '--unknown': 'a number to begin with, or nothing'}[option]
+                raise InputError(f'`{rest}` is not {wanted}; numbers are {FORMS}', where)
+            if name in sensors:
+                assert said.value is not None
+                found.sensors[name] = said.value
+                continue
+            found.numbers[name] = Stated(
+                said.value, UNKNOWN if option == '--unknown' else said.tolerance)
+
+
+def _one_of(option: str, value: str, allowed: Any) -> str:
+    from pam_sim.errors import did_you_mean, InputError
+    if value not in allowed:
+        raise InputError(f'`{value}` is not known{did_you_mean(value, allowed)}; allowed: '
+                         f'{", ".join(allowed)}', option)
+    return value
+
+
+def _check(args: argparse.Namespace) -> int:
+    from pam_sim import load_rig
+    from pam_sim.rig_text import rig_title
+    rig = load_rig(args.file)
+    lines = [rig_title(rig), f'load {rig.load}, valve {rig.valve}', *_numbers_text(rig)]
+    emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve, **_numbers(rig)},
+         '\n'.join(lines))
+    return EXIT_DONE
+
+
+def _numbers(rig: 'Rig') -> dict[str, Any]:
+    """Return the numbers that are not exact, for programs."""
+    return {'unknown': list(rig.unknown), 'about': [
+        {'name': p.name, 'unit': p.unit, 'value': rig.parameters[p.name],
+         'sd': rig.prior_sd(p.name)} for p in _inexact(rig)]}
+
+
+def _numbers_text(rig: 'Rig') -> list[str]:
+    lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.parameter_list
+             if p.name in rig.unknown]
+    return lines + [
+        f'  {p.name}: {rig.parameters[p.name]:g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
+        for p in _inexact(rig)]
+
+
+def _inexact(rig: 'Rig') -> list[Any]:
+    """Return the parameters of rig and valve that are neither unknown nor exact."""
+    from pam_sim.valve import hsv, ppr
+    other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
+    return [p for p in rig.parameter_list if p.name not in rig.unknown and p.name not in other
+            and rig.prior_sd(p.name) > 0.0]

@@ -1,0 +1,163 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a person says of a rig, and the numbers that follow from it."""
+
+from dataclasses import dataclass, field
+import math
+from typing import Any
+
+from pam_actuation.rig_files.numbers import Stated
+from pam_sim.errors import InputError
+from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
+from pam_sim.parameters import Parameter
+from pam_sim.rig_parameters import rig_parameters
+from pam_sim.tolerance import AbsoluteSd, Tolerance
+from pam_sim.valve.regulator_presets import get_regulator
+
+BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
+REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', 'ppr_zero_pa')
+
+
+@dataclass
+class Description:
+    """
+    What was said of a rig.
+
+    Parameters
+    ----------
+    muscle : str or None
+        Name of a muscle; None: the one whose bore is nearest, else that of the nominal rig.
+    dimensions : dict
+        Those of ``DIMENSIONS`` that differ, SI.
+    force_map : str or None
+        Path of a table that ``pam characterise`` wrote.
+    load, valve : str
+        As in a rig.
+    regulator : str or None
+        Name of a regulator.
+    volts, gauge_pa : tuple of float or None
+        Range of the input [V] and of the pressure [Pa gauge] of the regulator.
+    numbers : dict
+        Parameter name -> Stated.
+    sensors : dict
+        Sensor setting -> value.
+    notes : dict
+        Parameter name -> where its number comes from; filled by ``work_out``.
+
+    """
+
+    muscle: str | None = None
+    dimensions: dict[str, float] = field(default_factory=dict)
+    force_map: str | None = None
+    load: str = 'hanging_mass'
+    valve: str = 'ppr'
+    regulator: str | None = None
+    volts: tuple[float, float] | None = None
+    gauge_pa: tuple[float, float] | None = None
+    numbers: dict[str, Stated] = field(default_factory=dict)
+    sensors: dict[str, float] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters that a rig with this load has."""
+        return rig_parameters(self.load)
+
+    def work_out(self) -> None:
+        """
+        Fill in muscle and numbers that follow from what was said.
+
+        Raises
+        ------
+        InputError
+            A dimension or number out of range, or one that was said twice.
+
+        """
+        for dimension in DIMENSIONS:
+            if dimension.name in self.dimensions:
+                dimension.check(self.dimensions[dimension.name], 'muscle')
+        if self.muscle is None:
+            self.muscle = self._nearest()
+        self._scale_force_map()
+        if self.valve == 'ppr':
+            self._regulator()
+        elif self.regulator or self.volts or self.gauge_pa:
+            raise InputError('a rig with valve hsv has no regulator', '--regulator')
+
+    def muscle_data(self) -> Any:
+        """Return the entry ``muscle`` of the file, without the law."""
+        if not self.dimensions:
+            return self.muscle
+        return {'like': self.muscle, **self.dimensions}
+
+    def _nearest(self) -> str:
+        bore = self.dimensions.get('bore_m')
+        if bore is None:
+            return 'dmsp_5_300'
+        return min(muscle_names(), key=lambda n: abs(math.log(bore / get_muscle(n).bore_m)))
+
+    def _scale_force_map(self) -> None:
+        assert self.muscle is not None
+        like, bore = get_muscle(self.muscle), self.dimensions.get('bore_m')
+        if bore is None or bore == like.bore_m or self.force_map:
+            return
+        gain = (bore / like.bore_m) ** 2
+        parameter = next(p for p in self.parameters if p.name == 'force_map_gain')
+        if not parameter.lower <= gain <= parameter.upper:
+            low, high = (1e3 * like.bore_m * math.sqrt(b)
+                         for b in (parameter.lower, parameter.upper))
+            raise InputError(f'the bore is {1e3 * bore:g} mm; allowed {low:.3g} to {high:.3g} mm '
+                             f'with the force map of {self.muscle}', '--bore-mm')
+        self._add('force_map_gain', round(gain, 6), BY_BORE_TOLERANCE,
+                  f'(bore / bore of {self.muscle})^2: a first guess, measure it')
+
+    def _regulator(self) -> None:
+        volts, gauge_pa, source = self.volts, self.gauge_pa, 'as stated'
+        if self.regulator is not None:
+            preset = get_regulator(self.regulator)
+            source = f'{preset.sold_as}: {preset.rests_on}'
+            gauge_pa = gauge_pa or (preset.lowest_gauge_pa, preset.highest_gauge_pa)
+            if volts is None and preset.lowest_v is not None and preset.highest_v is not None:
+                volts = preset.lowest_v, preset.highest_v
+            if volts is None:
+                raise InputError(f'the data sheet of {preset.sold_as} at hand does not state the '
+                                 'input; give --regulator-volts LOW:HIGH, such as 0:10',
+                                 f'--regulator {self.regulator}')
+            if preset.lag_s is not None and 'T_m' not in self.numbers:
+                self._add('T_m', preset.lag_s, None, source)
+        if volts is None and gauge_pa is None:
+            return
+        nominal = {p.name: p.default for p in self.parameters}
+        low_v, high_v = volts or (nominal['ppr_lowest_v'], nominal['ppr_highest_v'])
+        low_pa, high_pa = gauge_pa or (0.0, nominal['K_m'] * (nominal['ppr_highest_v']
+                                                              - nominal['ppr_lowest_v']))
+        gain = float(f'{(high_pa - low_pa) / (high_v - low_v):.9g}')
+        for name, value in zip(REGULATOR_NUMBERS, (gain, low_v, high_v, low_pa)):
+            # A data sheet begins its range where control begins, not quite at the lowest input.
+            unsure = AbsoluteSd(abs(low_pa)) if (
+                self.regulator and name == 'ppr_zero_pa' and low_pa != 0.0) else None
+            self._add(name, value, unsure, source)
+
+    def _add(self, name: str, value: float, tolerance: Tolerance | None, note: str) -> None:
+        """Add a number that follows from others; how well it is known may be said beside it."""
+        said = self.numbers.get(name)
+        if said is not None and said.value is not None:
+            raise InputError(f'`{name}` is stated, and follows from the other options too; leave '
+                             'one of them out', f'{name}={said.value:g}')
+        parameter = next(p for p in self.parameters if p.name == name)
+        known = tolerance if said is None else said.tolerance
+        where = 'muscle' if name == 'force_map_gain' else 'regulator'
+        self.numbers[name] = Stated(parameter.check(value, where), known)
+        self.notes[name] = note

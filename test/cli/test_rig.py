@@ -1,0 +1,201 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam rig``: a described rig becomes a file that loads, simulates and says what is known."""
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+
+from pam_actuation.cli.main import main
+from pam_actuation.rig_files.questions import ask_description
+from pam_actuation.rig_files.text import rig_file
+from pam_sim import load_rig
+from pam_sim.tolerance import AbsoluteSd, UNKNOWN
+from pam_sim.valve.regulator_presets import get_regulator, regulator_names
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def new(*options):
+    """Write a rig with options; return it."""
+    assert main(['rig', 'new', '--out', 'made.yaml', *options]) == 0
+    return load_rig('made.yaml')
+
+
+def test_what_was_said_is_in_the_rig():
+    rig = new('--muscle', 'dmsp_10_250', '--length-mm', '200', '--unknown', 'mass_kg=3',
+              '--about', 'spring_n_per_m=200±50', '--about', 'T_m=0.05 +- 20%',
+              '--known', 'damping_n_s_per_m=40', '--known', 'pressure_noise_pa=300',
+              '--regulator-volts', '1:9', '--regulator-kpa', '0:500')
+    assert (rig.name, rig.load, rig.valve) == ('made', 'hanging_mass', 'ppr')
+    assert rig.muscle.length_m == 0.2 and rig.muscle.bore_m == 0.010
+    assert rig.unknown == ('mass_kg',) and rig.parameters['mass_kg'] == 3.0
+    assert rig.tolerance['spring_n_per_m'] == AbsoluteSd(50.0)
+    assert rig.tolerance['T_m'] == 0.2 and rig.tolerance['damping_n_s_per_m'] == 0.0
+    assert rig.sensors['pressure_noise_pa'] == 300.0
+    wanted = {'K_m': 62500.0, 'ppr_lowest_v': 1.0, 'ppr_highest_v': 9.0, 'ppr_zero_pa': 0.0,
+              'spring_n_per_m': 200.0, 'T_m': 0.05, 'damping_n_s_per_m': 40.0}
+    assert wanted.items() <= rig.parameters.items()
+    assert rig.tolerance['K_m'] == 0.02        # not said: that of the parameter
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('load', ['hanging_mass', 'isometric', 'driven'])
+def test_without_a_word_it_is_the_nominal_rig_with_every_number_in_a_comment(load, valve):
+    rig = new('--load', load, '--valve', valve)
+    assert rig == load_rig(f'dmsp_5_300_{load}', valve=valve).with_(name='made')
+    text = open('made.yaml', encoding='utf-8').read()
+    other = {'K_m', 'T_m'} if valve == 'hsv' else {'C', 'b', 'V_dead', 'supply_pa'}
+    for parameter in rig.parameter_list:
+        if parameter.name in other or valve == 'hsv' and parameter.name.startswith('ppr_'):
+            continue
+        if parameter.name == 'pwm_period_s' and valve == 'ppr':
+            continue
+        row = re.search(rf'^  # {parameter.name}: (\S+) .*# (.*)$', text, re.M)
+        assert row and float(row[1]) == parameter.default and parameter.allowed in row[2]
+    # Without the comment sign each line states the same number.
+    stated = re.sub(r'^  # (\w+: [-\d.e+]+ )', r'  \1', text, flags=re.M)
+    assert 'mass_kg: 0.02' in stated
+    open('stated.yaml', 'w', encoding='utf-8').write(stated.replace('  # mass_kg: 0.02', ''))
+    assert load_rig('stated.yaml').with_(name='made') == rig
+
+
+def test_another_bore_scales_the_force_map_and_says_so():
+    rig = new('--bore-mm', '12')
+    assert rig.muscle.bore_m == 0.012 and rig.muscle.law == load_rig(
+        'dmsp_10_250_hanging_mass').muscle.law
+    assert rig.parameters['force_map_gain'] == pytest.approx(1.44)
+    assert rig.tolerance['force_map_gain'] == 0.2
+    assert 'first guess' in open('made.yaml', encoding='utf-8').read()
+
+
+def test_a_force_map_is_found_from_another_folder(folder, monkeypatch):
+    from pam_sim.muscle.laws.lookup import SHIPPED
+    (folder / 'maps').mkdir()
+    (folder / 'maps' / "o'map.csv").write_bytes((SHIPPED / 'dmsp_5_300.csv').read_bytes())
+    assert main(['rig', 'new', '--force-map', "maps/o'map.csv", '--out', 'rigs/a.yaml']) == 0
+    (folder / 'elsewhere').mkdir()
+    monkeypatch.chdir(folder / 'elsewhere')
+    assert load_rig('../rigs/a.yaml').muscle.law.name == 'lookup'
+
+
+@pytest.mark.parametrize('name', regulator_names())
+def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsys):
+    sheet = get_regulator(name)
+    assert 'http' in sheet.rests_on and sheet.lowest_v is None
+    assert main(['rig', 'new', '--out', 'x.yaml', '--regulator', name]) == 2
+    assert '--regulator-volts' in capsys.readouterr().err
+    rig = new('--regulator', name, '--regulator-volts', '0:10')
+    ends = [rig.with_(parameters={'T_m': 0.01}).simulate([volts] * 1000).true_pressure_pa[-1]
+            - 101_325.0 for volts in (0.0, 10.0)]
+    assert ends == pytest.approx([sheet.lowest_gauge_pa, sheet.highest_gauge_pa], abs=1.0)
+    assert rig.prior_sd('ppr_zero_pa') == sheet.lowest_gauge_pa
+
+
+@pytest.mark.parametrize('options, said', [
+    (['--known', 'mass_kg=-3'], '0.1 to 500 kg'),
+    (['--known', 'mass_kg=nan'], '0.1 to 500 kg'),
+    (['--known', 'mass_kg=heavy'], 'heavy'),
+    (['--known', 'mass_kg'], 'no value'),
+    (['--known', 'mass_kg=1±1'], 'not a number alone'),
+    (['--about', 'mass_kg=3'], 'not a number with ±'),
+    (['--about', 'mass_kg=3±-1'], '{sd: 0 to 499.9 kg}'),
+    (['--about', 'mass_kg=3±200%'], '0 to 1 (relative)'),
+    (['--unknown', 'mass_kg=1±1'], 'nothing'),
+    (['--unknown', 'mas_kg'], 'did you mean `mass_kg`'),
+    (['--unknown', 'pressure_noise_pa'], 'unknown parameter'),
+    (['--unknown', 'mass_kg', '--known', 'mass_kg=1'], 'stated twice'),
+    (['--unknown', 'mass_kg', '--load', 'isometric'], 'allowed: force_map_gain'),
+    (['--known', 'K_m=9e4', '--regulator-kpa', '0:500'], 'K_m'),
+    (['--regulator-volts', '0-10'], 'LOW:HIGH'), (['--regulator-volts', '10:0'], 'below'),
+    (['--regulator-volts', '0:10', '--regulator-kpa', '0:9000'], 'K_m'),
+    (['--regulator', 'smc'], 'smc_itv1030'), (['--regulator-kpa', 'nan:5'], 'below'),
+    (['--valve', 'hsv', '--regulator-volts', '0:10'], 'no regulator'),
+    (['--muscle', 'dsmp'], 'dmsp_5_300'), (['--load', 'hung'], 'hanging_mass'),
+    (['--bore-mm', '90'], '17.9 to 89.4 mm'), (['--force-map', 'none.csv'], 'none.csv'),
+    (['--out', 'rig.txt'], '.yaml'), (['rig.yaml'], 'rig.yaml')])
+def test_a_mistake_is_one_sentence_and_nothing_is_written(options, said, folder, capsys):
+    assert main(['rig', 'new', '--out', 'x.yaml', *options]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count('\n') == 1
+    assert list(folder.iterdir()) == []
+
+
+def test_a_file_is_kept_unless_it_may_be_replaced(capsys):
+    new('--known', 'mass_kg=2')
+    assert main(['rig', 'new', '--out', 'made.yaml', '--known', 'mass_kg=3']) == 2
+    assert '--overwrite' in capsys.readouterr().err
+    assert load_rig('made.yaml').parameters['mass_kg'] == 2.0
+    assert new('--known', 'mass_kg=3', '--overwrite').parameters['mass_kg'] == 3.0
+
+
+def test_the_next_command_works(capsys):
+    new('--load', 'isometric')
+    command = capsys.readouterr().out.rpartition('next: pam ')[2].split()
+    assert main(command) == 0
+    new('--unknown', 'mass_kg', '--overwrite')
+    assert 'next: pam identify RUN --rig made.yaml' in capsys.readouterr().out
+
+
+def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):
+    new('--unknown', 'mass_kg', '--about', 'pressure_zero_pa=0±500')
+    capsys.readouterr()
+    assert main(['rig', 'check', 'made.yaml', '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told['unknown'] == ['mass_kg']
+    assert {'name': 'pressure_zero_pa', 'unit': 'Pa', 'value': 0.0, 'sd': 500.0} in told['about']
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    assert 'mass_kg: unknown, 0.1 to 500 kg' in capsys.readouterr().out
+    assert main(['rig', 'check']) == 2 and main(['rig', 'check', 'none.yaml']) == 2
+
+
+def test_questions_come_again_until_the_answer_is_possible():
+    answers = iter(['dsmp', 'own', '5', '200', '', 'hanging_mass', '-1', 'unknown', '300±100',
+                    'ppr', 'smc_itv1050', '0-10', '0:10', '', '200', '', ''])
+    told = []
+    described = ask_description(lambda question: next(answers), told.append)
+    described.work_out()
+    text, rig = rig_file(described, 'asked.yaml')
+    assert next(answers, None) is None
+    assert len([line for line in told if line.startswith('  ')]) == 4
+    assert rig.muscle.length_m == 0.2 and rig.muscle.bore_m == 0.005
+    assert rig.tolerance['mass_kg'] == UNKNOWN
+    assert rig.tolerance['spring_n_per_m'] == AbsoluteSd(100.0)
+    assert rig.parameters['K_m'] == pytest.approx(89_500.0)
+    assert rig.sensors['pressure_noise_pa'] == 200.0 and text.startswith('# A rig')
+
+
+def test_a_terminal_is_asked_and_an_early_end_writes_nothing(folder):
+    above, below = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'rig', 'new'], cwd=folder,
+        stdin=below, stdout=below, stderr=subprocess.PIPE)
+    os.close(below)
+    os.write(above, b'dmsp_10_250\n\x04')
+    try:
+        _, error = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        os.close(above)
+    assert process.returncode == 2 and b'nothing was written' in error
+    assert list(folder.iterdir()) == []
