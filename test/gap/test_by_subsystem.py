@@ -91,6 +91,8 @@ def test_every_name_stands_in_its_own_subsystem():
     assert (found['load'].verdict, found['load'].names) == ('parameter', ('mass_kg',))
     assert found['sensor'].names == ('contraction_bias',)
     assert found['sensor'].signal == 'contraction'
+    zero = Calibrated('pressure_zero_pa', 'Pa', 0.0, 9e3, (8e3, 1e4), 7.5)
+    assert given('parameter', parameters=[zero])['sensor'].signal == 'pressure'
     assert subsystem_of('K_m') == 'valve'
     assert subsystem_of('force_map_gain') == 'muscle'
 

@@ -22,7 +22,9 @@ from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.select.order import in_order, is_sensor_error, uncertain_numbers
+from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.tolerance import UNKNOWN
 import pytest
 
 WITHOUT_CELL = ('pressure', 'contraction')
@@ -50,7 +52,15 @@ def test_numbers_are_uncertain_by_their_tolerance():
     rig = replace(nominal(), tolerance={'mass_kg': 0.3, 'T_m': 0.05, 'damping_n_s_per_m': 0.5})
     problems = subsystem_problems(rig, [Recording(recorded(nominal(), voltages(6.0)), 'ppr')])
     # Damping is a number of the muscle; a twentieth is not rough yet.
+    assert subsystem_of_number('damping_n_s_per_m') == 'muscle'
     assert uncertain_numbers(problems, CRITERIA) == {'mass_kg'}
+
+
+def test_the_zero_of_a_sensor_does_not_stand_before_its_bias():
+    rig = replace(nominal(), tolerance={'contraction_zero_m': UNKNOWN, 'spring_n_per_m': UNKNOWN})
+    problems = subsystem_problems(rig, [Recording(recorded(nominal(), voltages(6.0)), 'ppr')])
+    assert 'contraction_zero_m' in {k.name for p in problems for k in p.known}
+    assert uncertain_numbers(problems, CRITERIA) == {'spring_n_per_m'}
 
 
 def test_an_error_of_a_sensor_is_a_bias_or_a_gain():

@@ -102,7 +102,9 @@ def _own(s: str, names: tuple[str, ...], gaps: Mapping[str, Mapping[str, SignalG
     of_muscle = dict(gaps.get('muscle', {}))
     if s != 'sensor':
         return of_muscle
-    read = {get_effect(n).fitting.sensor_signal for n in names if n in effects()}
+    # A zero of a sensor is a number of the rig that begins with the signal.
+    read = {get_effect(n).fitting.sensor_signal if n in effects() else n.split('_')[0]
+            for n in names}
     return {signal: gap for signal, gap in {**of_muscle, **gaps['valve']}.items()
             if signal in read} or of_muscle
 

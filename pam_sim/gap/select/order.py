@@ -37,7 +37,7 @@ def is_sensor_error(name: str) -> bool:
 def numbers_of_rig(problems: Iterable[SubsystemProblem]) -> list[Known]:
     """Return the numbers of load and valve that act in subsystems."""
     return [k for p in problems for k in p.known
-            if k.of_rig and subsystem_of_number(k.name) != 'muscle']
+            if k.of_rig and subsystem_of_number(k.name) in ('valve', 'load')]
 
 
 def uncertain_numbers(problems: Iterable[SubsystemProblem], criteria: Criteria) -> set[str]:
