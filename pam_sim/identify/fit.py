@@ -25,8 +25,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.errors import InputError
 from pam_sim.gap.data.split import FIT, SELECT, UNUSED
-from pam_sim.gap.fit.solver import simulated_errors, tempering
+from pam_sim.gap.fit.solver import REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.numbers import Number, with_values
 from pam_sim.rig import Rig
@@ -85,7 +86,10 @@ class Weighted:
     def errors(self, x: FloatArray, problem: SubsystemProblem) -> FloatArray:
         """Return the errors of one subsystem in floors."""
         values = self.values(x)
-        rig = with_values(self.rig, self.numbers, values)
+        try:
+            rig = with_values(self.rig, self.numbers, values)
+        except InputError:          # each is within its range, but not all of them go together
+            return np.where(problem.part == UNUSED, 0.0, REFUSED)
         z = np.array([(values.get(k.name, k.value) - k.value) / k.sd for k in problem.known])
         return np.where(problem.part == UNUSED, 0.0, simulated_errors(problem, rig, z))
 

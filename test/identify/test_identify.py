@@ -105,6 +105,13 @@ def test_the_muscle_alone_is_identified_at_a_held_length_without_a_command():
     assert inside(found['force_map_gain'], 0.9) and inside(found['force_zero_n'], 0.0)
 
 
+def test_the_held_length_may_be_unknown_and_beyond_the_stroke_is_no_length():
+    rig = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.03})
+    run = record(rig, keep=('pressure', 'force'), command=False)
+    found = identify(run, load_rig('dmsp_5_300_isometric'), ['contraction_m'], advise=False)
+    assert found['contraction_m'].value == pytest.approx(0.03, rel=0.02)
+
+
 def test_a_missing_effect_widens_the_intervals_and_is_said():
     rig = RIG.with_(parameters={'mass_kg': 3.3}, effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 4.0}}])
