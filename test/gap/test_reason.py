@@ -117,6 +117,12 @@ def test_a_wrong_number_is_a_sentence_of_its_own():
                     'falls from 8 to 0.4 kPa.')
 
 
+def test_a_number_that_was_0_has_no_change_in_percent():
+    spring = Calibrated('spring_n_per_m', 'N/m', 0.0, 400.0, (390.0, 410.0), 8.0)
+    text = said('parameter', {'pressure': PRESSURE}, parameters=[spring])
+    assert text.startswith('spring_n_per_m = 400 N/m instead of 0 N/m. With this')
+
+
 def test_the_page_of_doubtful_effects_says_likeliest():
     assert 'What is likeliest to be missing' in gap_section(
         GapResult('ambiguous', '', effects=[EFFECTS['hysteresis']])).body

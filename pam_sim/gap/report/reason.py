@@ -89,8 +89,9 @@ def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _numbers(parameters: Iterable[Calibrated]) -> str:
-    return join([f'{c.name} = {c.value:.4g} {c.unit} instead of {c.nominal:.4g} {c.unit} '
-                 f'({100 * (c.value / c.nominal - 1):+.1f} %)' for c in parameters])
+    return join([f'{c.name} = {c.value:.4g} {c.unit} instead of {c.nominal:.4g} {c.unit}'
+                 + (f' ({100 * (c.value / c.nominal - 1):+.1f} %)' if c.nominal else '')
+                 for c in parameters])
 
 
 def _shrink(result: GapResult) -> str:
