@@ -82,6 +82,9 @@ class Fitting:
         It contains another formulation of its name and adds little, so it is tried after that.
     limits : tuple of str
         Simpler look-alikes that it contains. One that explains as much is named instead.
+    together : tuple of str
+        Formulations that usually come with it. All are tried at once where neither one effect
+        nor two explain a subsystem.
     same_as : str
         Parameter of the model that does the same.
     delay : str
@@ -99,6 +102,7 @@ class Fitting:
     free: tuple[FreeParameter, ...] = ()
     refinement: bool = False
     limits: tuple[str, ...] = ()
+    together: tuple[str, ...] = ()
     same_as: str = ''
     delay: str = ''
     edges: tuple[str, ...] = ()

@@ -58,8 +58,18 @@ EFFECT = Effect(
         free=(
             FreeParameter('closing_pressure_pa', 5e3, 0.0, 1e5),
             FreeParameter('bleed_rate_pa_per_s', 1e4, 1e3, 3e5, True)),
-        limits=('valve_dead_zone', 'vent_asymmetry')),
+        limits=('valve_dead_zone', 'vent_asymmetry'),
+        together=('valve_dead_time_by_direction', 'flow_limit')),
 )
+
+
+@compiled
+def closing_vent(above_pa: float, time_constant_s: float, closing_pa: float,
+                 rate_pa_per_s: float) -> tuple[float, float]:
+    """Return (aim above the set point [Pa], lag [s]) of a valve at a distance not negative."""
+    if above_pa > closing_pa:
+        return max(closing_pa - rate_pa_per_s * time_constant_s, 0.0), time_constant_s
+    return 0.0, max(time_constant_s, above_pa / rate_pa_per_s)
 
 
 @compiled
@@ -69,7 +79,6 @@ def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
     above_pa = pressure_pa - set_point_pa
     if above_pa <= 0.0:
         return set_point_pa, time_constant_s
-    if above_pa > par.closing_pressure_pa:
-        bled_pa = par.bleed_rate_pa_per_s * time_constant_s
-        return set_point_pa + max(par.closing_pressure_pa - bled_pa, 0.0), time_constant_s
-    return set_point_pa, max(time_constant_s, above_pa / par.bleed_rate_pa_per_s)
+    aim_pa, lag_s = closing_vent(
+        above_pa, time_constant_s, par.closing_pressure_pa, par.bleed_rate_pa_per_s)
+    return set_point_pa + aim_pa, lag_s

@@ -35,6 +35,8 @@ valve valve_nonlinearity valve_hysteresis half_width_pa
 valve valve_nonlinearity flow_limit fill_rate_at_400kpa_pa_per_s vent_rate_at_400kpa_pa_per_s
 valve valve_nonlinearity vent_asymmetry vent_to_fill_time_ratio
 valve valve_nonlinearity vent_bleed closing_pressure_pa bleed_rate_pa_per_s
+valve valve_nonlinearity vent_bleed_fill_creep closing_pressure_pa bleed_rate_pa_per_s \
+fill_closing_pressure_pa creep_rate_pa_per_s
 valve loss leakage conductance_m3_per_s_pa mass_flow_at_400kpa_kg_per_s
 valve loss leakage_slit conductance_m3_per_s_pa mass_flow_at_400kpa_kg_per_s
 valve loss supply_droop reservoir_volume_m3
@@ -89,7 +91,8 @@ def test_named_as_results_name_it(line):
         assert parameter.unit and parameter.description
         assert parameter.lower <= parameter.default <= parameter.upper
     hsv_only = ('supply_droop', 'dead_volume', 'thermal', 'valve_dead_zone_two_ramps')
-    ppr_only = ('valve_hysteresis', 'flow_limit', 'vent_bleed', 'valve_dead_time_by_direction')
+    ppr_only = ('valve_hysteresis', 'flow_limit', 'vent_bleed',
+                'vent_bleed_fill_creep', 'valve_dead_time_by_direction')
     expected = ('hsv',) if name in hsv_only else ('ppr',) if name in ppr_only else ('ppr', 'hsv')
     assert effect.valves == expected
 

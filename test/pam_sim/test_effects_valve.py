@@ -355,6 +355,21 @@ def test_the_vent_closes_above_the_set_point_and_bleeds():
     assert np.array_equal(*up)
 
 
+def test_both_valves_close_before_the_set_point_each_by_its_own_distance():
+    vent = {'closing_pressure_pa': 18e3, 'bleed_rate_pa_per_s': 9e3}
+    both = held('ppr', ('vent_bleed_fill_creep', {
+        **vent, 'fill_closing_pressure_pa': 8e3, 'creep_rate_pa_per_s': 4e3}))
+    mirrored = held('ppr', ('vent_bleed', {
+        'closing_pressure_pa': 8e3, 'bleed_rate_pa_per_s': 4e3}))
+    up = both.simulate(np.full(3000, 4.0), initial_pressure_pa=P_ATM_PA + 200e3).pressure_pa
+    down = mirrored.simulate(np.full(3000, 2.0), initial_pressure_pa=P_ATM_PA + 400e3).pressure_pa
+    assert np.allclose(up + down, 2.0 * P_ATM_PA + 600e3, rtol=0.0, atol=1e-4)
+    falling = [rig.simulate(np.full(3000, 2.0), initial_pressure_pa=P_ATM_PA + 400e3).pressure_pa
+               for rig in (both, held('ppr', ('vent_bleed', vent)))]
+    assert np.allclose(*falling, rtol=0.0, atol=1e-4)
+    assert up[600] - P_ATM_PA == pytest.approx(393e3, abs=1.5e3)
+
+
 def test_a_bleed_quicker_than_the_lag_is_the_lag():
     quick = held('ppr', ('vent_bleed', {
         'closing_pressure_pa': 20e3, 'bleed_rate_pa_per_s': 1e7}))
@@ -364,7 +379,8 @@ def test_a_bleed_quicker_than_the_lag_is_the_lag():
 
 
 @pytest.mark.parametrize('name', [
-    'flow_limit', 'valve_hysteresis', 'vent_bleed', 'valve_dead_time_by_direction'])
+    'flow_limit', 'valve_hysteresis', 'vent_bleed', 'vent_bleed_fill_creep',
+    'valve_dead_time_by_direction'])
 def test_effects_of_the_regulator_leave_the_switching_valves_alone(name):
     signal = duties('random', 300)
     ours = held('hsv', (name, {})).simulate(signal)

@@ -26,6 +26,7 @@ from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.backward import backward_elimination, Selected
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.forward import forward_selection
+from pam_sim.gap.select.groups import group_of
 from pam_sim.gap.select.pairs import pair_of
 from pam_sim.gap.select.plausibility import is_poor, with_wrong_numbers
 from pam_sim.gap.select.rival import NamedEffect
@@ -73,7 +74,7 @@ def search(context: SearchContext) -> Outcome:
         again, added = forward_selection(context, selected.fit, selected.named)
         if len(added) > len(selected.named):
             selected = backward_elimination(context, again, added)
-    selected = _paired(context, selected)
+    selected = _grouped(context, _paired(context, selected))
     fit, named, explained = with_wrong_numbers(
         context, selected.fit, selected.named, selected.explained)
     return Outcome(context.base, fit, named, explained, not context.out_of_time(),
@@ -103,4 +104,31 @@ def _paired(context: SearchContext, selected: Selected) -> Selected:
                 return both
             selected = replace(selected, mistaken=both.mistaken)
     problem.level, estimator.slopes = level, slopes
+    return selected
+
+
+def _grouped(context: SearchContext, selected: Selected) -> Selected:
+    """
+    Return the same with the effects of a group that explains a subsystem, if several stay.
+
+    Only where nothing is named in a subsystem with a gap.
+    """
+    for problem in context.problems:
+        s = problem.subsystem
+        if (context.first_gap[s] <= context.seen_gap or selected.mistaken
+                or any(w.subsystem == s for w in selected.named) or context.out_of_time()):
+            continue
+        estimator = context.estimator
+        level, slopes = problem.level, dict(estimator.slopes)
+        group = group_of(context, selected.fit, problem)
+        if group is not None:
+            found, named = group
+            context.set_levels(named[0].rivals, [problem])
+            if not is_poor(context, problem, found, context.explained(found)):
+                estimator.take_slopes(found.settings(), found.known_z)
+                several = backward_elimination(context, found, [*selected.named, *named])
+                if sum(w.subsystem == s for w in several.named) > 1:
+                    selected = several
+                    continue
+        problem.level, estimator.slopes = level, slopes
     return selected
