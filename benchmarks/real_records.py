@@ -16,6 +16,7 @@
 `pam gap` on records of a DMSP-10-250 that others measured, and effects injected into them.
 
     python benchmarks/real_records.py FOLDER
+    python benchmarks/real_records.py FOLDER --pressure --write    # the table of the valve alone
 
 FOLDER holds ``steps_100hz.csv`` and ``quasi_static_loop.csv``, transcribed from
 github.com/tbazina/pam_lqi_pid; they are no part of this project. Another muscle than the one of
@@ -41,6 +42,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import real_pressure
 import results_page
 
 MODEL = """
@@ -57,7 +59,7 @@ RESOLUTION = {'pressure_pa': 900.0, 'contraction_m': 4.9e-5}       # of the loop
 MUSCLE_NAMES = ('coulomb_friction', 'pressure_friction', 'hysteresis', 'viscous_damping', 'creep',
                 'end_taper', 'bladder_stiffness', 'threshold_pressure', 'thermal_softening')
 VALVE_NAMES = ('valve_dead_time', 'tube_lag', 'flow_limit', 'vent_asymmetry', 'valve_dead_zone',
-               'valve_hysteresis', 'pressure_lag')
+               'valve_hysteresis', 'pressure_lag', 'vent_bleed')
 MIDDLE_BAR = np.linspace(1.0, 5.4, 23)
 INJECTED = (('coulomb_friction', 'force_n', 15.0), ('coulomb_friction', 'force_n', 6.0),
             ('end_taper', 'k_minus_1', 0.2), ('end_taper', 'k_minus_1', 0.07),
@@ -165,6 +167,7 @@ def command_line():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('folder')
     parser.add_argument('--seconds', type=float, default=600.0, help='budget of each look')
+    parser.add_argument('--pressure', action='store_true', help='the table of the valve alone')
     results_page.add_write(parser, 'real_records')
     return parser
 
@@ -172,8 +175,21 @@ def command_line():
 def main():
     """Look at the loop, at the steps, and for what was injected."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        show(args)
+    with results_page.printed(args, __file__, 'pressure'):
+        show_pressure(args)
+    if not args.pressure:
+        with results_page.printed(args, __file__):
+            show(args)
+
+
+def show_pressure(args):
+    """Print how well regulator and black box follow the pressure of the steps."""
+    loop = read_table(args.folder, 'quasi_static_loop.csv')
+    steps = read_table(args.folder, 'steps_100hz.csv')
+    zero, slope = calibrated(loop)
+    rig, _ = model_of(loop, zero)
+    real_pressure.print_table(rig.with_(effects=[]), np.clip(slope * steps['u_V'], 0.0, 6.0),
+                              1e5 * (zero + steps['p_bar']))
 
 
 def show(args):
