@@ -23,6 +23,7 @@ from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Precision
 from pam_sim.gap.result import Calibrated, GapResult
+from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.materiality import is_material
@@ -118,8 +119,15 @@ def _is_left(result: GapResult, estimator: Estimator, validation: Validation, ba
             NORMAL_95 * spread.get(name, 0.0))) / max(validation.noise[name], 1e-12)
             for name, s in result.signals.items()), default=0.0)
 
-    return left({}) > least and left(
-        spread_of_numbers(validation, estimator, base, whole)) > least
+    # What the searched data show clearly is no doubt about numbers, however wide their priors.
+    return left({}) > least and (_is_clear(estimator, base) or left(
+        spread_of_numbers(validation, estimator, base, whole)) > least)
+
+
+def _is_clear(estimator: Estimator, base: Fit) -> bool:
+    """Return whether calibration leaves a gap in the searched data that is clear without proof."""
+    return any(gap(p, base.errors[p.subsystem]) > estimator.criteria.clear_rest
+               for p in estimator.problems)
 
 
 def _beyond(value: float, floor: float) -> float:

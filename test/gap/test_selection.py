@@ -159,7 +159,7 @@ def test_a_gap_without_a_name_must_be_clear(monkeypatch, off, materiality, verdi
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(named=[], share={'valve': 0.0})
-    estimator = SimpleNamespace(criteria=CRITERIA)
+    estimator = SimpleNamespace(criteria=CRITERIA, problems=[])
     verdict_module.judge(
         result, outcome, estimator, validation, found, found, materiality, True)
     assert result.verdict == verdict

@@ -67,13 +67,14 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
     open_ones = [s for s, one in found.items() if one.verdict == 'no_gap']
     least = criteria.likely_sd * max(materiality, 1.0)
     left = {s: _left(runs.gaps[s], result, criteria, {}) for s in open_ones}
+    plain = left
     if any(value > least for value in left.values()):
         doubt = runs.spread()
         left = {s: _left(runs.gaps[s], result, criteria, {
             signal: doubt[s, signal] for signal in runs.gaps[s]}) for s in open_ones}
     unknown = {s for s, value in left.items() if value > least}
     if result.verdict == 'unknown' and not unknown:
-        unknown = {max(left, key=lambda s: left[s])}       # the whole chain shows it
+        unknown = {max(plain, key=lambda s: plain[s])}     # or the doubt hides it here
     return {s: replace(one, verdict='unknown') if s in unknown else one
             for s, one in found.items()}
 
