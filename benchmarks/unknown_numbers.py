@@ -1,0 +1,213 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How often the intervals of `pam identify` hold the true numbers: rigs of an independent simulator.
+
+    python benchmarks/unknown_numbers.py                     # 60 cases
+    python benchmarks/unknown_numbers.py --number 20 --undetermined 10 --minutes 15
+
+The hidden rig is the one of `test/hidden`: its air, friction, memory and creep have other
+formulations than the library. In each case one or two of mass, spring, gain of the regulator and
+zeros of pressure and contraction differ from the rig file, by up to half of the value. Every
+second case hides an effect as well. The other numbers of the hidden rig are off within their
+tolerance.
+
+With --undetermined N as many cases follow that cannot determine a number: a load that never
+lifts, a valve without command, a load cell that was not recorded, a muscle alone. There the answer
+must say so and name an experiment; the experiment is run on the hidden rig and answered as well.
+"""
+
+import argparse
+from pathlib import Path
+import sys
+import time
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT)]
+
+from pam_sim import load_rig  # noqa: E402, I100
+from pam_sim.gap.data.signals import FIELD, UNIT  # noqa: E402
+from pam_sim.identify import identify  # noqa: E402
+from pam_sim.run import Run, Series  # noqa: E402
+import truth_commands  # noqa: E402
+import truth_effects  # noqa: E402
+import truth_rig  # noqa: E402
+import truth_run  # noqa: E402
+import truth_sensors  # noqa: E402
+
+NOMINAL = 'dmsp_5_300_hanging_mass'
+# Name here -> name of the hidden rig (or of the change of a sensor), low and high true value.
+NUMBERS = {'mass_kg': ('mass', 3.0, 7.0), 'spring_n_per_m': ('spring', 100.0, 800.0),
+           'K_m': ('k_m', 80e3, 125e3), 'pressure_zero_pa': ('pressure_bias', -15e3, 15e3),
+           'contraction_zero_m': ('contraction_bias', -2e-3, 2e-3)}
+SENSORS = ('pressure_zero_pa', 'contraction_zero_m')
+HIDDEN = ('', 'hysteresis', '', 'creep', '', 'valve_dead_time', '', 'coulomb_friction', '',
+          'viscous_damping')
+TOLERANCE = {'damping': (25.0, 0.02), 't_m': (0.06, 0.02), 'gain_map': (1.0, 0.02)}
+WITHOUT = (                 # what cannot be determined: unknown number, topics, protocol
+    ('mass_kg', ('pressure', 'contraction', 'valve_signal'), 'low'),
+    ('K_m', ('pressure', 'contraction', 'force'), 'steps'),
+    ('mass_kg', ('pressure', 'valve_signal'), 'steps'),
+    ('force_zero_n', ('pressure', 'contraction', 'valve_signal'), 'steps'),
+    ('T_m', ('pressure', 'contraction'), 'steps'))
+LOW = {'domain': 'pressure', 'segments': [
+    {'step': {'to_pa': truth_rig.ATM + p, 'duration_s': 1.0}} for p in (30e3, 60e3, 90e3, 50e3)]}
+TRUE_OF = {'T_m': 't_m', 'mass_kg': 'mass', 'K_m': 'k_m'}
+
+
+def draw(seed, place):
+    """Return (true values by name, numbers of the rig, changes of the sensors, effect)."""
+    rng = np.random.default_rng([seed, place])
+    names = rng.choice(list(NUMBERS), size=1 + place % 2, replace=False)
+    true = {str(n): float(rng.uniform(*NUMBERS[n][1:])) for n in names}
+    numbers = {n: value * (1.0 + sd * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
+               for n, (value, sd) in TOLERANCE.items()}
+    sensors = {}
+    for name, value in true.items():
+        (sensors if name in SENSORS else numbers)[NUMBERS[name][0]] = value
+    effect = HIDDEN[place % len(HIDDEN)]
+    if effect:
+        numbers |= truth_effects.EFFECTS[effect].draw(
+            rng, float(rng.uniform(0.4, 1.2)), 'ppr').numbers
+    return true, numbers, sensors, effect
+
+
+def record(numbers, experiment, rng, sensors=None, topics=('pressure', 'contraction', 'force',
+                                                           'valve_signal')):
+    """Return what the sensors of the hidden rig record of an experiment, as a Run."""
+    truth = truth_run.run_rig(numbers, 'ppr', experiment)
+    chain = truth_sensors.drawn_chain(rng)
+    chain.effects = sensors or {}
+    found = truth_sensors.measured(truth.rows, chain, rng, reservoir=False)
+    series = {t: Series(np.rint(1e9 * (s + 1.0)).astype(np.int64), {FIELD[t]: v},
+                        {FIELD[t]: UNIT[t]}) for t, (s, v) in found.items() if t in topics}
+    if 'valve_signal' in topics:
+        series['valve_signal'] = Series(np.rint(1e9 * (truth.sent_s + 1.0)).astype(np.int64),
+                                        {'ppr_voltage': truth.sent[:, 0]}, {'ppr_voltage': 'V'})
+    return Run(series, {}, '/muscle', 'hidden rig')
+
+
+def covered(seed, place):
+    """Return one row per unknown number of a case: what it is, and whether its interval holds."""
+    true, numbers, sensors, effect = draw(seed, place)
+    rng = np.random.default_rng([seed, place, 1])
+    topics = ('pressure', 'contraction', 'valve_signal', *(('force',) if place % 4 < 2 else ()))
+    run = record(numbers, truth_commands.protocol('steps', int(rng.integers(2**31))), rng,
+                 sensors, topics)
+    began = time.process_time()
+    found = identify(run, load_rig(NOMINAL), list(true), advise=False)
+    spent = time.process_time() - began
+    rows = []
+    for one in found.found:
+        i, value = one.interval, true[one.number.name]
+        holds = (i.open_low or i.low <= value) and (i.open_high or value <= i.high)
+        rows.append({'case': place, 'number': one.number.name, 'effect': effect or 'none',
+                     'force': 'force' in topics, 'true': value, 'value': one.value,
+                     'low': i.low, 'high': i.high, 'status': one.status, 'holds': bool(holds),
+                     'seconds': spent})
+    return rows
+
+
+def left_open(seed, place):
+    """Return what was said of a number that a recording cannot determine, and what followed."""
+    name, topics, protocol = WITHOUT[place % len(WITHOUT)]
+    rng = np.random.default_rng([seed, place, 2])
+    numbers = {n: value * (1.0 + sd * float(rng.uniform(-1.0, 1.0)))
+               for n, (value, sd) in TOLERANCE.items()}
+    numbers |= {'mass': float(rng.uniform(4.0, 6.5)), 'k_m': float(rng.uniform(85e3, 110e3))}
+    experiment = LOW if protocol == 'low' else truth_commands.protocol(
+        protocol, int(rng.integers(2**31)))
+    run = record(numbers, experiment, rng, None, topics)
+    # What is not sought is right in the rig file, within its tolerance.
+    parameters = {k: numbers[t] for k, t in TRUE_OF.items() if k != name}
+    rig = load_rig(NOMINAL).with_(parameters=parameters)
+    found = identify(run, rig, [name])
+    open_ = name not in {n.number.name for n in found.found} or name in found.open_names
+    row = {'case': place, 'number': name, 'topics': '+'.join(topics), 'said': open_,
+           'advised': found.next_experiment is not None, 'then': None}
+    if found.next_experiment is not None:
+        advice = found.next_experiment
+        more = dict(numbers)
+        more['mass'] += advice['added_kg']
+        topics = ('pressure', 'contraction', 'valve_signal',
+                  *(('force',) if advice['needs_force'] or name == 'force_zero_n' else ()))
+        again = identify([run, record(more, advice['experiment'], rng, None, topics)], rig, [name],
+                         [0.0, advice['added_kg']], advise=False)
+        row['then'] = name in {n.number.name for n in again.found} and not again.open_names
+    return row
+
+
+def table(rows, columns):
+    """Return rows as a table in Markdown."""
+    lines = ['| ' + ' | '.join(columns) + ' |', '|' + '---|' * len(columns)]
+    for row in rows:
+        lines.append('| ' + ' | '.join(
+            f'{v:.5g}' if isinstance(v := row[c], float) else
+            {True: 'yes', False: 'NO', None: '–'}.get(v, str(v)) if v is None or isinstance(
+                v, bool) else str(v) for c in columns) + ' |')
+    return '\n'.join(lines)
+
+
+def shares(rows):
+    """Return the coverage in words: all, with and without an effect, and how many determined."""
+    lines = []
+    for title, chosen in (('all', rows), ('no effect', [r for r in rows if r['effect'] == 'none']),
+                          ('an effect', [r for r in rows if r['effect'] != 'none'])):
+        if chosen:
+            held = sum(r['holds'] for r in chosen)
+            known = sum(r['status'] == 'determined' for r in chosen)
+            lines.append(f'{title}: {held} of {len(chosen)} intervals hold the true value '
+                         f'({100.0 * held / len(chosen):.0f} %), {known} are determined')
+    return '\n'.join(lines)
+
+
+def main():
+    """Answer all cases and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--number', type=int, default=60, help='cases (default: 60)')
+    parser.add_argument('--undetermined', type=int, default=40, metavar='N',
+                        help='cases that determine nothing (default: 40)')
+    parser.add_argument('--seed', type=int, default=2026)
+    parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
+                        help='begin no case after N minutes; the tables say how many there were')
+    args = parser.parse_args()
+    until = time.time() + 60.0 * args.minutes
+    rows, opens = [], []
+    for place in range(args.number):
+        if time.time() > until:
+            break
+        rows += covered(args.seed, place)
+        print(f'case {place}: ' + ', '.join(
+            f'{r["number"]} {"holds" if r["holds"] else "MISSES"}' for r in rows
+            if r['case'] == place), file=sys.stderr, flush=True)
+    for place in range(args.undetermined):
+        if time.time() > until:
+            break
+        opens.append(left_open(args.seed, place))
+        print(f'undetermined {place}: {opens[-1]}', file=sys.stderr, flush=True)
+    if rows:
+        print(table(rows, ('case', 'number', 'effect', 'force', 'true', 'value', 'low', 'high',
+                           'status', 'holds', 'seconds')))
+        print(f'\n{shares(rows)}\n')
+    if opens:
+        print(table(opens, ('case', 'number', 'topics', 'said', 'advised', 'then')))
+        for word in ('said', 'advised', 'then'):
+            print(f'{word}: {sum(bool(r[word]) for r in opens)} of {len(opens)}')
+
+
+if __name__ == '__main__':
+    main()
