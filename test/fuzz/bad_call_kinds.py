@@ -134,6 +134,9 @@ VERBS = {
         (Slot('', 'fixed', '--plan'), Slot('', 'experiment', 'good.yaml'),
          Slot('--model', 'rig', RIG), Slot('--out', 'folder', 'new')),
         (Slot('--explain', 'effect', 'coulomb_friction'), Slot('--model', 'rig', RIG))],
+    'identify': [
+        (BAG, Slot('--rig', 'rig', RIG), INSIDE, Slot('--seed', 'count'),
+         Slot('--out', 'folder', 'new'))],
     'report': [(BAG, BAG, INSIDE, Slot('--out', 'page', 'new.html'))],
     'info': [(BAG,)],
     'import': [
