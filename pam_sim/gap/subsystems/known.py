@@ -23,7 +23,7 @@ from pam_sim.valve import hsv, ppr
 LATENCY_PRIOR_S, LATENCY_SD_S, LATENCY_MAX_S = 1e-3, 1e-3, 3e-3
 SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
 STEP_SD = 0.05               # of slopes, in deviations of the prior
-STEP_OF_UNKNOWN = 0.01       # the same of the value, or of the deviation where that is 0
+STEP_OF_UNKNOWN = 0.01       # of the value; where that is 0, its square of the deviation
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def known_numbers(rig: Rig) -> list[Known]:
         value, sd = rig.parameters[p.name], rig.prior_sd(p.name)
         if sd > 0.0:
             unknown = rig.tolerance[p.name] == UNKNOWN
-            step = STEP_OF_UNKNOWN * (abs(value) / sd or 1.0) if unknown else STEP_SD
+            step = STEP_OF_UNKNOWN * (abs(value) / sd or STEP_OF_UNKNOWN) if unknown else STEP_SD
             found.append(Known(p.name, p.unit, value, sd, p.lower, p.upper, True, step, unknown))
     return found
 
