@@ -37,12 +37,13 @@ import time
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT)]
+sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
 from pam_sim import load_rig  # noqa: E402, I100
 from pam_sim.gap.data.signals import FIELD, UNIT  # noqa: E402
 from pam_sim.identify import identify  # noqa: E402
 from pam_sim.run import Run, Series  # noqa: E402
+import results_page  # noqa: E402
 import truth_commands  # noqa: E402
 import truth_effects  # noqa: E402
 import truth_rig  # noqa: E402
@@ -170,13 +171,13 @@ def shares(rows):
         if chosen:
             held = sum(r['holds'] for r in chosen)
             known = sum(r['status'] == 'determined' for r in chosen)
-            lines.append(f'{title}: {held} of {len(chosen)} intervals hold the true value '
+            lines.append(f'- {title}: {held} of {len(chosen)} intervals hold the true value '
                          f'({100.0 * held / len(chosen):.0f} %), {known} are determined')
     return '\n'.join(lines)
 
 
-def main():
-    """Answer all cases and print the tables."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--number', type=int, default=60, help='cases (default: 60)')
     parser.add_argument('--undetermined', type=int, default=40, metavar='N',
@@ -184,9 +185,25 @@ def main():
     parser.add_argument('--seed', type=int, default=2026)
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='begin no case after N minutes; the tables say how many there were')
-    args = parser.parse_args()
+    results_page.add_write(parser, 'unknown_numbers')
+    return parser
+
+
+def main():
+    """Answer all cases and print the tables."""
+    args = command_line().parse_args()
     until = time.time() + 60.0 * args.minutes
-    rows, opens = [], []
+    if args.number:
+        with results_page.printed(args, __file__):
+            show_covered(args, until)
+    if args.undetermined:
+        with results_page.printed(args, __file__, 'undetermined'):
+            show_open(args, until)
+
+
+def show_covered(args, until):
+    """Print whether the intervals hold the true numbers."""
+    rows = []
     for place in range(args.number):
         if time.time() > until:
             break
@@ -194,19 +211,22 @@ def main():
         print(f'case {place}: ' + ', '.join(
             f'{r["number"]} {"holds" if r["holds"] else "MISSES"}' for r in rows
             if r['case'] == place), file=sys.stderr, flush=True)
+    print(table(rows, ('case', 'number', 'effect', 'force', 'true', 'value', 'low', 'high',
+                       'status', 'holds', 'seconds')))
+    print(f'\n{shares(rows)}\n')
+
+
+def show_open(args, until):
+    """Print what is said of numbers that a recording does not determine."""
+    rows = []
     for place in range(args.undetermined):
         if time.time() > until:
             break
-        opens.append(left_open(args.seed, place))
-        print(f'undetermined {place}: {opens[-1]}', file=sys.stderr, flush=True)
-    if rows:
-        print(table(rows, ('case', 'number', 'effect', 'force', 'true', 'value', 'low', 'high',
-                           'status', 'holds', 'seconds')))
-        print(f'\n{shares(rows)}\n')
-    if opens:
-        print(table(opens, ('case', 'number', 'topics', 'said', 'advised', 'then')))
-        for word in ('said', 'advised', 'then'):
-            print(f'{word}: {sum(bool(r[word]) for r in opens)} of {len(opens)}')
+        rows.append(left_open(args.seed, place))
+        print(f'undetermined {place}: {rows[-1]}', file=sys.stderr, flush=True)
+    print(table(rows, ('case', 'number', 'topics', 'said', 'advised', 'then')) + '\n')
+    for word in ('said', 'advised', 'then'):
+        print(f'- {word}: {sum(bool(r[word]) for r in rows)} of {len(rows)}')
 
 
 if __name__ == '__main__':
