@@ -32,6 +32,8 @@ from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
 from pam_sim.rig import Rig
 
+# Their least size, not zero, is the strongest effect.
+NOT_GRADUAL = ('flow_limit', 'supply_droop')
 SEEN_FLOORS2 = 1.5           # mean squared error from which on something is missing
 
 
@@ -55,19 +57,21 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     are left out: of a sensor it is known that it was calibrated, unless its zero is asked for.
     """
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
-    if any(n.name == 'spring_n_per_m' for n in numbers):
+    unknown = {n.name for n in numbers if n.unknown}
+    if 'spring_n_per_m' in unknown:
         there.add('parallel_spring')
     found = []
     for effect in effects().values():
         if (effect.variant_of or effect.subsystem == 'sensor' or effect.name in there
-                or rig.valve not in effect.valves or effect.fitting.same_as
-                or len(effect.amplitude) != 1):
+                or effect.name in NOT_GRADUAL or rig.valve not in effect.valves
+                or effect.fitting.same_as in unknown):
             continue
-        p = next(one for one in effect.parameters if one.name == effect.amplitude[0])
-        if p.lower > 0.0 or p.default <= 0.0:
+        sizes = [p for p in effect.parameters if p.name in effect.amplitude]
+        if any(p.lower > 0.0 or p.default <= 0.0 for p in sizes):
             continue
-        number = Number(effect.name, effect.name, p.name, p.unit, 0.0, 0.0, p.upper, p.default,
-                        description=effect.sentence)
-        if any(number.acts_in(problem) for problem in problems):
-            found.append(number)
+        for p in sizes:
+            number = Number(f'{effect.name}.{p.name}', effect.name, p.name, p.unit, 0.0, p.lower,
+                            p.upper, p.default, description=effect.sentence)
+            if any(number.acts_in(problem) for problem in problems):
+                found.append(number)
     return found
