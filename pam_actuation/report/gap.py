@@ -46,7 +46,7 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.select.memory import MEMORY
+from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
@@ -98,7 +98,7 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
     if len(result.rivals) > 1:
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise,
-            pieces=('speeds',) if result.at_one_speed and set(MEMORY) <= {
+            pieces=('speeds',) if result.at_one_speed and set(memories()) <= {
                 rival[0] for rival in result.rivals} else (),
             may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])

@@ -82,7 +82,7 @@ EFFECT = Effect(
             FreeParameter('stiffness_2_n_per_m', 50.0, 0.0, 5e3),
             FreeParameter('time_constant_1_s', 1.0, 0.15, 4.0, True, ends=('lower',)),
             FreeParameter('time_constant_2_s', 10.0, 4.0, 100.0, True, ends=('upper',))),
-        limits=('viscous_damping', 'bladder_stiffness')),
+        limits=('viscous_damping', 'bladder_stiffness'), remembers=True),
 )
 
 

@@ -85,6 +85,9 @@ class Fitting:
     together : tuple of str
         Formulations that usually come with it. All are tried at once where neither one effect
         nor two explain a subsystem.
+    remembers : bool
+        Its force depends on the past, so that a loop stays open. At one speed of motion all
+        such effects look alike, and they are a set.
     same_as : str
         Parameter of the model that does the same.
     delay : str
@@ -103,6 +106,7 @@ class Fitting:
     refinement: bool = False
     limits: tuple[str, ...] = ()
     together: tuple[str, ...] = ()
+    remembers: bool = False
     same_as: str = ''
     delay: str = ''
     edges: tuple[str, ...] = ()

@@ -67,7 +67,7 @@ EFFECT = Effect(
     pack=_pack,
     fitting=Fitting(
         free=(*LEVEL_FREE, FreeParameter('width_scale', 1.0, 0.35, 5.0, True, (0.5, 1.5))),
-        limits=('coulomb_friction', 'pressure_friction')),
+        limits=('coulomb_friction', 'pressure_friction'), remembers=True),
 )
 
 

@@ -32,7 +32,7 @@ from pam_sim.gap.report.location import locate
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.context import context_of
-from pam_sim.gap.select.memory import as_sets, MEMORY
+from pam_sim.gap.select.memory import as_sets, memories
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verdict import fill, judge
@@ -159,7 +159,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     fill(result, estimator, outcome, final, validation)
     judge(result, outcome, estimator, validation, base, final, materiality, certify is not None)
-    result.at_one_speed = one_speed and set(MEMORY) <= set(result.ambiguity_set)
+    result.at_one_speed = one_speed and set(memories()) <= set(result.ambiguity_set)
     own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
     result.subsystems = subsystem_verdicts(
         result, outcome.named, own_runs, criteria, materiality)

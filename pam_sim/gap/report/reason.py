@@ -26,7 +26,7 @@ from pam_sim.gap.verify.harm import Harm
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
 LEAST_SHARE = 0.005
-ONE_SPEED = 'Creep and hysteresis both remember; only a second speed tells which it is.'
+ONE_SPEED = 'They all remember the past; only a second speed tells which it is.'
 WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 

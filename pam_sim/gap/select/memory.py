@@ -23,12 +23,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from pam_sim.effects.registry import effects
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.refit import fit_without
 from pam_sim.gap.select.rival import NamedEffect, Rival
 
-MEMORY = ('creep', 'hysteresis')
+
+def memories() -> list[str]:
+    """Return the names of the effects that remember."""
+    return sorted(name for name, effect in effects().items() if effect.fitting.remembers)
 
 
 def as_sets(context: SearchContext, named: Sequence[NamedEffect], final: Fit
@@ -46,9 +50,9 @@ def as_sets(context: SearchContext, named: Sequence[NamedEffect], final: Fit
         The final model.
 
     """
-    found = []
+    found, alike = [], memories()
     for w in named:
-        others = [n for n in MEMORY if w.name in MEMORY and n not in w.names]
+        others = [n for n in alike if w.name in alike and n not in w.names]
         rival = _rival(context, final, w.name, others[0]) if others else None
         if rival is None:
             found.append(w)
