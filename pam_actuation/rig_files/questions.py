@@ -40,6 +40,8 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
     """
     Return what a person answers.
 
+    A wrong answer is told with what is allowed, and the question comes again.
+
     Parameters
     ----------
     ask : callable
@@ -47,7 +49,6 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
     tell : callable
         Shows a line.
 
-    A wrong answer is told with what is allowed, and the question comes again.
     """
     tell(f'Enter takes the default. A number is {FORMS}.')
     found = Description()

@@ -36,8 +36,8 @@ EFFECT = Effect(
     source='Read off measured steps of a DMSP-10-250 behind a regulator '
            '(github.com/tbazina/pam_lqi_pid): filling ends about 10 kPa below, venting 20 kPa '
            'above.',
-    equation='as vent_bleed for p_g > K_m u, and mirrored, with numbers of its own, for '
-             'p_g < K_m u',
+    equation='e = p_g - K_m u: as vent_bleed for e > 0, mirrored for e < 0 with w_fill '
+             'and b_fill',
     parameters=(
         *_SIBLING.parameters,
         Parameter('fill_closing_pressure_pa', 'Pa', 10e3, 0.0, 200e3,

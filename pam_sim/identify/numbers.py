@@ -20,6 +20,7 @@ import math
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.parameters import Parameter
@@ -92,6 +93,11 @@ class Number:
         """Return what one unit of the coordinate is where it is the same everywhere."""
         return 0.05 * (self.upper - self.lower) if self.unknown else self.sd
 
+    @property
+    def resolution(self) -> float:
+        """Return what no sensor of such a rig resolves, of a zero; 0 for other numbers."""
+        return SMALLEST[self.name.partition('_zero')[0]] if self.name in ZERO_NAMES else 0.0
+
     def slope(self, value: float) -> float:
         """Return what one unit of the coordinate is at a value, in the number's unit."""
         if self.is_scale:
@@ -142,6 +148,7 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
     Parameters
     ----------
     rig : pam_sim.Rig
+        Its tolerances say what is unknown, its values where the search begins.
     names : sequence of str
         A parameter of the rig, or ``EFFECT.PARAMETER``.
 

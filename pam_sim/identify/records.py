@@ -90,7 +90,9 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     Parameters
     ----------
     run : Run
+        With a pressure.
     rig : pam_sim.Rig
+        Its valve and load say which topics matter.
     added_kg : float
         Known mass on the load in addition to that of the rig.
 

@@ -88,7 +88,7 @@ def test_every_verb_says_that_the_run_stopped_early(stopped, tmp_path, capsys):
     for arguments, code in (
             (['info', stopped], 1), (['replay', stopped], 0),
             (['report', stopped, '--out', tmp_path / 'page.html'], 0),
-            (['gap', stopped, '--seconds', 1, '--effects', 'coulomb_friction', '--out', out], 1),
+            (['gap', stopped, '--seconds', 1, '--effects', 'coulomb_friction', '--out', out], 0),
             (['tune', stopped, '--rollouts', 10, '--out', tmp_path / 'tuned.yaml'], None)):
         got = main([str(word) for word in arguments])
         shown = capsys.readouterr().out

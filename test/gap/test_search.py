@@ -252,7 +252,8 @@ def test_a_refinement_alone_is_one_to_begin_with():
     pool = candidates(nominal(), ('contraction',))
     first, refinements = split_refinements(pool)
     assert {c.name for c in refinements} == {
-        'coulomb_friction', 'pressure_friction', 'guide_friction', 'tube_lag', 'end_taper'}
+        'coulomb_friction', 'pressure_friction', 'guide_friction', 'tube_lag', 'end_taper',
+        'vent_bleed'}
     assert not set(first) & set(refinements) and set(first) | set(refinements) == set(pool)
     assert split_refinements(refinements) == (refinements, [])
 
