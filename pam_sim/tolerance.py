@@ -106,11 +106,11 @@ def prior_sd(parameter: Parameter, value: float, tolerance: Tolerance) -> float:
     """
     Return the standard deviation of what is known of a number, in its unit.
 
-    A relative one is taken of ``value``. Of an unknown number it is half of the allowed range:
-    where both bounds are positive in its logarithm, ``value * ln(upper / lower) / 2``, because
-    such a range covers scales (0.1 to 500 kg) and its half would be nearer to the largest than
-    to any likely number; otherwise ``(upper - lower) / 2``. Both bounds are then within some
-    deviations, so a prior of this width decides nothing that data can decide.
+    A relative one is taken of ``value``. Of an unknown number it is half of the allowed range,
+    ``(upper - lower) / 2``. Where both bounds are positive it is half of the range of the
+    logarithm, ``value * ln(upper / lower) / 2``. Such a range covers scales (0.1 to 500 kg), and
+    its plain half would be nearer to the largest than to any likely number. Both bounds are then
+    within some deviations, so a prior of this width decides nothing that data can decide.
 
     Parameters
     ----------

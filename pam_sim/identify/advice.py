@@ -24,21 +24,21 @@ from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.signals import FIELD, UNIT
 from pam_sim.gap.subsystems.simulation import pressure_driven
-from pam_sim.identify.fit import Weighted
+from pam_sim.gap.verify.uncertainty import NORMAL_95
+from pam_sim.identify.fit import NOWHERE, Weighted
 from pam_sim.identify.judgement import is_narrow
 from pam_sim.identify.numbers import known_numbers_of, Number
-from pam_sim.identify.profile import NORMAL_95
 from pam_sim.identify.records import Offer, offer_of, problems_of
 from pam_sim.rig import Rig
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import voltage_v
 
 HIGH_PA, LOW_PA = 500e3, 50e3            # gauge
 RATE_HZ = 200.0
 TYPICAL_NOISE = {'pressure': 500.0, 'contraction': 2e-5, 'force': 0.2}
 # Neighbouring samples share their error; so many count as one.
 MEMORY = 50.0
-NOWHERE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,8 @@ class Proposal:
     Parameters
     ----------
     name, why : str
-    segments : list of dict
-        As in an experiment file.
     steps : list of (float, float)
-        The same as (gauge pressure [Pa], duration [s]).
+        Gauge pressure [Pa] and duration [s].
     force : bool
         Whether a load cell is needed.
     added_kg : float
@@ -197,8 +195,8 @@ def _information(rig: Rig, numbers: Sequence[Number], proposal: Proposal,
 def _simulated(rig: Rig, proposal: Proposal, noise: dict[str, float]) -> Run:
     """Return the experiment as a recording of the rig with noise."""
     ideal = rig if rig.valve == 'ppr' else pressure_driven(rig)
-    gain = ideal.parameters['K_m']
-    voltage = np.concatenate([np.full(int(1000 * d), p / gain) for p, d in proposal.steps])
+    voltage = np.concatenate([np.full(int(1000 * duration), voltage_v(gauge, ideal.parameters))
+                              for gauge, duration in proposal.steps])
     if rig.load == 'hanging_mass' and proposal.added_kg:
         ideal = ideal.with_(parameters={
             'mass_kg': ideal.parameters['mass_kg'] + proposal.added_kg})

@@ -22,6 +22,7 @@ what is left, so that an incomplete model does not seem to know its numbers bett
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+import math
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
@@ -46,6 +47,7 @@ EVALUATIONS = 30
 # open ends near the value that the rig file has.
 TIE_BREAKER = 0.3
 FOLLOWED_STEPS = 6           # of a profile, with the slopes of the solution
+NOWHERE = 1e-9               # information of a number that nothing depends on
 GAIN, TIGHT = 0.02, 1e-9     # of the cost, which ends them; least room of a number
 
 
@@ -178,15 +180,19 @@ class Weighted:
         self.temper = fresh
         return settled
 
-    def misfit(self, x: FloatArray) -> float:
-        """Return a measure that compares far starts: sum of the logarithms of the misfits."""
-        total = 0.0
+    def mean_squares(self, x: FloatArray) -> list[tuple[SubsystemProblem, str, float]]:
+        """Return (subsystem, signal, mean squared error in floors) of every signal."""
+        found = []
         for p in self.problems:
             errors = self.errors(x, p)
-            for s in range(len(p.signals)):
+            for s, name in enumerate(p.signals):
                 chosen = errors[(p.signal == s) & (p.part != UNUSED)]
-                total += float(np.log(np.mean(chosen ** 2)))
-        return total
+                found.append((p, name, float(np.mean(chosen ** 2))))
+        return found
+
+    def misfit(self, x: FloatArray) -> float:
+        """Return a measure that compares far starts: sum of the logarithms of the misfits."""
+        return sum(math.log(square) for _, _, square in self.mean_squares(x))
 
 
 def settle(weighted: Weighted, x: FloatArray) -> FloatArray:

@@ -21,8 +21,9 @@ import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.numbers import Number
-from pam_sim.identify.profile import Interval, NORMAL_95
+from pam_sim.identify.profile import Interval
 
 DETERMINED, TOGETHER, UNDETERMINED = 'determined', 'only together', 'not determined'
 # Ratio of the ends of an interval; or its share of the range of a zero, or of a small size.

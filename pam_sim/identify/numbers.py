@@ -94,9 +94,14 @@ class Number:
         return 0.05 * (self.upper - self.lower) if self.unknown else self.sd
 
     @property
+    def zero_of(self) -> str:
+        """Return the signal whose sensor has this zero; '' for other numbers."""
+        return self.name.partition('_zero')[0] if self.name in ZERO_NAMES else ''
+
+    @property
     def resolution(self) -> float:
         """Return what no sensor of such a rig resolves, of a zero; 0 for other numbers."""
-        return SMALLEST[self.name.partition('_zero')[0]] if self.name in ZERO_NAMES else 0.0
+        return SMALLEST[self.zero_of] if self.zero_of else 0.0
 
     def slope(self, value: float) -> float:
         """Return what one unit of the coordinate is at a value, in the number's unit."""
@@ -133,8 +138,8 @@ class Number:
         if self.effect:
             return (acts_on(self.effect, problem.subsystem)
                     or get_effect(self.effect).fitting.sensor_signal == 'contraction')
-        if self.name in ZERO_NAMES:
-            signal = self.name.partition('_zero')[0]
+        signal = self.zero_of
+        if signal:
             return signal == 'pressure' or problem.subsystem != 'valve' and (
                 signal == 'contraction' or signal in problem.signals)
         return any(k.name == self.name for k in problem.known) and (

@@ -26,7 +26,6 @@ from collections.abc import Sequence
 
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import effects
-from pam_sim.gap.data.split import UNUSED
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
@@ -39,13 +38,7 @@ SEEN_FLOORS2 = 1.5           # mean squared error from which on something is mis
 
 def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
     """Tell whether a fitted model leaves more than noise in some signal."""
-    for p in weighted.problems:
-        errors = weighted.errors(x, p)
-        for s in range(len(p.signals)):
-            chosen = errors[(p.signal == s) & (p.part != UNUSED)]
-            if float((chosen ** 2).mean()) > SEEN_FLOORS2:
-                return True
-    return False
+    return any(square > SEEN_FLOORS2 for _, _, square in weighted.mean_squares(x))
 
 
 def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]

@@ -26,17 +26,16 @@ from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.gap.verify.uncertainty import NORMAL_95, NUMERICS
 from pam_sim.identify.fit import Weighted
 
 RISE_95 = 3.841              # 95 % of chi squared with one degree of freedom
-NORMAL_95 = 1.96
 FARTHER = 2.0                # next try, where the cost has not risen enough
 FLAT, FLAT_FARTHER = 0.1, 10.0       # the same, where it has hardly risen
 TRIES = 9
 EVALUATIONS = 8
 BETTER = 0.1                 # of the cost
 CLOSE = 0.15                 # of the wanted rise
-NUMERICS = 2e-3              # relative; steps of the grid and of slopes limit every number
 
 
 @dataclass(frozen=True)

@@ -15,22 +15,22 @@
 """From recordings to the unknown numbers of a rig."""
 
 from collections.abc import Callable, Sequence
+import math
 from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.data.split import UNUSED
 from pam_sim.gap.subsystems.effects import subsystem_of_number
-from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment
-from pam_sim.identify.fit import fit, settle, Weighted
+from pam_sim.identify.fit import fit, NOWHERE, settle, Weighted
 from pam_sim.identify.judgement import DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import is_incomplete, possible_effects
-from pam_sim.identify.profile import Interval, NORMAL_95, profile
+from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.rig import Rig
@@ -38,7 +38,6 @@ from pam_sim.run import Run
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 
 RETURNS = 4                  # to the fit, where a profile met a better solution
-NOWHERE = 1e-9               # information of a number that nothing depends on
 
 
 def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
@@ -162,17 +161,9 @@ def _identified(rig: Rig, found: Sequence[Found]) -> Rig:
 
 
 def _rms(weighted: Weighted, x: FloatArray) -> dict[str, float]:
-    found = {}
-    for p in weighted.problems:
-        errors = weighted.errors(x, p)
-        for s, name in enumerate(p.signals):
-            found[name] = _floor(p, name) * float(np.sqrt(np.mean(
-                errors[(p.signal == s) & (p.part != UNUSED)] ** 2)))
-    return found
-
-
-def _floor(problem: SubsystemProblem, signal: str) -> float:
-    return problem.floor[signal]
+    """Return the rms error of every signal, SI."""
+    return {name: p.floor[name] * math.sqrt(square)
+            for p, name, square in weighted.mean_squares(x)}
 
 
 def _signals(before: dict[str, float], after: dict[str, float]) -> dict[str, dict[str, Any]]:
