@@ -21,9 +21,9 @@ Does the model that `pam gap` improved make a better controller? Tuned on both, 
 Per case an effect is hidden in a rig of the independent simulator under test/hidden, whose
 numbers are off by a per cent or two. It is recorded twice; `pam gap` gets both bags and the
 nominal model and writes its model.yaml. The same controller is then tuned twice, on the nominal
-and on that model, with the same budget and seeds, and each result tracks on the hidden rig, which
-neither tuning has seen: the experiment held out from the search and one more, frozen as tuned,
-and learning on where the law learns. RMSE over all cycles.
+and on that model, with the same budget and seeds. Each result tracks on the hidden rig, which
+neither tuning has seen. The experiments are the one held out from the search and one more. Rules
+are frozen as tuned, and learn on where the law learns. RMSE over all cycles.
 """
 
 import argparse

@@ -20,9 +20,10 @@ What happens after a vent: sensors lost and healed, controllers stopped, command
 Plant, driver, watchdog, controller and reference run as processes over DDS. The muscle is held at
 8.9 mm; at random moments a sensor is lost or the controller stopped, for a random time, and comes
 back. In a second series random orders of stop, continue, restart, emergency stop and command
-patterns follow each other. Told are the largest excursion beyond the reference, and the largest
-rise of the measured pressure after a vent (of the driver, or atmosphere commanded by the
-controller): over any 0.2 s, until the driver has followed commands under pressure for 1 s in all.
+patterns follow each other. The table states the largest excursion beyond the reference. It also
+states the largest rise of the measured pressure over any 0.2 s after a vent. A vent is one of the
+driver, or atmosphere commanded by the controller. The look at the rise ends when the driver has
+followed commands under pressure for 1 s in all.
 Each outcome is a line of ``--out``; started again with the same file, it goes on where it was.
 ``--print`` only prints the table.
 """

@@ -19,10 +19,10 @@ Run a rig for an hour and compare its last minutes with its first ones.
 
 All nodes and the recorder live, at the rates of `pam run`. Every 10 s the memory of each
 process (`VmRSS`, `RssAnon` of /proc) is noted; the stamps of what each loop sends come from the
-bag. Printed, for a twelfth of the run after the warm-up and for the last one: the mean memory,
-the period of each loop (the slope of its stamps over the number of periods, so that a
-message that was not sent does not count as a longer period) and how many messages it sent per
-period. Exit code 1 if a process grew by more than 1 %, the period of a loop changed
+bag. The first twelfth of the run after the warm-up is compared with the last one. Printed are the
+mean memory, the period of each loop, and how many messages it sent per period. The period is the
+slope of the stamps over the number of periods: a message that was not sent does not count as a
+longer period. Exit code 1 if a process grew by more than 1 %, the period of a loop changed
 by more than 0.001 %, or the experiment did not come to its end with every message recorded.
 """
 
