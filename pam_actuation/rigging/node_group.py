@@ -23,6 +23,8 @@ still run.
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+import shutil
+import tempfile
 from typing import Self, TYPE_CHECKING
 
 from pam_actuation.interrupts import held, undisturbed
@@ -50,8 +52,9 @@ class NodeGroup:
     ----------
     nodes : mapping of str to NodeSpec
         What the caller calls a node, to that node.
-    folder : path
-        Exists; what the nodes print goes there, one folder for each namespace.
+    folder : path, optional
+        What the nodes print goes there, one folder for each namespace; default: a temporary one,
+        which is removed at the end.
     domain_id : int, optional
         ROS domain; default: a free one.
 
@@ -69,7 +72,7 @@ class NodeGroup:
 
     """
 
-    def __init__(self, nodes: Mapping[str, NodeSpec], folder: Path,
+    def __init__(self, nodes: Mapping[str, NodeSpec], folder: Path | None = None,
                  domain_id: int | None = None) -> None:
         try:
             from pam_actuation.rigging.client import RigClient
@@ -77,7 +80,7 @@ class NodeGroup:
             raise InputError(ros_missing(error.name or 'rclpy')) from None
         self._new_client = RigClient
         self._nodes = dict(sorted(nodes.items(), key=lambda item: ORDER.index(item[1].name)))
-        self._folder = folder
+        self._folder, self._own_folder = folder, folder is None
         self._lock = DomainLock(domain_id)
         self._asked: set[str] = set()           # to become active
         self._uncertain: set[str] = set()       # those that have not answered yet
@@ -96,6 +99,8 @@ class NodeGroup:
             if self.client is not None:
                 self.client.close()
             self._lock.release()
+            if self._own_folder and self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
 
     @property
     def started(self) -> 'RigClient':
@@ -121,9 +126,11 @@ class NodeGroup:
             A node ended or refused.
 
         """
-        environment = node_environment(self.domain_id, self._folder)
+        folder = self._folder or Path(tempfile.mkdtemp(prefix='pam_nodes_'))
+        self._folder = folder
+        environment = node_environment(self.domain_id, folder)
         for name, node in self._nodes.items():
-            log_dir = self._folder / node.namespace.strip('/')
+            log_dir = folder / node.namespace.strip('/')
             log_dir.mkdir(parents=True, exist_ok=True)
             # A process that nobody knows of is ended by nobody.
             with held() as interrupted:

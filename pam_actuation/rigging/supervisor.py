@@ -17,9 +17,6 @@
 from collections.abc import Iterable
 from dataclasses import replace
 import os
-from pathlib import Path
-import shutil
-import tempfile
 import time
 from typing import Self, TYPE_CHECKING
 
@@ -50,11 +47,10 @@ class Supervisor:
                  realtime_priority: int = 0) -> None:
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
-        self._folder = Path(tempfile.mkdtemp(prefix='pam_nodes_'))
         self._group = NodeGroup({
             node_name_of(node.name, node.namespace): replace(node, parameters={
                 'realtime_priority': realtime_priority, **node.parameters, 'autostart': False})
-            for node in nodes}, self._folder, domain_id)
+            for node in nodes}, domain_id=domain_id)
 
     def __enter__(self) -> Self:
         """Return the supervisor."""
@@ -63,7 +59,6 @@ class Supervisor:
     def __exit__(self, *why: object) -> None:
         """End all processes."""
         self._group.__exit__(*why)
-        shutil.rmtree(self._folder, ignore_errors=True)
 
     @property
     def processes(self) -> 'dict[str, NodeProcess]':
