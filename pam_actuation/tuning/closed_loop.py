@@ -31,8 +31,9 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S, sampled_reference,
+    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
+from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -112,6 +113,8 @@ class MuscleLoop:
     driver : DriverConfig, optional
         What the valve driver knows; by default the data sheet of ``rig``. Give that of the
         nominal rig where ``rig`` differs from what its model file says.
+    preview_s : float
+        How far ahead the controller is told the reference; without limit by default.
 
     Raises
     ------
@@ -124,9 +127,11 @@ class MuscleLoop:
 
     def __init__(self, rig: 'Rig', experiment: 'Experiment', seed: int = 0, rate_hz: float = 200.0,
                  latency_s: float = 0.003, external_force_n: Course | None = None,
-                 driver: 'DriverConfig | None' = None, supply_pa: Course | None = None) -> None:
+                 driver: 'DriverConfig | None' = None, supply_pa: Course | None = None,
+                 preview_s: float = math.inf) -> None:
         self._arguments = (
-            rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa)
+            rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa,
+            preview_s)
         if experiment.domain != self.DOMAIN:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -140,7 +145,8 @@ class MuscleLoop:
         dt_s = fields(self._par, layout.PARAMETERS).dt_s
         if dt_s != PHYSICS_S:
             raise InputError(f'the rig is packed for {dt_s} s, not {PHYSICS_S} s')
-        self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
+        self._reference = SampledReference(experiment, rate_hz, preview_s)
+        self.ticks = self._reference.ticks
         self._noise, self._quantum = sensor_noise(rig, self.ticks, seed)
         self._disturbance = np.zeros(self.ticks * size_of(DISTURBANCE))
         disturbances = self._disturbance.view(DISTURBANCE)
@@ -155,7 +161,7 @@ class MuscleLoop:
     @property
     def reference_m(self) -> FloatArray:
         """Wanted contraction [m] at every tick."""
-        return self._position[:self.ticks]
+        return self._reference.values
 
     @property
     def start_tick(self) -> int:
@@ -211,7 +217,7 @@ class ClosedLoop(MuscleLoop):
         log = self.run_raw(controller, learn)
         n = self.ticks
         return LoopResult(
-            np.arange(n) / self.rate_hz, self._position[:n], log['contraction_m'],
+            np.arange(n) / self.rate_hz, self.reference_m, log['contraction_m'],
             log['pressure_pa'], log['command_pa'], log['force_n'],
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)
@@ -236,7 +242,7 @@ class ClosedLoop(MuscleLoop):
         rollout = getattr(rollouts, f'{controller.kind}_rollout')
         rollout(
             self._fresh_plant(), self.hsv, self._driver.fresh(),
-            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._timing, self._reference.rows(controller.lead_s),
             self._noise, self._quantum, self._disturbance,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.compiled_arguments(), controller.input_array, log)

@@ -114,7 +114,7 @@ class ForceLoop(MuscleLoop):
         """
         log = self.run_raw(controller, learn)
         return ModeResult(
-            'n', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
+            'n', np.arange(self.ticks) / self.rate_hz, self._reference.values,
             log['force_n'],
             {name: log[name] for name in ('contraction_m', 'pressure_pa', 'command_pa')},
             self.experiment.cycles)
@@ -128,7 +128,7 @@ class ForceLoop(MuscleLoop):
         mode, law = controller.compiled_arguments()
         mode_rollouts.force_rollout(
             self._fresh_plant(self._start_m), self.hsv, self._driver.fresh(),
-            self._timing, controller.lead_s * self.rate_hz, (self._position, self._rate),
+            self._timing, self._reference.rows(controller.lead_s),
             self._noise, self._quantum, self._way_m,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode,
             controller.static_inverse, law, controller.law.input_array, log)

@@ -19,6 +19,7 @@ The same compiled steps as in the controller, drivers and joint, as in ``closed_
 """
 
 from collections.abc import Sequence
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -30,9 +31,10 @@ from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S, sampled_reference,
+    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
+from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
@@ -68,6 +70,8 @@ class JointLoop:
         Standard deviation and step of the measured angle.
     drivers : pair of DriverConfig, optional
         What the drivers of flexor and extensor know; by default the data sheets of the joint.
+    preview_s : float
+        How far ahead the controller is told the reference; without limit by default.
 
     Raises
     ------
@@ -81,7 +85,8 @@ class JointLoop:
                  rate_hz: float = 200.0, latency_s: float = 0.003,
                  external_torque_n_m: Course | None = None,
                  angle_noise_rad: float = ANGLE_NOISE_RAD, angle_step_rad: float = ANGLE_STEP_RAD,
-                 drivers: 'Sequence[DriverConfig] | None' = None) -> None:
+                 drivers: 'Sequence[DriverConfig] | None' = None,
+                 preview_s: float = math.inf) -> None:
         if experiment.domain != JOINT.topic:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -89,7 +94,8 @@ class JointLoop:
         experiment.check_reachable(joint)
         steps = steps_per_tick(rate_hz)
         self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
-        self.ticks, self._position, self._rate = sampled_reference(experiment, rate_hz)
+        self._reference = SampledReference(experiment, rate_hz, preview_s)
+        self.ticks = self._reference.ticks
         sides = {'flexor': joint.flexor, 'extensor': joint.extensor}
         angle = np.random.default_rng((seed, len(sides))).standard_normal(self.ticks)
         self._noise = np.empty(self.ticks * size_of(JOINT_READINGS))
@@ -105,7 +111,7 @@ class JointLoop:
         if external_torque_n_m is not None:
             self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
         self._arguments = (joint, experiment, seed, rate_hz, latency_s, external_torque_n_m,
-                           angle_noise_rad, angle_step_rad, drivers)
+                           angle_noise_rad, angle_step_rad, drivers, preview_s)
         configs = drivers or [driver_config(rig) for rig in sides.values()]
         self._drivers = [DriverLaw(rig, config, rate_hz)
                          for rig, config in zip(sides.values(), configs)]
@@ -141,7 +147,7 @@ class JointLoop:
         """Return the cost [degrees] of tracking the experiment; the rules change in place."""
         angle_rad = self.run_raw(controller)['angle_rad']
         return tracking_cost(
-            np.degrees(self._position[:self.ticks] - angle_rad), self.start_tick)
+            np.degrees(self._reference.values - angle_rad), self.start_tick)
 
     def run(self, controller: 'JointController', learn: Learns = True) -> ModeResult:
         """
@@ -168,7 +174,7 @@ class JointLoop:
         """
         log = self.run_raw(controller, learn)
         return ModeResult(
-            'rad', np.arange(self.ticks) / self.rate_hz, self._position[:self.ticks],
+            'rad', np.arange(self.ticks) / self.rate_hz, self._reference.values,
             log['angle_rad'],
             {name: log[name] for name in log.dtype.names or () if name != 'angle_rad'},
             self.experiment.cycles)
@@ -185,7 +191,7 @@ class JointLoop:
         mode_rollouts.joint_rollout(
             plant, tuple(driver.hsv for driver in self._drivers),
             tuple(driver.fresh() for driver in self._drivers), self._timing,
-            controller.lead_s * self.rate_hz, (self._position, self._rate), self._noise,
+            self._reference.rows(controller.lead_s), self._noise,
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
             controller.law.input_array, log)

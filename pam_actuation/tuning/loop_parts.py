@@ -35,6 +35,8 @@ READINGS = record('pressure_pa', 'contraction_m', 'force_n')
 JOINT_READINGS = record(
     'angle_rad', 'flexor_pressure_pa', 'extensor_pressure_pa', 'flexor_force_n',
     'extensor_force_n')
+# What is wanted at a tick, and one preview ahead: in the unit of what is tracked, per second.
+WANTED = record('reference', 'rate', 'lead', 'lead_rate')
 # What acts on a muscle from outside.
 DISTURBANCE = record('external_force_n', 'supply_pa')
 
@@ -53,21 +55,6 @@ def look_up(values: FloatArray, place: float) -> float:
     whole = min(int(place), values.shape[0] - 2)
     share = min(place - whole, 1.0)
     return (1.0 - share) * values[whole] + share * values[whole + 1]
-
-
-@compiled
-def wanted(tick: int, position: FloatArray, rate: FloatArray,
-           lead_ticks: float) -> tuple[float, float, float, float]:
-    """
-    Return reference and rate at a tick, and the same one preview ahead.
-
-    ``position``, ``rate`` per tick, longer than the run by the preview of ``lead_ticks``.
-    """
-    whole = int(lead_ticks)
-    share = lead_ticks - whole
-    at = min(tick + whole, position.shape[0] - 2)
-    return (position[tick], rate[tick], (1.0 - share) * position[at] + share * position[at + 1],
-            (1.0 - share) * rate[at] + share * rate[at + 1])
 
 
 @compiled

@@ -16,7 +16,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 PHYSICS_S = 0.001
-_MAX_LEAD_S = 0.5
 # Noise and step of a sensor, by what it reads.
 _SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
             'contraction_m': ('contraction_noise_m', 'contraction_step_m'),
@@ -59,16 +57,6 @@ def steps_per_tick(rate_hz: float) -> int:
         raise InputError(
             f'{rate_hz:g} Hz is no whole number of {PHYSICS_S * 1e3:g} ms steps per period')
     return steps
-
-
-def sampled_reference(experiment: 'Experiment',
-                      rate_hz: float) -> tuple[int, FloatArray, FloatArray]:
-    """Return (ticks, values, rates) of an experiment; the arrays reach beyond by a preview."""
-    ticks = int(round(experiment.duration_s * rate_hz))
-    ahead = int(math.ceil(_MAX_LEAD_S * rate_hz)) + 2
-    wanted = [experiment.at(k * (1.0 / rate_hz)) for k in range(ticks + ahead)]
-    return (ticks, np.array([value for value, _ in wanted], dtype=float),
-            np.array([rate for _, rate in wanted], dtype=float))
 
 
 def first_periodic_tick(experiment: 'Experiment', rate_hz: float) -> int:

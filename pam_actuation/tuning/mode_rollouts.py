@@ -27,7 +27,7 @@ from pam_actuation.control.modes.joint import (
     COMMANDS, JOINT_INPUT, joint_inputs, joint_outputs)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    drive, Driver, JOINT_READINGS, look_up, Plant, read, READINGS, wanted)
+    drive, Driver, JOINT_READINGS, look_up, Plant, read, READINGS, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, source_key
 from pam_sim.joint import layout as joint_layout
@@ -50,16 +50,15 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     @allocating_entry_point
     def force_rollout(
             plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            lead_ticks: float, reference: tuple[FloatArray, FloatArray], noise: FloatArray,
-            quantum: FloatArray, way_m: FloatArray, learn: FloatArray,
-            mode: tuple[FloatArray, FloatArray, FloatArray], inverse: FloatArray, law: Any,
-            inputs: FloatArray, log: FloatArray) -> None:
+            reference: FloatArray, noise: FloatArray, quantum: FloatArray, way_m: FloatArray,
+            learn: FloatArray, mode: tuple[FloatArray, FloatArray, FloatArray],
+            inverse: FloatArray, law: Any, inputs: FloatArray, log: FloatArray) -> None:
         """
         Track a force; the rules of the law change in place.
 
         Parameters
         ----------
-        plant, hsv, driver, timing, lead_ticks, reference, noise, quantum, learn
+        plant, hsv, driver, timing, reference, noise, quantum, learn
             As of ``rollouts.sofc_rollout``, the reference in N and N/s.
         way_m : float64[:]
             Contraction of the driven or isometric load at every tick and at the end (N + 1);
@@ -78,7 +77,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             return
         plant_state, plant_par, plant_inp, plant_out = plant
         steps, driver_every, latency_steps = timing
-        position, rate = reference
+        wanted = reference.view(WANTED)
         par, surface, state = mode
         acting, seen = part(plant_inp, 0, layout.INPUT), part(plant_out, 0, layout.OUTPUT)
         noises, rows = noise.view(READINGS), log.view(FORCE_LOG)
@@ -96,11 +95,10 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             raw.contraction_m = read(
                 seen.contraction_m + off.contraction_m, steps_of.contraction_m)
             raw.force_n = read(seen.force_n + off.force_n, steps_of.force_n)
-            wanted_n, rate_n_per_s, lead_n, lead_rate = wanted(tick, position, rate, lead_ticks)
-            raw.reference_n = wanted_n
-            raw.reference_rate_n_per_s = rate_n_per_s
-            raw.lead_reference_n = lead_n
-            raw.lead_rate_n_per_s = lead_rate
+            raw.reference_n = wanted[tick].reference
+            raw.reference_rate_n_per_s = wanted[tick].rate
+            raw.lead_reference_n = wanted[tick].lead
+            raw.lead_rate_n_per_s = wanted[tick].lead_rate
             raw.learning = learn[tick]
             raw.elapsed_s = np.nan
             force_inputs(par, surface, state, raw_array, inverse, inputs)
@@ -118,8 +116,8 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     @allocating_entry_point
     def joint_rollout(
             plant: tuple[Plant, Plant, Plant], hsv: tuple[bool, bool],
-            drivers: tuple[Driver, Driver], timing: tuple[int, int, int], lead_ticks: float,
-            reference: tuple[FloatArray, FloatArray], noise: FloatArray, quantum: FloatArray,
+            drivers: tuple[Driver, Driver], timing: tuple[int, int, int],
+            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
             torque_n_m: FloatArray, learn: FloatArray, mode: tuple[FloatArray, FloatArray],
             law: Any, inputs: FloatArray, log: FloatArray) -> None:
         """
@@ -131,7 +129,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             Arguments of ``joint_step``: joint, flexor, extensor.
         hsv, drivers : tuple of bool, tuple of tuple
             Driver law of flexor and extensor, its state, par and out.
-        timing, lead_ticks, reference, learn
+        timing, reference, learn
             As of ``rollouts.sofc_rollout``, the reference in rad and rad/s.
         noise, quantum : float64[:]
             N ``JOINT_READINGS`` of sensor noise, one behind the other, and those of the steps.
@@ -158,7 +156,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         flexor_hsv, extensor_hsv = hsv
         flexor_driver, extensor_driver = drivers
         steps, driver_every, latency_steps = timing
-        position, rate = reference
+        wanted = reference.view(WANTED)
         par, state = mode
         noises, rows = noise.view(JOINT_READINGS), log.view(JOINT_LOG)
         steps_of = part(quantum, 0, JOINT_READINGS)
@@ -186,12 +184,10 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
                 flexor_seen.force_n + off.flexor_force_n, steps_of.flexor_force_n)
             raw.extensor_force_n = read(
                 extensor_seen.force_n + off.extensor_force_n, steps_of.extensor_force_n)
-            wanted_rad, rate_rad_per_s, lead_rad, lead_rate = wanted(
-                tick, position, rate, lead_ticks)
-            raw.reference_rad = wanted_rad
-            raw.reference_rate_rad_per_s = rate_rad_per_s
-            raw.lead_reference_rad = lead_rad
-            raw.lead_rate_rad_per_s = lead_rate
+            raw.reference_rad = wanted[tick].reference
+            raw.reference_rate_rad_per_s = wanted[tick].rate
+            raw.lead_reference_rad = wanted[tick].lead
+            raw.lead_rate_rad_per_s = wanted[tick].lead_rate
             raw.learning = learn[tick]
             raw.elapsed_s = np.nan
             joint_inputs(par, raw_array, inputs)
@@ -218,4 +214,4 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
 
 force_rollout, joint_rollout = _entries(source_key(
     force_inputs, joint_inputs, joint_outputs, sofc_step, step, joint_step, drive, look_up, read,
-    wanted, layout, joint_layout))
+    layout, joint_layout))

@@ -29,7 +29,7 @@ from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    DISTURBANCE, drive, Driver, Plant, read, READINGS, Rows, wanted)
+    DISTURBANCE, drive, Driver, Plant, read, READINGS, Rows, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.records import part, record
@@ -50,19 +50,17 @@ LOG = record(
 
 @compiled
 def _sense(tick: int, plant_out: np.record, noise: np.record, quantum: np.record,
-           position: FloatArray, rate: FloatArray, lead_ticks: float, learn: FloatArray,
-           inp: np.record, log: np.record) -> None:
+           wanted: np.record, learn: FloatArray, inp: np.record, log: np.record) -> None:
     """Fill the inputs of the controller and the measured part of the log."""
     inp.contraction_m = read(
         plant_out.contraction_m + noise.contraction_m, quantum.contraction_m)
     inp.pressure_pa = read(plant_out.pressure_pa + noise.pressure_pa,
                            quantum.pressure_pa)
     inp.force_n = read(plant_out.force_n + noise.force_n, quantum.force_n)
-    reference, reference_rate, lead, lead_rate = wanted(tick, position, rate, lead_ticks)
-    inp.reference_m = reference
-    inp.reference_rate_m_per_s = reference_rate
-    inp.lead_reference_m = lead
-    inp.lead_rate_m_per_s = lead_rate
+    inp.reference_m = wanted.reference
+    inp.reference_rate_m_per_s = wanted.rate
+    inp.lead_reference_m = wanted.lead
+    inp.lead_rate_m_per_s = wanted.lead_rate
     inp.learning = learn[tick]
     inp.elapsed_s = np.nan
     log.contraction_m = plant_out.true_contraction_m
@@ -99,9 +97,9 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     @entry_point
     def sofc_rollout(
             plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            lead_ticks: float, reference: tuple[FloatArray, FloatArray], noise: FloatArray,
-            quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, controller: Any,
-            inputs: FloatArray, log: FloatArray) -> None:
+            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
+            disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+            log: FloatArray) -> None:
         """
         Track a reference with the self-organizing controller; its rules change in place.
 
@@ -115,10 +113,8 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             state, par, out of the driver law.
         timing : tuple of int
             Physics steps per tick, ticks per driver step, latency in physics steps.
-        lead_ticks : float
-            Preview in ticks.
-        reference : tuple
-            Position [m] and rate [m/s] per tick, longer than ``log`` by the preview.
+        reference : float64[:]
+            N ``WANTED`` in m and m/s.
         noise, quantum : float64[:]
             N ``READINGS`` of sensor noise, one behind the other, and those of the sensors' steps.
         disturbance : float64[:]
@@ -136,12 +132,11 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         _, _, _, plant_out = plant
         seen = part(plant_out, 0, layout.OUTPUT)
         steps, driver_every, latency_steps = timing
-        position, rate = reference
-        noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+        wanted, noises = reference.view(WANTED), noise.view(READINGS)
+        disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
-                   log_rows[tick])
+            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = sofc_step(*controller)
             _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
                      latency_steps, disturbances, plant, log_rows[tick])
@@ -149,21 +144,20 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     @entry_point
     def pid_rollout(
             plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            lead_ticks: float, reference: tuple[FloatArray, FloatArray], noise: FloatArray,
-            quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, controller: Any,
-            inputs: FloatArray, log: FloatArray) -> None:
+            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
+            disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+            log: FloatArray) -> None:
         """Track a reference with the PID; arguments as ``sofc_rollout``, of ``pid_step``."""
         if key < 0:
             return
         _, _, _, plant_out = plant
         seen = part(plant_out, 0, layout.OUTPUT)
         steps, driver_every, latency_steps = timing
-        position, rate = reference
-        noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+        wanted, noises = reference.view(WANTED), noise.view(READINGS)
+        disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
-                   log_rows[tick])
+            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = pid_step(*controller)
             _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
                      latency_steps, disturbances, plant, log_rows[tick])
@@ -171,21 +165,20 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     @entry_point
     def lqi_rollout(
             plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            lead_ticks: float, reference: tuple[FloatArray, FloatArray], noise: FloatArray,
-            quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, controller: Any,
-            inputs: FloatArray, log: FloatArray) -> None:
+            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
+            disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
+            log: FloatArray) -> None:
         """Track a reference with the LQI; arguments as ``sofc_rollout``, of ``lqi_step``."""
         if key < 0:
             return
         _, _, _, plant_out = plant
         seen = part(plant_out, 0, layout.OUTPUT)
         steps, driver_every, latency_steps = timing
-        position, rate = reference
-        noises, disturbances = noise.view(READINGS), disturbance.view(DISTURBANCE)
+        wanted, noises = reference.view(WANTED), noise.view(READINGS)
+        disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, position, rate, lead_ticks, learn, inp,
-                   log_rows[tick])
+            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = lqi_step(*controller)
             _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
                      latency_steps, disturbances, plant, log_rows[tick])
