@@ -84,9 +84,14 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     return DriverConfig.from_parameters(changes, config, where)
 
 
-def driver_loops(rig: 'Rig | JointRig') -> dict[str, DriverLoop]:
-    """Return the driver of each muscle of a rig, by the place of the muscle (``Rig.muscles``)."""
-    return {place: DriverLoop(muscle.valve, driver_config(muscle))
+def driver_loops(rig: 'Rig | JointRig',
+                 changes: Mapping[str, object] | None = None) -> dict[str, DriverLoop]:
+    """
+    Return the driver of each muscle of a rig, by the place of the muscle (``Rig.muscles``).
+
+    ``changes``: parameters that differ from what the rig tells, by name.
+    """
+    return {place: DriverLoop(muscle.valve, driver_config(muscle, changes))
             for place, muscle in rig.muscles.items()}
 
 

@@ -26,6 +26,9 @@ class SafetyLimits:
 
     command_timeout_s: float = number(
         0.1, 0.01, 10.0, 'age of the newest command from which the driver vents')
+    command_wait_s: float = number(
+        0.015, 0.0, 0.05, 'on/off valves: the most a command waits so that all act at one age; '
+        '0 = none waits')
     measurement_timeout_s: float = number(
         0.1, 0.01, 10.0, 'age from which a measured pressure is invalid')
     first_pressure_wait_s: float = number(

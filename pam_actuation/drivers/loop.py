@@ -65,7 +65,8 @@ class DriverLoop:
         self._names = VALVE_NAMES[valve_type]
         self.period_s = config.hsv.period_s if self.is_hsv else config.ppr.period_s
         lag_s, dead_time_s = self._lag()
-        self.safety = SafetySupervisor(config.safety, self.is_hsv, lag_s, dead_time_s)
+        self.safety = SafetySupervisor(
+            config.safety, self.is_hsv, lag_s, dead_time_s, self.period_s)
         self.rate_hz = 1.0 / self.period_s
         spare = self._new_law()
         if isinstance(spare, HsvLaw):
@@ -269,9 +270,8 @@ class DriverLoop:
         """Return how the driver is as of the last tick; there must have been one."""
         now_ns, decision, safety = self._last_ns, self._decision, self.safety
         assert now_ns is not None and decision is not None
-        command_age_ms = math.nan
-        if safety.command_stamp_ns is not None:
-            command_age_ms = (now_ns - safety.command_stamp_ns) * 1e-6
+        command_ns = safety.command_stamp_ns
+        command_age_ns = None if command_ns is None else now_ns - command_ns
         values = [
             ('state', decision.state),
             ('fault', decision.fault),
@@ -280,7 +280,8 @@ class DriverLoop:
             ('late_ticks', str(self.late_ticks)),
             ('target_kpa_gauge', _target_text(decision)),
             ('command_kpa_gauge', f'{gauge_kpa(safety.command_pa):.1f}'),
-            ('command_age_ms', f'{command_age_ms:.1f}'),
+            ('command_age_ms', f'{_ms(command_age_ns):.1f}'),
+            ('command_acted_age_ms', f'{_ms(safety.ages.age_ns):.1f}'),
             ('pressure_kpa_gauge', f'{gauge_kpa(safety.pressure.pressure_pa):.1f}'),
             ('pressure_age_ms', f'{safety.pressure.age_s(now_ns) * 1e3:.1f}'),
             ('pressure_refused', str(safety.pressure.refused)),
@@ -302,6 +303,10 @@ def _followed_pa(decision: Decision) -> float | None:
     if decision.duty is not None:
         return None
     return P_ATM_PA if decision.pressure_pa is None else decision.pressure_pa
+
+
+def _ms(age_ns: int | None) -> float:
+    return math.nan if age_ns is None else age_ns * 1e-6
 
 
 def _target_text(decision: Decision) -> str:

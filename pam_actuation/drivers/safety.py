@@ -32,6 +32,7 @@ from typing import TypeVar
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
+from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
@@ -98,14 +99,15 @@ class SafetySupervisor:
     """Judge commands and measurements at each tick of the driver."""
 
     def __init__(self, limits: SafetyLimits | None = None, needs_pressure: bool = True,
-                 lag_s: float = math.inf, dead_time_s: float = 0.0) -> None:
+                 lag_s: float = math.inf, dead_time_s: float = 0.0,
+                 period_s: float = 0.01) -> None:
         """
         Start in state waiting.
 
         ``needs_pressure``: True for the HSV, whose loop is blind without a reading;
         a PPR runs, after a wait and with a warning, where none is measured. ``lag_s`` and
         ``dead_time_s`` of the pressure behind a command are for the slow rise, which waits
-        for the muscle.
+        for the muscle. ``period_s`` is that of the ticks.
         """
         self.limits = limits or SafetyLimits()
         self.needs_pressure = needs_pressure
@@ -116,6 +118,9 @@ class SafetySupervisor:
         self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest, 5e6)
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
+        # A regulator is told of each command as it comes: nothing waits there.
+        self.ages = SteadyAge(
+            round(lim.command_wait_s * _NS) if needs_pressure else 0, round(period_s * _NS))
         self.publishers = 1
         self.publisher_names = ''
         self.sender_fault: Fault | None = None      # of a second sender, as senders.py tells
@@ -250,7 +255,7 @@ class SafetySupervisor:
 
     def _forget(self) -> None:
         self._pending = _Pending()
-        for part in (self.pressure, self.supply, self.frozen, self.order):
+        for part in (self.pressure, self.supply, self.frozen, self.order, self.ages):
             part.forget()
         self.command_stamp_ns = None
         self.command_pa = math.nan
@@ -299,8 +304,10 @@ class SafetySupervisor:
         self._seen_command = True
         self.command_duty = None
         if is_duty:
+            self.ages.forget()
             self.command_pa, self.command_duty = math.nan, min(max(value, -1.0), 1.0)
             return
+        self.ages.take(stamp_ns, value)
         highest = P_ATM_PA + lim.max_pressure_gauge_pa
         if value > highest:
             self.commands_clamped += 1
@@ -382,6 +389,7 @@ class SafetySupervisor:
         if self._fault is None or _without_figures(self._fault) != _without_figures(fault):
             self._fault = fault
         self._rise.begin()
+        self.ages.forget()
         key, text = self._fault
         if FAULTS[key].latched:
             return Decision(EMERGENCY_STOP, None, LEVEL_ERROR, text, key)
@@ -409,7 +417,8 @@ class SafetySupervisor:
 
     def _follow(self, now_ns: int) -> Decision:
         lim = self.limits
-        target = min(max(self.command_pa, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
+        target = self.ages.at(now_ns, self.command_pa)
+        target = min(max(target, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
         target = self._rise.limited(target, self._dt_s, self.pressure.pressure_pa)
         self._watch_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)

@@ -33,6 +33,7 @@ from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.config import driver_facts
 from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.experiments.limits import check_tracked
@@ -63,12 +64,12 @@ class _Loops:
             self, experiment: 'Experiment', rig: 'Rig | JointRig',
             controller: 'Controller | None',
             seed: int, learning: bool, recorder: MessageWriter, transport_ns: int,
-            ticks: Mapping[str, Iterable[int]]) -> None:
+            ticks: Mapping[str, Iterable[int]], changes: Mapping[str, object] | None) -> None:
         self._recorder = recorder
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
-        plant, drivers = PlantLoop(rig, seed), driver_loops(rig)
+        plant, drivers = PlantLoop(rig, seed), driver_loops(rig, changes)
         reference = ReferenceLoop(experiment, valve=rig.valve)
         lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 
@@ -122,7 +123,7 @@ def simulate_experiment(
         out: Path | str, seed: int = 0, learning: bool = True, overwrite: bool = False,
         progress: Callable[[int], object] | None = None, namespace: str | None = None,
         ticks: Mapping[str, Iterable[int]] | None = None,
-        transport_ns: int = 0) -> dict[str, Any]:
+        transport_ns: int = 0, driver: Mapping[str, object] | None = None) -> dict[str, Any]:
     """
     Simulate an experiment and record it as a bag.
 
@@ -152,6 +153,8 @@ def simulate_experiment(
         it; a loop not named ticks at its rate. For the tick times of a live run.
     transport_ns : int
         Time from the tick that sends a message to its arrival.
+    driver : mapping, optional
+        Parameters of the driver that differ from what the rig tells, by name.
 
     Returns
     -------
@@ -173,14 +176,14 @@ def simulate_experiment(
     metadata = experiment_metadata(
         experiment=experiment, rig=rig.to_yaml(),
         controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
-        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)))
+        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)), **driver_facts(driver))
     writer = None
     try:
         with interrupts.held() as stopped:
             writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
             recorder = MessageWriter(writer, namespace, name)
             loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
-                           ticks or {})
+                           ticks or {}, driver)
             ending = _recorded(loops, recorder, experiment, progress, stopped)
             if not ending.reached_s:
                 raise KeyboardInterrupt

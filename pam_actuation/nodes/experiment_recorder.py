@@ -156,6 +156,7 @@ class ExperimentRecorder(ManagedNode):
                     return json.load(stream)
             except (OSError, ValueError) as error:
                 raise InputError(f'cannot be read: {error}', path) from None
+        from pam_actuation.drivers.config import driver_facts
         valve, seed = self.value('valve_type'), self.value('seed')
         valve = '' if valve == UNKNOWN_VALVE else valve
         experiment = rig = controller = None
@@ -173,7 +174,7 @@ class ExperimentRecorder(ManagedNode):
             controller = load_controller(self.value('controller'), rig, accept_other_rig=True)
         return experiment_metadata(
             experiment, rig, controller, valve, None if seed == UNKNOWN_SEED else seed,
-            origin='live', remarks='\n'.join(
+            origin='live', **driver_facts(), remarks='\n'.join(
                 experiment.remarks(rig.valve, rig, controller)) if experiment and rig else '')
 
     def start(self) -> None:

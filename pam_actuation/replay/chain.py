@@ -33,6 +33,7 @@ import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.drivers.config import as_recorded
 from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
@@ -132,18 +133,21 @@ class RepeatedLoops:
     parts : collection of str
         Which of ``controller``, ``driver`` and ``plant`` are computed; what the others sent
         comes from the recording.
+    changes : mapping, optional
+        Parameters of the drivers that differ from what the rig tells.
 
     """
 
     def __init__(self, rig: Rig | JointRig, controller: 'Controller | None', seed: int,
-                 name: str, parts: Collection[str] = ('controller', 'driver', 'plant')) -> None:
+                 name: str, parts: Collection[str] = ('controller', 'driver', 'plant'),
+                 changes: Mapping[str, object] | None = None) -> None:
         self._parts = parts
         self.bus = Bus(on_sent=self._sent)
         self._newest: dict[str, Any] = {}       # by topic, of what was sent
         self._samples: dict[int, dict[str, Message]] = {}   # by what tells a sample
         self._angles = 0                        # of a joint
         self._commands: dict[str, Message] = {}     # of the newest tick of the controller
-        self._drivers = driver_loops(rig) if 'driver' in parts else {}
+        self._drivers = driver_loops(rig, changes) if 'driver' in parts else {}
         for place, driver in self._drivers.items():
             attach(self.bus, driver, place)
         if 'plant' in parts:
@@ -283,7 +287,8 @@ def replay_chain(run: Run,
     for place in rig.muscles:
         run.require(f'{place}valve_signal')
     law = _controller(run, rig, controller, 'reference' if of_muscle else 'joint_reference')
-    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2])
+    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2],
+                          changes=as_recorded(run.metadata, run.path))
     if of_muscle:
         topics = set(ORDER) if law is not None else set(ORDER) - {'controller_state'}
         chain.run(recorded_topics(run, topics))

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from pam_actuation.drivers.config import as_recorded
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.loops.bus import Bus
@@ -138,11 +139,11 @@ def replay_driver(run: Run) -> DriverReplay:
 
 def _driver(run: Run, signals: Series) -> tuple[DriverLoop, str]:
     """Return the driver of a run's rig, and what it was not told."""
-    text = run.metadata.get('rig')
+    text, changes = run.metadata.get('rig'), as_recorded(run.metadata, run.path)
     if text:
         rig = load_rig(text)
-        return DriverLoop(rig.valve, driver_config(rig)), ''
+        return DriverLoop(rig.valve, driver_config(rig, changes)), ''
     valve = 'ppr' if 'ppr_voltage' in signals.values else 'hsv'
     if not set(signals.values) & set(UNITS):
         raise InputError('valve_signal has none of the known signals', str(run.path))
-    return DriverLoop(valve), 'the bag does not say which rig it is: default settings'
+    return DriverLoop(valve, changes), 'the bag does not say which rig it is: default settings'

@@ -168,6 +168,7 @@ def _compile(rig: 'Rig | JointRig', controller: 'Controller | None') -> None:
 def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, namespace: str,
                 overwrite: bool) -> dict[str, Parameters]:
     """Return the place of each node to its parameters and write the files they name."""
+    from pam_actuation.drivers.config import driver_facts
     rig, controller = plan.rig, plan.controller
     rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
     nodes: dict[str, Parameters] = {}
@@ -175,7 +176,8 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
         metadata = experiment_metadata(
             plan.experiment, rig, controller, rig.valve, seed, origin='live',
             learning=str(bool(learning)).lower(),
-            remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)))
+            remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)),
+            **driver_facts())
         nodes[RECORDER] = {
             'output': os.path.abspath(bag), 'overwrite': overwrite,
             'await_topics': _awaited(plan), 'notes_folder': str(plan.folder),
