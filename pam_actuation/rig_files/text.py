@@ -17,12 +17,14 @@
 import os
 import textwrap
 from typing import TYPE_CHECKING
+import warnings
 
 import numpy as np
 from pam_actuation.rig_files.description import Description
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import load_yaml
 from pam_sim.model_file import load_rig
+from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.muscle.muscle import get_muscle, MUSCLE_PARAMETERS
 from pam_sim.parameters import Parameter
 from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
@@ -65,7 +67,10 @@ def rig_file(described: Description, out: str) -> tuple[str, 'Rig']:
     rig = load_rig(load_yaml(read, name=out))
     signal = np.zeros((10, len(rig.signal_names)))
     moved = None if not LOADS[rig.load].NEEDS_CONTRACTION else np.zeros(11)
-    rig.simulate(signal[:, 0] if rig.valve == 'ppr' else signal, contraction_m=moved)
+    with warnings.catch_warnings():
+        # A measured force map may begin above the pressure of a vented muscle.
+        warnings.simplefilter('ignore', ExtrapolationWarning)
+        rig.simulate(signal[:, 0] if rig.valve == 'ppr' else signal, contraction_m=moved)
     return text, rig
 
 

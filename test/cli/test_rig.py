@@ -99,6 +99,16 @@ def test_a_force_map_is_found_from_another_folder(folder, monkeypatch):
     assert load_rig('../rigs/a.yaml').muscle.law.name == 'lookup'
 
 
+@pytest.mark.filterwarnings('error')
+def test_a_force_map_from_60_kpa_on_gives_no_warning(folder):
+    from pam_sim.muscle.laws.lookup import SHIPPED
+    lines = (SHIPPED / 'dmsp_5_300.csv').read_text(encoding='utf-8').splitlines(keepends=True)
+    begins = next(k for k, line in enumerate(lines) if line.startswith('60'))
+    names = next(k for k, line in enumerate(lines) if not line.startswith('#'))
+    (folder / 'map.csv').write_text(''.join((*lines[:names + 1], *lines[begins:])), 'utf-8')
+    assert new('--force-map', 'map.csv').muscle.law.name == 'lookup'
+
+
 @pytest.mark.parametrize('name', regulator_names())
 def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsys):
     sheet = get_regulator(name)
