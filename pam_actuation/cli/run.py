@@ -24,7 +24,8 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
 
 HELP = ('Run an experiment on live nodes (real ROS 2 processes), of a muscle or a joint, and '
-        'record it.')
+        'record it. The rig is simulated; `pam up rig --hardware FILE --record DIR` drives and '
+        'records a real one.')
 EXAMPLE = 'pam run sine_quarter_hz --valve ppr --out runs/live'
 
 
