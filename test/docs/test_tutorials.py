@@ -14,6 +14,7 @@
 
 """The tutorials: each command runs in a real process and prints what the page shows."""
 
+import json
 from pathlib import Path
 import re
 
@@ -136,6 +137,33 @@ def test_a_failure_ends_the_other_terminals(tmp_path):
     with pytest.raises(AssertionError, match='the page shows:\ntwo'):
         walk_text(text, tmp_path)
     assert (tmp_path / 'ended').exists()
+
+
+def made_by(text):
+    """Return {name: its text, or none} of what a page writes into the folder of its reader."""
+    code = '\n'.join(re.findall(r'^(?:```.*?^```$|    pam .*?$)', text, re.M | re.S))
+    made = dict.fromkeys(re.findall(
+        r'(?:--out|--save|--record|[^-]>|%%writefile) ([\w./]+)|savefig\(\'([\w./]+)', code))
+    files = re.findall(r'^:caption: (\S+\.\w+)\n\n(.*?)^```$', text, re.M | re.S)
+    return {''.join(name): None for name in made} | dict(files)
+
+
+def test_one_folder_holds_the_readme_and_all_tutorials():
+    texts = {'README': (ROOT / 'README.md').read_text(encoding='utf-8'), **PAGES}
+    for name in NOTEBOOKS:
+        cells = json.loads((FOLDER / f'{name}.ipynb').read_text(encoding='utf-8'))['cells']
+        texts[name] = '\n'.join(f'```\n{"".join(cell["source"])}\n```' for cell in cells
+                                if cell['cell_type'] == 'code')
+    owner, held = {}, {}
+    for page, text in texts.items():
+        made = made_by(text)
+        assert made, page
+        for name, content in made.items():
+            again = name in owner and (content is None or content != held[name])
+            assert not again, f'{name} is made by {owner[name]} and by {page}'
+            owner[name], held[name] = page, content
+    assert {'runs/first', 'runs/learning', 'my_rig.yaml', 'gap_real', 'moves.yaml',
+            'first_run.png', 'wrong.yaml'} <= set(owner)
 
 
 def test_every_tutorial_stands_first_on_the_index():
