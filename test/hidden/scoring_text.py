@@ -122,13 +122,27 @@ def _truth(key):
     return ' + '.join(sorted((*truths(key), *key['outside']))) or key['kind']
 
 
+def _due(key):
+    """Return the answer that is due: the truth, where one name can say it."""
+    if key['outside']:
+        return 'unknown'
+    if key['kind'] == 'ambiguous':
+        return 'set'
+    return _truth(key) if truths(key) else 'no_gap'
+
+
 def _confusion(cases):
-    counts = {}
+    counts, due = {}, {}
     for case in cases:
         prefix = '(ambiguous) ' if case.key['kind'] == 'ambiguous' else ''
-        counts.setdefault(prefix + _truth(case.key), Counter())[case.answer.label] += 1
-    parts = ['Answers by truth, all sizes:', '', '| truth | answers |', '|---|---|']
-    for truth, answers in sorted(counts.items()):
+        truth = prefix + _truth(case.key)
+        counts.setdefault(truth, Counter())[case.answer.label] += 1
+        due[truth] = _due(case.key)
+    other = {truth: answers for truth, answers in counts.items() if set(answers) != {due[truth]}}
+    parts = [f'Answers by truth, all sizes. Of {len(counts)} truths, '
+             f'{len(counts) - len(other)} had only the answer that is due; the others:', '',
+             '| truth | answers |', '|---|---|']
+    for truth, answers in sorted(other.items()):
         listed = ', '.join(f'{label} {n}' for label, n in answers.most_common())
         parts.append(f'| {truth} | {listed} |')
     return parts

@@ -14,6 +14,8 @@
 
 """The scorer itself: who knows the key scores everything, who does not scores chance."""
 
+import re
+
 import pytest
 from scoring_judge import is_of_family, is_right, read_answer, shrink_percent, wrong_names
 from scoring_mutants import constant, oracle
@@ -45,7 +47,10 @@ def test_who_knows_the_key_meets_every_bar(keys):
     assert [row.measure for row in rows if row.met is not True] == [
         '95 % intervals that cover the truth']      # all of 100 % is above 98 %
     assert values(rows)['right single name'].value.startswith('100.0 % (150/150')
-    assert '- none' in report(cases, FAMILIES)
+    text = report(cases, FAMILIES)
+    assert '- none' in text
+    truths, as_due = re.search(r'Of (\d+) truths, (\d+) had only', text).groups()
+    assert truths == as_due and int(truths) > 20
 
 
 @pytest.mark.parametrize('verdict, name', [
@@ -73,6 +78,8 @@ def test_one_wrong_answer_is_found_and_named(keys):
     assert rows['wrong name, all cases'].failed == (keys[victim]['name'],)
     text = report(cases, FAMILIES, {'rival': cases})
     assert f'- {keys[victim]["name"]} (single' in text and 'named creep' in text
+    listed = text.split('| truth | answers |')[1].split('\n\n')[0]
+    assert listed.count('\n') == 2 and '| leakage | ' in listed and 'creep 1 |' in listed
 
 
 def test_a_number_by_another_name_is_right():
