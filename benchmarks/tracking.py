@@ -19,15 +19,15 @@ Run ``python benchmarks/tracking.py`` for everything, or ``--part sine,step`` an
 ``--valve ppr`` and ``--controller sofc`` for a part of it. Offline, in compiled closed
 loop; every error is that of the muscle (reference less true contraction, no sensor noise).
 
-sine    +-10 mm about 14 mm, root mean square and largest error of the last of 20 cycles,
-        rules untaught at the start; and what of it repeats from cycle to cycle
-step    10 mm up and down: error at the end of the hold, overshoot, time from the step of the
-        wanted value until the error stays within 0.1 mm; first and sixth step after sines,
-        and all six of eight seeds of the noise: which share of them is within 0.1 mm in time
-gait    knee flexion, ten strides at 0.8 Hz after ten at 0.5 Hz
-rigs    random rigs a data sheet does not tell of, +-6 mm about 12 mm, all starting from the
-        rules taught on the nominal rig, beside the same rules frozen
-change  1 kg more and 15 % less supply in the middle of a run at 0.5 Hz, rules taught
+- ``sine``: +-10 mm about 14 mm, rules untaught at the start. Root mean square and largest error
+  of the last of 20 cycles, and what of it repeats from cycle to cycle.
+- ``step``: 10 mm up and down. Error at the end of the hold, overshoot, and the time from the step
+  until the error stays within 0.1 mm. First and sixth step after sines, and the share of the steps
+  of eight seeds that are within 0.1 mm in time.
+- ``gait``: knee flexion, ten strides at 0.8 Hz after ten at 0.5 Hz.
+- ``rigs``: random rigs that differ from the data sheet, +-6 mm about 12 mm. All start from the
+  rules taught on the nominal rig, beside the same rules frozen.
+- ``change``: 1 kg more and 15 % less supply in the middle of a run at 0.5 Hz, rules taught.
 
 The valve driver is told of the nominal rig throughout.
 """
