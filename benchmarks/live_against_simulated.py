@@ -19,16 +19,16 @@ Run ``python benchmarks/live_against_simulated.py --experiments decay,knee_gait 
 Per experiment the live nodes run once, in real time. Everything is compared at the header
 stamps of the live measurements, time zero being the first message of the experiment:
 
-live - sim      live recording less simulation, RMS
-noise           simulations that differ in the seed of the sensors, RMS over six seeds: noise
-                of both and what it does on its way through controller and driver
-timing          two simulations without sensor noise, one with every loop ticking when it
-                ticked in the live run and every message as late as the median one was
-                there, RMS: phase, jitter and pauses of the loops, and transport
-live - re-timed live recording less noisy simulations with the live timing, RMS, median of six
-                seeds: noise, and what is left unexplained
-among re-timed  these six simulations less each other, RMS, median and largest of the fifteen
-                pairs: what the live recording would show if it were one of them
+- *live - sim*: live recording less simulation, RMS.
+- *noise*: simulations that differ in the seed of the sensors, RMS over six seeds. This is noise
+  and what it does on its way through controller and driver.
+- *timing*: two simulations without sensor noise, RMS. In one of them every loop ticks when it
+  ticked in the live run, and every message is as late as the median one was there. This is phase,
+  jitter and pauses of the loops, and transport.
+- *live - re-timed*: live recording less noisy simulations with the live timing, RMS, median of six
+  seeds. This is noise, and what is left unexplained.
+- *among re-timed*: these six simulations less each other, RMS, median and largest of the fifteen
+  pairs. The live recording would show this if it were one of them.
 """
 
 import argparse
