@@ -15,8 +15,8 @@
 """
 The rig of the fault table: real nodes as processes, a relay that spoils sensors, a witness.
 
-Run as a program it is the relay: sensors of the plant come in on ``true/...``, go out on the
-topics of the rig, and are spoiled on the way as the lines on its standard input ask for.
+Run as a program it is the relay. Sensors of the plant come in on ``true/...`` and go out on the
+topics of the rig. On the way they are spoiled as the lines on its standard input ask for.
 """
 
 import collections

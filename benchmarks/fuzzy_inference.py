@@ -29,8 +29,8 @@ proportional to the degree. Degrees, firing strengths and outputs
 are then compared one by one. Its own defaults (minimum, maximum, seven triangular
 output sets) define another surface; they are timed too, and the faster of the two
 is what ours is measured against. Most of its time goes into the graph of rules it
-makes anew in every call; a third row leaves its control system out and calls its
-functions on arrays that were made before, for the same surface.
+makes anew in every call. A third row leaves its control system out. It calls the
+functions alone on arrays that were made before, for the same surface.
 """
 
 import argparse

@@ -19,7 +19,7 @@ Does a listener that is stopped hold up who sends to it? Through shared memory, 
 
 A plain rclpy node sends at 1 kHz, three others listen; one of these is stopped (SIGSTOP) at a
 random moment for 60 ms, again and again. Counted is how often a call of ``publish`` took longer
-than half of that, once with what ROS 2 takes by default on this machine (shared memory) and once
+than half of that. This is done with the default of ROS 2 on this machine (shared memory), and
 with the profile by which the nodes of this package receive. Exit code 1 if a call was held up by
 UDP.
 """

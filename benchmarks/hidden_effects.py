@@ -19,10 +19,10 @@ How often `pam gap` names the hidden effect: rigs made by an independent simulat
     python benchmarks/hidden_effects.py --number 33 --seed 7 --jobs 2 --kinds single,null
     python benchmarks/hidden_effects.py --work exam --minutes 40     # a piece; again to go on
 
-Four phases: all cases are recorded and the key is sealed; `pam gap` answers every case from
-its bags; the experiments it suggests for the ambiguous cases are run on the hidden rigs and
-answered; then the key is opened and everything is scored. With --work DIR each recording and each
-answer is kept as soon as it is there, and an interrupted run goes on where it stopped; with
+There are four phases. All cases are recorded, and the key is sealed. `pam gap` answers every case
+from its bags. The experiments that it suggests for the ambiguous cases are run on the hidden rigs
+and answered. Then the key is opened, and everything is scored. With --work DIR each recording and
+each answer is kept as soon as it is there; an interrupted run goes on where it stopped. With
 --minutes it stops by itself between two cases.
 
 Exit code 1 when a bar is missed, 3 when the minutes were over before all was answered.

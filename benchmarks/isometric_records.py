@@ -15,12 +15,13 @@
 """
 Hold every muscle law against isometric records of a 10 mm hose, and print a Markdown table.
 
-Run ``python benchmarks/isometric_records.py FOLDER``. The records are not part of this project:
-10 mm fluidic muscle, 25 cm cut (l0 23.3 cm, 19.3 cm at 620 kPa), held at 0, 25, 50 and 75 % of
-the largest contraction, inflated and deflated in pulses; github.com/Agile-and-Adaptive-Robotics/
-Muscle_Sensory, files ``contraction_00.csv`` to ``contraction_75.csv`` with force [N], pressure
-[kPa gauge], time [s] and phase (1 inflating, 2 deflating). Within a pulse the pressure in the
-line leads the force, so only plateaus count.
+Run ``python benchmarks/isometric_records.py FOLDER``. The records are not part of this project.
+They are of a 10 mm fluidic muscle, 25 cm cut (l0 23.3 cm, 19.3 cm at 620 kPa). It is held at 0,
+25, 50 and 75 % of the largest contraction, inflated and deflated in pulses. They come from
+github.com/Agile-and-Adaptive-Robotics/Muscle_Sensory, files ``contraction_00.csv`` to
+``contraction_75.csv``. Columns are force [N], pressure [kPa gauge], time [s] and phase (1
+inflating, 2 deflating). Within a pulse the pressure in the line leads the force, so only plateaus
+count.
 """
 
 from pathlib import Path

@@ -21,12 +21,11 @@ Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live. A bare ec
 them with the real-time priority of the plant: one rclpy node with a timer, another one with a
 callback. It sends the message of the valve signal with the defaults of rclpy, 97 times per second.
 That loads the cores little and is in no step with the loops.
-Prints for each loop the ticks that did not run and how irregular the others were, and the age of
-a valve signal when the plant applies it beside that of a message in the callback of the echo. A
-bare loop of 1 kHz without ROS, that does nothing and goes before
-all others, shows what the machine itself allows. Exit code 1 if more than 0.1 % of the ticks of
-plant or controller did not run, or the 99th percentile of the plant is more than twice that of
-the echo.
+It prints for each loop the ticks that did not run, and how irregular the others were. It prints
+the age of a valve signal when the plant applies it, beside that of a message in the callback of
+the echo. A bare loop of 1 kHz without ROS, that does nothing and goes before all others, shows
+what the machine itself allows. Exit code 1 if more than 0.1 % of the ticks of plant or controller
+did not run. The same if the 99th percentile of the plant is more than twice that of the echo.
 """
 
 import argparse

@@ -17,11 +17,11 @@ Sensors lost and healed, controllers stopped and continued, at random times: sim
 
     python benchmarks/recoveries_simulated.py --times 100
 
-The classes of the live nodes in a closed loop on a virtual clock, for both valves, SOFC and PID:
-many more faults than there is time for on live nodes (``recoveries.py``). The muscle is held at
-8.9 mm or follows a sine of 8 mm at 0.5 Hz; a fault lasts 0.12 to 3 s. Told is the largest
-excursion beyond all that was wanted; of the sine, beyond that of the same controller without a
-fault.
+The classes of the live nodes run in a closed loop on a virtual clock, for both valves, SOFC and
+PID. There are many more faults than there is time for on live nodes (``recoveries.py``). The
+muscle is held at 8.9 mm or follows a sine of 8 mm at 0.5 Hz; a fault lasts 0.12 to 3 s. The table
+has the largest excursion beyond all that was wanted. Of the sine it is that beyond the largest
+contraction of the same controller without a fault.
 """
 
 import argparse

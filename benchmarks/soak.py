@@ -22,8 +22,8 @@ process (`VmRSS`, `RssAnon` of /proc) is noted; the stamps of what each loop sen
 bag. The first twelfth of the run after the warm-up is compared with the last one. Printed are the
 mean memory, the period of each loop, and how many messages it sent per period. The period is the
 slope of the stamps over the number of periods: a message that was not sent does not count as a
-longer period. Exit code 1 if a process grew by more than 1 %, the period of a loop changed
-by more than 0.001 %, or the experiment did not come to its end with every message recorded.
+longer period. Exit code 1 if a process grew by more than 1 %, or the period of a loop changed by
+more than 0.001 %. The same if the experiment did not end with every message recorded.
 """
 
 import argparse

@@ -15,11 +15,11 @@
 """
 A tuned controller on the live nodes against the same in simulation.
 
-Run ``python benchmarks/tuned_live.py``; it tunes from the untuned defaults, writes controller and
-rule file as ``pam tune`` does, and runs both files in ``pam run``'s session (real nodes, real
-time) and in the offline simulation, with the tuned table frozen and learning on. RMSE over all
-cycles of the experiment, and over the last three, from the recorded measurements; of the
-simulation the median over five seeds of the sensor noise, and the largest.
+Run ``python benchmarks/tuned_live.py``. It tunes from the untuned defaults and writes controller
+and rule file as ``pam tune`` does. Both files then run on live nodes and in the simulation, with
+the tuned rules frozen and with learning. Errors are RMSE of the recorded measurements, over all
+cycles and over the last three. Of the simulation the table has the median over five seeds of the
+sensor noise, and the largest.
 """
 
 import argparse

@@ -18,12 +18,12 @@ How many closed-loop rollouts of 20 s a minute `pam tune` gets through.
 Run ``OPENBLAS_NUM_THREADS=1 python benchmarks/tuning_speed.py`` (``pam`` sets that by itself);
 about a minute on a quiet machine. Every rollout
 builds a controller with other settings, tracks 0.5 Hz at 200 Hz on the realistic rig at
-1 ms (noise on) and yields a cost, as the search does it, on one thread and on all cores.
+1 ms (noise on) and yields a cost, as the search does. One thread and all cores are timed.
 
-Beside it the same loop as one would write it with SciPy: a PID, the nominal rig's three
-differential equations, ``scipy.integrate.solve_ivp`` from one change of the valve signal to
-the next. The force law it calls is the compiled one, everything else is Python. Both comparisons
-are made of a joint as well, its peer with both muscles and the limb.
+Beside it stands the same loop as one would write it with SciPy: a PID and the three differential
+equations of the nominal rig. ``scipy.integrate.solve_ivp`` goes from one change of the valve
+signal to the next. The force law it calls is the compiled one, everything else is Python. Both
+comparisons are made of a joint as well, its peer with both muscles and the limb.
 """
 
 import argparse

@@ -19,13 +19,13 @@ How often the intervals of `pam identify` hold the true numbers: rigs of an inde
     python benchmarks/unknown_numbers.py --number 20 --undetermined 10 --minutes 15
 
 The hidden rig is the one of `test/hidden`: its air, friction, memory and creep have other
-formulations than the library. In each case one or two of mass, spring, gain of the regulator and
-zeros of pressure and contraction differ from the rig file, by up to half of the value. Every
+formulations than the library. In each case one or two numbers differ from the rig file, by up to
+half of the value: mass, spring, gain of the regulator, zeros of pressure and contraction. Every
 second case hides an effect as well. The other numbers of the hidden rig are off within their
 tolerance.
 
-With --undetermined N as many cases follow that cannot determine a number: a load that never
-lifts, a valve without command, a load cell that was not recorded, a muscle alone. There the answer
+With --undetermined N as many cases follow that cannot determine a number. Examples are a load that
+never lifts, a valve without command and a load cell that was not recorded. There the answer
 must say so and name an experiment; the experiment is run on the hidden rig and answered as well.
 """
 
