@@ -145,13 +145,6 @@ def command_line():
     return parser
 
 
-def main():
-    """Tune and compare."""
-    args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        show(args)
-
-
 def show(args):
     """Print one line per case and controller."""
     nominal = load_rig(MODEL)
@@ -178,4 +171,4 @@ def show(args):
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(results_page.run(command_line(), __file__, show))

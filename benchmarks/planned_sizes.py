@@ -24,6 +24,7 @@ workflow then compares the record with the nominal model; every fifth block is k
 """
 
 import argparse
+import sys
 
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.protocols import sensitivities
@@ -54,13 +55,6 @@ def command_line():
     return parser
 
 
-def main():
-    """Look for every effect."""
-    args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        show(args)
-
-
 def show(args):
     """Print one line per effect."""
     rig = load_rig(MODEL, valve=args.valve)
@@ -83,4 +77,4 @@ def show(args):
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(results_page.run(command_line(), __file__, show))

@@ -72,15 +72,8 @@ def command_line():
     return parser
 
 
-def main():
-    """Play, print the table; exit code 1 if an excursion was too large."""
-    given = command_line().parse_args()
-    with results_page.printed(given, __file__):
-        return show(given)
-
-
 def show(given):
-    """Play and print the table; return the exit code."""
+    """Play and print the table; return 1 if an excursion was too large."""
     rows = [(valve, controller, fault, reference)
             for valve, names in CONTROLLERS.items() for controller in names
             for fault in FAULTS for reference in REFERENCES]
@@ -104,4 +97,4 @@ def show(given):
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(results_page.run(command_line(), __file__, show))

@@ -27,7 +27,7 @@ the name of the file. Only the last run is kept.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from importlib.metadata import version
 import io
@@ -93,6 +93,36 @@ def printed(args: argparse.Namespace, program: str, part: str = '') -> Iterator[
     with contextlib.redirect_stdout(Both(sys.stdout, copy)):
         yield
     write_text(path, replaced(path, name, f'{head}\n\n{copy.getvalue().strip()}'))
+
+
+def run(parser: argparse.ArgumentParser, program: str,
+        show: Callable[[argparse.Namespace], int | None]) -> int:
+    """
+    Run a benchmark with one table: read the command line, print, and write where asked.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Extended by ``add_write``.
+    program : str
+        ``__file__`` of the benchmark.
+    show : callable
+        Takes what was parsed and prints the table; returns an exit code or none.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Raises
+    ------
+    SystemExit
+        As ``check``, before the work begins.
+
+    """
+    args = parser.parse_args()
+    with printed(args, program):
+        return show(args) or 0
 
 
 def check(args: argparse.Namespace, program: str, part: str = '') -> Path:

@@ -34,6 +34,7 @@ The valve driver is told of the nominal rig throughout.
 
 import argparse
 from dataclasses import dataclass
+import sys
 from typing import Callable
 
 import numpy as np
@@ -289,13 +290,6 @@ def command_line():
     return parser
 
 
-def main():
-    """Print the tables as Markdown."""
-    args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        show(args)
-
-
 def show(args):
     """Print the tables that were asked for."""
     chosen = [one for one in CONTROLLERS if args.controller.lower() in one.name.lower()]
@@ -309,4 +303,4 @@ def show(args):
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(results_page.run(command_line(), __file__, show))

@@ -73,13 +73,6 @@ def command_line():
     return parser
 
 
-def main():
-    """Tune, run live and simulated, print the table as Markdown."""
-    args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        show(args)
-
-
 def show(args):
     """Print what was tuned, and one line per experiment, valve and way."""
     rows = []
@@ -112,4 +105,4 @@ def show(args):
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(results_page.run(command_line(), __file__, show))

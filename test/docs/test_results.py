@@ -218,3 +218,22 @@ def test_the_commit_is_that_of_the_checkout(helper, tmp_path):
     assert helper.commit(tmp_path) == found
     (tmp_path / 'code.py').write_text('b')
     assert helper.commit(tmp_path) == f'{found} with changes'
+
+
+@pytest.mark.parametrize('returned, code', [(None, 0), (1, 1)])
+def test_a_benchmark_with_one_table_prints_writes_and_returns(
+        helper, page, monkeypatch, capsys, returned, code):
+    import argparse
+    parser = argparse.ArgumentParser()
+    helper.add_write(parser, 'some')
+
+    def show(args):
+        print('| a table |')
+        return returned
+    for words in ([], ['--write']):
+        before = page.read_text(encoding='utf-8')
+        monkeypatch.setattr(sys, 'argv', ['some.py', *words])
+        assert helper.run(parser, 'some.py', show) == code
+        assert capsys.readouterr().out == '| a table |\n'
+        assert (page.read_text(encoding='utf-8') != before) == bool(words)
+    assert '| a table |\n\n<!-- end: benchmarks/some.py -->' in page.read_text(encoding='utf-8')
