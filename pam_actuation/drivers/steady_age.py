@@ -22,9 +22,10 @@ decides, and the age of what acts changes at random. A pair of valves answers ea
 pulses, and learning cannot make up for it.
 
 ``SteadyAge`` therefore lets commands wait until the age that the latest of them need, and
-interpolates between the two about it. It finds that age by itself: the highest of late, within
-one and a half periods of the sender above the lowest. While all ages are the same, that is the
-age of the newest command, which then acts unchanged. A later command acts as it comes. A command
+interpolates between the two about it. It finds that age by itself. A change of the age costs
+tracking until it is learned. After the first 2 s the age therefore rises only when more than 3 %
+of the commands within 2 s are older, and falls slowly, when none needed it for 10 s. While all
+ages are the same, the newest command acts unchanged. A later command acts as it comes. A command
 to vent never waits.
 """
 
@@ -36,7 +37,11 @@ from pam_sim.units import P_ATM_PA
 _KEPT = 32                  # commands
 _INTERVALS = 9              # of which the middle one is the period of the sender
 _PERIODS = 1.5              # the most a command waits: a period of the sender, and its jitter
-_NEARER = 5_000             # part of a period by which both ends of the ages come closer a tick
+_AGES = 200                 # ticks of which the ages are known
+_ONE_IN = 33                # so many may be older than the steady age, or younger than the lowest
+_HELD = 1_000               # ticks for which the steady age stays although none needs it
+_FALL_NS = 2_000            # by which it falls a tick then
+_ALMOST_NS = 500_000        # an age this little below still needs it
 _SMOOTH = 16                # ticks over which the jitter of the driver is averaged
 
 
@@ -66,7 +71,8 @@ class SteadyAge:
         # (stamp [ns], pressure)
         self._commands: deque[tuple[int, float]] = deque(maxlen=_KEPT)
         self._intervals_ns: deque[int] = deque(maxlen=_INTERVALS)
-        self._lowest_ns = self._steady_ns = 0
+        self._ages_ns: deque[int] = deque(maxlen=_AGES)
+        self._steady_ns = self._spare = 0       # spare: ticks since the steady age was needed
         self._tick_ns: int | None = None
         self.age_ns: int | None = None
 
@@ -94,10 +100,9 @@ class SteadyAge:
         self.age_ns = age_ns = now_ns - newest_ns
         if self._longest_wait_ns == 0:
             return newest_pa
-        tick_ns = self._tick(now_ns)
-        self._learn(age_ns, tick_ns - newest_ns)
-        due_ns = tick_ns - self._steady_ns
-        if due_ns >= newest_ns or newest_pa <= P_ATM_PA:
+        self._learn(age_ns)
+        due_ns = self._tick(now_ns) - self._steady_ns
+        if age_ns >= self._steady_ns or due_ns >= newest_ns or newest_pa <= P_ATM_PA:
             return newest_pa
         later_ns, later_pa = newest_ns, newest_pa
         for stamp_ns, pressure_pa in reversed(self._commands):
@@ -118,13 +123,21 @@ class SteadyAge:
         self._tick_ns += (now_ns - self._tick_ns) // _SMOOTH
         return self._tick_ns
 
-    def _learn(self, age_ns: int, tick_age_ns: int) -> None:
-        """Follow the lowest and the highest age, less what lies outside one and a half periods."""
+    def _learn(self, age_ns: int) -> None:
+        """Follow the highest age, within one and a half periods of the sender."""
+        settled = len(self._ages_ns) == _AGES
+        self._ages_ns.append(age_ns)
         if not self._intervals_ns:
-            self._lowest_ns, self._steady_ns = age_ns, tick_age_ns
+            self._steady_ns = age_ns
             return
-        wait_ns = min(round(_PERIODS * median_low(self._intervals_ns)), self._longest_wait_ns)
-        nearer_ns = self._period_ns // _NEARER
-        self._lowest_ns = min(age_ns, self._lowest_ns + nearer_ns)
-        self._steady_ns = min(max(tick_age_ns, self._steady_ns - nearer_ns),
-                              self._lowest_ns + wait_ns)
+        ages_ns = sorted(self._ages_ns)
+        few = len(ages_ns) // _ONE_IN
+        limit_ns = ages_ns[few] + min(
+            round(_PERIODS * median_low(self._intervals_ns)), self._longest_wait_ns)
+        highest_ns = min(ages_ns[-1 - few] if settled else ages_ns[-1], limit_ns)
+        needed = age_ns >= self._steady_ns - _ALMOST_NS
+        self._spare = 0 if needed else self._spare + 1
+        if not settled or highest_ns > self._steady_ns:
+            self._steady_ns = highest_ns
+        elif self._spare > _HELD:
+            self._steady_ns = max(highest_ns, self._steady_ns - _FALL_NS)
