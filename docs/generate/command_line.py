@@ -55,7 +55,7 @@ def page(name, parser, line):
     """Return the page of one verb."""
     usage = parser.format_usage().partition(': ')[2].strip()
     usage = re.sub(r'\n +', '\n    ', usage)
-    parts = [f'# pam {name}', plain(line), plain(parser.description or ''),
+    parts = [f'# pam {name}', plain(parser.description or line),
              f'```text\n{usage}\n```']
     if parser.epilog:
         parts.append(f'```console\n$ {parser.epilog.removeprefix("Example: ").strip()}\n```')

@@ -118,3 +118,9 @@ def test_every_option_of_every_verb_has_its_row(site):
         for action in parser._actions:
             for option in action.option_strings:
                 assert f'<span class="pre">{option}</span>' in text, (name, option)
+
+
+def test_options_in_the_text_keep_their_hyphens(site):
+    assert '--bore-mm the one' in (site / 'reference/cli/rig.html').read_text(encoding='utf-8')
+    for path in (site / 'reference' / 'cli').glob('*.html'):
+        assert not re.search(r'–\w+-\w', path.read_text(encoding='utf-8')), path.name
