@@ -57,8 +57,6 @@ html_title = f'pam_actuation {__version__}'
 html_static_path = ['static']
 html_css_files = ['site.css']
 html_show_sphinx = False
-# Options of the command line keep their two hyphens.
-smartquotes = False
 html_copy_source = False
 html_theme_options = {'navigation_with_keys': True}
 pygments_style = 'friendly'

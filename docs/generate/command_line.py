@@ -91,5 +91,7 @@ def _row(action, parser):
 
 def plain(text):
     """Return a text of the parser as Markdown in which nothing else is markup."""
-    text = ' '.join(text.split())
-    return re.sub(r'([\\|*_<>\[\]`])', r'\\\1', text)
+    parts = re.split(r'(?<![\w-])(--[a-z][a-z-]*)', ' '.join(text.split()))
+    # Options are code: typography would make one dash of their two hyphens.
+    return ''.join(f'`{part}`' if k % 2 else re.sub(r'([\\|*_<>\[\]`])', r'\\\1', part)
+                   for k, part in enumerate(parts))
