@@ -19,8 +19,8 @@ The controller alone is given the inputs that its states name (``joint_controlle
 reproduced to the bit, simulated or live. The other parts are the live loops on a bus. A part that
 is replayed alone ticks at the recorded times and gets what had arrived by then. The messages of
 the other parts come from the recording. A simulated bag is reproduced to the bit. Of a live one
-the moment at which a message reached a driver or the plant is not recorded: near a tick a message
-may count one tick early or late. So it is with the controller in recordings of versions whose
+it is not recorded when a message reached a driver or the plant. Near a tick a message may count
+one tick early or late. So it is with the controller in recordings of versions whose
 states lack some inputs.
 """
 

@@ -137,7 +137,7 @@ class Criteria:
     active_gap: float = _criterion(
         0.3, 'floors squared', 'comparison',
         'Gap of a block from which on it judges.',
-        'Prototype; see docs/gap.md.')
+        'Prototype; see docs/explanation/gap_method.md.')
     min_blocks: int = _criterion(
         4, 'blocks', 'comparison',
         'Blocks below which there is no test.',

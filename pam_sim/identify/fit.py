@@ -17,7 +17,7 @@ Fit the unknown numbers to recordings.
 
 The fit begins at the best of many starts spread over the ranges: a mass that is wrong by a factor
 of ten leaves no slope to follow. Weights are the noise floors, lowered by misfit and memory of
-what is left, so that an incomplete model does not seem to know its numbers better than it does.
+what is left. An incomplete model then does not seem to know its numbers better than it does.
 """
 
 from collections.abc import Sequence

@@ -17,7 +17,7 @@ Effects that may be in the recordings although nobody named them.
 
 An effect that the model misses bends the numbers: a dead time looks like a longer time constant.
 Where the calibrated model leaves more than noise, the effects of the library are therefore
-fitted along with the numbers, each with a prior about zero as wide as its typical size. What they
+fitted along with the numbers. Each has a prior about zero as wide as its typical size. What they
 could explain widens the intervals. Their sizes are no result: ``pam gap`` names effects, and
 proves them.
 """
@@ -46,8 +46,8 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     """
     Return the effects that may be missing, as numbers with a prior about zero.
 
-    Formulations of the same name, sensors, and what stands in the rig or among ``numbers``
-    are left out: of a sensor it is known that it was calibrated, unless its zero is asked for.
+    Formulations of the same name, and what stands in the rig or among ``numbers``, are left out.
+    So are sensors: they count as calibrated, unless their zero is asked for.
     """
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
     unknown = {n.name for n in numbers if n.unknown}

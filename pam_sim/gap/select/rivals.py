@@ -94,8 +94,8 @@ def numbers_before_sensors(context: SearchContext, current: Fit,
     """
     Return a fit for every number of load and valve that was not tried, without its prior.
 
-    Before an error of a sensor is named: where the misfit is large, the weight of the errors is
-    low, and a number that is far off still stays near its prior.
+    This comes before an error of a sensor is named. Where the misfit is large, the weight of the
+    errors is low. A number that is far off then still stays near its prior.
     """
     names = [k.name for k in numbers_of_rig(problems)
              if k.name not in tried and k.name not in current.hypothesis.numbers]

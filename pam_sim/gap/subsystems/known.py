@@ -31,8 +31,8 @@ class Known:
     """
     A number with a Gaussian prior; ``of_rig`` False for one of the measurement alone.
 
-    ``step`` is that of the slope, in deviations: a time needs whole steps of the grid, and
-    a number that is ``unknown`` small ones, for its prior is as wide as its range.
+    ``step`` is that of the slope, in deviations. A time needs whole steps of the grid. A number
+    that is ``unknown`` needs small ones, for its prior is as wide as its range.
     """
 
     name: str
