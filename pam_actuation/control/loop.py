@@ -47,6 +47,8 @@ or silent; pressure lost, where it is unknown  that of a driver that vents or li
 of two muscles one stays empty; its driver     vents both until that one follows again
 vents against the commands or falls silent;    (``slack_muscle``): none is left alone
 its pressure is lost                           under air
+loop, driver or sensors late over 20 ms        learning stands still for 0.25 s
+the loop itself stood still                    waits up to 20 ms for a measurement
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
 
@@ -75,6 +77,9 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 STALL_NS = 250_000_000
+LATE_NS = 20_000_000        # a loop this late leaves an error
+AFTER_LATE_NS = 250_000_000     # for so long, credit delay included
+PATIENCE_NS = 20_000_000    # how long a measurement may take to arrive after a stall
 _CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle
 _RESTING_M, _RESTING_N = 0.002, 5.0     # up to there a muscle may lie on a stop
 _FORCE_MARGIN = 1.5         # of the largest force in the table: above, the load cell is wrong
@@ -137,6 +142,9 @@ class ControllerLoop:
         self.state: ControllerState | None = None
         self.two_sensors = ''
         self._last_tick_ns: int | None = None
+        self._late_ns = max(LATE_NS, round(3e9 / controller.rate_hz))
+        self._on_time_ns = 0        # from when on no stall is felt
+        self._patience_ns: int | None = None    # until when it waits for a measurement
         self._used_ns: int | None = None
         self._commands_pa: tuple[float, ...] | None = None    # of the last tick, if it ran
 
@@ -249,13 +257,20 @@ class ControllerLoop:
         return tuple(commands), self.state
 
     def sent(self, now_ns: int, learning: bool = True) -> dict[str, Pressure | ControllerState]:
-        """Run one tick; return what it sends by topic relative to the rig, as ``tick``."""
+        """
+        Run one tick; return what it sends by topic relative to the rig, as ``tick``.
+
+        Nothing while it waits, after a stall of its own, for what was measured meanwhile.
+        """
+        if self._waits(now_ns):
+            return {}
         commands, state = self.tick(now_ns, learning)
         return {**dict(zip(self.command_topics, commands)), 'controller_state': state}
 
     def _gather(self, now_ns: int, learning: bool) -> TickInputs:
         """Return the ``TickInputs`` of now."""
-        stalled = self._last_tick_ns is not None and now_ns - self._last_tick_ns > STALL_NS
+        gap_ns = 0 if self._last_tick_ns is None else now_ns - self._last_tick_ns
+        stalled = gap_ns > STALL_NS
         self._last_tick_ns = now_ns
         measurement, setpoint, muscles = self.measurement, self.setpoint, self.muscles
         reason = measurement.reason(now_ns)
@@ -268,7 +283,8 @@ class ControllerLoop:
             reason = self._reason(now_ns)
         effort = setpoint.effort
         may_learn = bool(learning and reason == codes.OK and not effort.follows
-                         and not self.controller.freeze_learning)
+                         and not self.controller.freeze_learning
+                         and self._on_time(now_ns, gap_ns))
         inputs = TickInputs(reason, may_learn, stalled)
         inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
         held_back = self._held_back(now_ns)
@@ -303,6 +319,35 @@ class ControllerLoop:
         if setpoint.changed and self._commands_pa is not None:
             inputs.pressures_pa = self._commands_pa     # one law goes on from those of the other
         return inputs
+
+    def _waits(self, now_ns: int) -> bool:
+        """
+        Return whether to leave a tick out: just after a stall the inputs are those from before.
+
+        The loop itself was late, and so is the newest reading. The next one is on its way through
+        the middleware, or sensors and loop stood still together.
+        """
+        before_ns, sensor = self._last_tick_ns, self._newest.get(self.measurement.sensor.topic)
+        if before_ns is None or sensor is None or now_ns - before_ns <= self._late_ns or (
+                now_ns - sensor.stamp_ns <= self._late_ns):
+            self._patience_ns = None
+            return False
+        if self._patience_ns is None:
+            self._patience_ns = now_ns + PATIENCE_NS
+        return now_ns < self._patience_ns
+
+    def _on_time(self, now_ns: int, gap_ns: int) -> bool:
+        """
+        Return whether all loops were on time of late; errors after a stall are no error of rules.
+
+        The controller itself is seen by its ticks, a driver by what it tells, the sensors by the
+        age of what is tracked.
+        """
+        late_ns = max(gap_ns, now_ns - self.measurement.stamp_ns,
+                      *(muscle.following.silent_ns(now_ns) for muscle in self.muscles))
+        if late_ns > self._late_ns:
+            self._on_time_ns = now_ns + late_ns + AFTER_LATE_NS
+        return now_ns >= self._on_time_ns
 
     def _position(self, now_ns: int) -> tuple[int, float]:
         """Return stamp and value of what the law starts from; -1, NaN where not usable."""

@@ -28,6 +28,8 @@ jerk there either. To compensate the lag of a valve, the change of pressure is n
 contains the jerk.
 """
 
+import math
+
 import numpy as np
 from pam_actuation.control.static_inverse import grid_of, GRID_SIZE, inverse_pressure_pa
 from pam_sim.annotations import FloatArray
@@ -37,17 +39,44 @@ _SLOPE_BASE_M = 5e-4      # the slope of the static inverse is taken over twice 
 _LEAST_SLOPE = 0.2        # of the mean slope of the table
 _ACCELERATION_FLOOR_M_PER_S2 = 1e-9       # then it is gone, before it becomes denormal
 _LEAST_SHAPE = 0.5        # of the integral, its inverse the largest
+_BEND = 0.25              # of a change of rate: what a bent way may differ from a straight one
+
+
+@compiled
+def _while_late(way_m: float, before_m_per_s: float, rate_m_per_s: float,
+                elapsed_s: float) -> float:
+    """Return how far a reference went beyond what its rates explain over some time [m]."""
+    beyond = way_m - 0.5 * (before_m_per_s + rate_m_per_s) * elapsed_s
+    bend = _BEND * abs(rate_m_per_s - before_m_per_s) * elapsed_s
+    return math.copysign(max(abs(beyond) - bend, 0.0), beyond)
 
 
 @compiled
 def jumps(par: np.record, st: np.record, inp: np.record) -> tuple[float, float]:
-    """Return by how much reference and lead reference jumped against their rates [m]."""
+    """
+    Return by how much reference and lead reference jumped against their rates [m].
+
+    Between readings that came late, more time than a period may have passed. Whichever of the
+    two explains more of the way counts.
+    """
     period = par.period_s
-    now = (inp.reference_m - st.reference_m
-           - inp.reference_rate_m_per_s * period)
-    lead = (inp.lead_reference_m - st.lead_reference_m
-            - inp.lead_rate_m_per_s * period)
+    rate, lead_rate = inp.reference_rate_m_per_s, inp.lead_rate_m_per_s
+    way = inp.reference_m - st.reference_m
+    lead_way = inp.lead_reference_m - st.lead_reference_m
+    now = way - rate * period
+    lead = lead_way - lead_rate * period
+    st.gap_s = period
+    if inp.elapsed_s > par.late_s > 0.0:       # False for NaN: a period
+        late_now = _while_late(way, st.reference_rate_m_per_s, rate, inp.elapsed_s)
+        if abs(late_now) < abs(now):
+            now = late_now
+        # Where only the sensors were late, the lead reference went on by periods.
+        late_lead = _while_late(lead_way, st.lead_rate_m_per_s, lead_rate, inp.elapsed_s)
+        if abs(late_lead) < abs(lead):
+            lead = late_lead
+            st.gap_s = inp.elapsed_s
     st.reference_m = inp.reference_m
+    st.reference_rate_m_per_s = rate
     st.lead_reference_m = inp.lead_reference_m
     return (now if abs(now) > par.jump_m else 0.0,
             lead if abs(lead) > par.jump_m else 0.0)
@@ -129,7 +158,7 @@ def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_
 
     ``rate_jumped``: the rate of before means nothing.
     """
-    period = par.period_s
+    period = st.gap_s
     if rate_jumped:
         st.lead_rate_m_per_s = rate_m_per_s
         st.acceleration_m_per_s2 = 0.0

@@ -53,7 +53,9 @@ STATE = record(
     # Of the tick before.
     'contraction_m',
     'reference_m',
+    'reference_rate_m_per_s',
     'lead_reference_m',
+    'gap_s',                          # before this tick: a period, or more after a late one
     'error_m',
     'command_pa',
     'lead_m',                         # lead reference without what is to go of a move

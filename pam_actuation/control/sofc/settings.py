@@ -109,6 +109,9 @@ SETTINGS = (
     setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
     setting('jump_m', 'm', 1e-3, 1e-5, 0.1, 'reference jump that freezes learning'),
     setting('jump_freeze_s', 's', 0.6, 0.0, 10.0, 'for how long, beyond the credit delay'),
+    setting('late_s', 's', 0.0, 0.0, 1.0,
+            'readings this far apart: some loop was late, and no jump is what moved meanwhile; '
+            '0 = never'),
     setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
     setting('valve_gap_pa', 'Pa', 4e4, 1e3, 1e6,
             'expected minus measured pressure that freezes learning and integral'),
