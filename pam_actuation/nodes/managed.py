@@ -39,7 +39,7 @@ from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, 
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
 from pam_actuation.nodes.loops import LoopSet, SteadyTime
 from pam_actuation.nodes.parameters import declare
-from pam_actuation.nodes.realtime import ask_for_realtime
+from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.simulated_time import FollowedTime, leave_clock_to_node, PlantTime
 from pam_actuation.nodes.timing import LoopTiming
@@ -404,10 +404,8 @@ class ManagedNode(LifecycleNode):
         self._await_subscriber()
         gc.collect()
         gc.freeze()                  # what exists now stays: no long collections in the loop
-        priority = self.value('realtime_priority')
-        refused = ask_for_realtime(priority and priority + self.REALTIME_RANK)
-        if refused:
-            self.get_logger().info(f'no real-time scheduling: {refused}')
+        run_in_realtime(
+            self.value('realtime_priority'), self.REALTIME_RANK, self.get_logger())
         if self.simulated_time is not None:
             self._await_participants()
             self.simulated_time.begin()

@@ -12,9 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Real-time scheduling of a node, where the system allows it."""
+"""Real-time scheduling of a node, where the system allows it, and the sentence on it."""
 
 import os
+from typing import Any
+
+LIMIT = 'a line such as `USER - rtprio 99` in /etc/security/limits.conf allows it'
 
 
 def ask_for_realtime(priority: int) -> str:
@@ -41,3 +44,53 @@ def ask_for_realtime(priority: int) -> str:
     except (AttributeError, OSError) as error:
         return getattr(error, 'strerror', None) or str(error)
     return ''
+
+
+def refused_realtime(priority: int) -> str:
+    """
+    Return why this process would not get a real-time priority, '' if it would.
+
+    The calling thread has it for a moment; nothing else changes.
+    """
+    try:
+        before = os.sched_getscheduler(0), os.sched_getparam(0)
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(priority))
+        os.sched_setscheduler(0, *before)
+    except (AttributeError, OSError) as error:
+        return getattr(error, 'strerror', None) or str(error)
+    return ''
+
+
+def realtime_sentence(asked: int, rank: int) -> tuple[bool, str]:
+    """
+    Ask for real-time priority; return whether that is as it should be, and a sentence on it.
+
+    Parameters
+    ----------
+    asked : int
+        Parameter ``realtime_priority``, 0 for none.
+    rank : int
+        What a node adds to it; 0: it may be late, and there is no sentence without asking.
+
+    """
+    if asked:
+        refused = ask_for_realtime(asked + rank)
+        if refused:
+            return False, (f'no real-time priority ({refused}), so that a busy machine makes '
+                           f'ticks late; {LIMIT}')
+        return True, f'real-time priority {asked + rank}'
+    if not rank:
+        return True, ''
+    refused = refused_realtime(1 + rank)
+    how = f'not permitted here ({refused}); {LIMIT}' if refused else 'possible here'
+    return True, ('default priority, so that a busy machine makes ticks late; '
+                  f'realtime_priority:=1 is {how}')
+
+
+def run_in_realtime(asked: int, rank: int, logger: Any) -> None:
+    """Do as ``realtime_sentence`` and say the sentence, of a refusal as a warning."""
+    granted, sentence = realtime_sentence(asked, rank)
+    if not granted:
+        logger.warning(sentence)
+    elif sentence:
+        logger.info(sentence)
