@@ -39,6 +39,7 @@ _INTERVALS = 9              # of which the middle one is the period of the sende
 _PERIODS = 1.5              # the most a command waits: a period of the sender, and its jitter
 _AGES = 200                 # ticks of which the ages are known
 _ONE_IN = 33                # so many may be older than the steady age, or younger than the lowest
+_AT_START = 2               # so many in the first 2 s, where a change costs nothing
 _HELD = 1_000               # ticks for which the steady age stays although none needs it
 _FALL_NS = 2_000            # by which it falls a tick then
 _ALMOST_NS = 500_000        # an age this little below still needs it
@@ -134,7 +135,7 @@ class SteadyAge:
         few = len(ages_ns) // _ONE_IN
         limit_ns = ages_ns[few] + min(
             round(_PERIODS * median_low(self._intervals_ns)), self._longest_wait_ns)
-        highest_ns = min(ages_ns[-1 - few] if settled else ages_ns[-1], limit_ns)
+        highest_ns = min(ages_ns[-1 - (few if settled else min(few, _AT_START))], limit_ns)
         needed = age_ns >= self._steady_ns - _ALMOST_NS
         self._spare = 0 if needed else self._spare + 1
         if not settled or highest_ns > self._steady_ns:
