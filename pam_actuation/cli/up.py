@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
             is_up = True
             if not args.json:
                 print(f'{len(supervisor.processes)} nodes are active, Ctrl-C vents and ends:\n  '
-                      + '\n  '.join(supervisor.processes), flush=True)
+                      + '\n  '.join(supervisor.processes) + _played(args), flush=True)
             supervisor.watch(args.seconds)
         except SessionFailed as error:
             failure = str(error)
@@ -131,6 +131,16 @@ def _tell_remarks(args: argparse.Namespace) -> None:
     if args.what == 'rig':
         rig = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
     tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
+
+
+def _played(args: argparse.Namespace) -> str:
+    """Return the line on how long an experiment lasts, and what comes after it."""
+    if not args.experiment:
+        return ''
+    from pam_actuation.experiments import load_experiment
+    experiment = load_experiment(args.experiment)
+    return (f'\nexperiment "{experiment.name}": {experiment.duration_s:g} s, '
+            'then its last value is held')
 
 
 def _write_policy(args: argparse.Namespace, nodes: 'list[NodeSpec]') -> int:
