@@ -124,6 +124,13 @@ def test_the_age_rises_once_many_commands_are_late_and_falls_late_and_slowly():
     assert np.all(falls < 0.0) and falls.min() > -0.01
 
 
+def test_two_late_commands_at_the_start_are_forgotten():
+    sent = sender(1000)
+    late = sent[~np.isin(np.arange(1000), [100, 200])]
+    acted, newest = ages_ms(late, START + WAY_NS + MS + 10 * MS * np.arange(1, 480))
+    assert np.sum(newest > 2.0) == 2 and acted[120:] == pytest.approx(newest[120:], abs=1e-6)
+
+
 def test_rare_flips_leave_the_age_as_it_is():
     ticks = START + WAY_NS + 10 * MS * np.arange(1, 3000) + 200_000
     ticks[np.random.default_rng(2).uniform(size=len(ticks)) < 0.015] -= 400_000
@@ -168,6 +175,16 @@ def test_after_a_silence_nothing_from_before_acts():
     after = ticks > stamps[400]
     assert driver.safety.vents == 1 and P_ATM_PA in followed[after]
     assert followed[after][15:].max() <= P_ATM_PA + 1e5
+
+
+def test_the_status_tells_both_ages():
+    stamps = sender(800)
+    commands = [Pressure(int(stamp), P_ATM_PA + 3e5) for stamp in stamps]
+    ticks = edge(380, 300_000)
+    _, driver = driven('hsv', commands, ticks)
+    values = dict(driver.status().values)
+    newest, acted = (float(values[key]) for key in ('command_age_ms', 'command_acted_age_ms'))
+    assert 0.3 <= newest <= 5.6 and acted == pytest.approx(5.3, abs=0.5)
 
 
 def test_a_regulator_passes_each_command_on():
