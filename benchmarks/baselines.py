@@ -17,10 +17,13 @@ The baseline controllers, each tuned by the same search with the same budget as 
 
 Run ``python benchmarks/baselines.py`` for the table of their errors: sines of +-10 mm about
 14 mm, last of 20 cycles, noise on. ``--tune`` searches the settings anew, from the defaults
-of each controller, and writes the presets of ``config/controllers``.
+of each controller, and writes the presets of ``config/controllers``. ``--tune random`` does so for
+motions that never repeat and are not announced; their presets end with ``_random``.
 """
 
 import argparse
+from dataclasses import dataclass
+import math
 
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
@@ -42,21 +45,34 @@ WORDS = {
     'lqi': 'LQI on a linear model that is identified on the rig when this is loaded.'}
 SOURCE = """#
 # Only what differs from the defaults; every setting with its unit and range is listed in
-# pam_actuation/control/{module}.py. Found by `python benchmarks/baselines.py --tune`: rig
+# pam_actuation/control/{module}.py. Found by `python benchmarks/baselines.py --tune{option}`: rig
 # {rig}, {valve}, {experiments},
 # {rollouts} rollouts from the defaults, seed {seed}; held-out cost {before:.3f} -> {after:.3f} mm.
 # Gains suit the dry friction of that rig: without any, on PPR, pid and lqi swing up.
 """
 FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
-SEARCHED = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
-CHECK = 'tuning_check'
 ROLLOUTS, SEED = 3000, 1
 CYCLES = 20
 
 
-def preset(kind, valve):
+@dataclass(frozen=True)
+class Purpose:
+    """What baselines are tuned for: experiments, those of the check, preview, ending of names."""
+
+    searched: tuple[str, ...]
+    check: tuple[str, ...]
+    preview_s: float = math.inf
+    ending: str = ''
+
+
+PURPOSES = {
+    'sines': Purpose(('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz'), ('tuning_check',)),
+    'random': Purpose(('tuning_random',), ('random_motion',), 0.0, '_random')}
+
+
+def preset(kind, valve, ending=''):
     """Return the name of the preset of a kind of baseline for a valve."""
-    return kind if valve == 'ppr' else f'{kind}_{valve}'
+    return f'{kind}{ending}' + ('' if valve == 'ppr' else f'_{valve}')
 
 
 def baselines():
@@ -90,23 +106,24 @@ def show_errors(valves):
                   + ' | '.join(f'{error:.3f}' for error in errors) + ' |', flush=True)
 
 
-def tune_presets(valve, jobs):
-    """Search the settings of every baseline and write the presets."""
+def tune_presets(valve, jobs, purpose):
+    """Search the settings of every baseline for a ``Purpose`` and write the presets."""
     rig = load_rig(RIG, valve=valve)
-    experiments = [load_experiment(name) for name in SEARCHED]
-    check = [load_experiment(CHECK), *experiments]
+    experiments = [load_experiment(name) for name in purpose.searched]
+    check = [*(load_experiment(name) for name in purpose.check), *experiments]
     for kind in KINDS:
         start = load_controller(dump_yaml({
             'controller': kind.split('_')[0], 'settings': STARTS[kind]}), rig)
         result = tune(rig, start, experiments, budget=ROLLOUTS, seed=SEED, jobs=jobs,
-                      held_out=check)
+                      held_out=check, preview_s=purpose.preview_s)
         settings = {**STARTS[kind], **{
             axis.name: result.controller.settings[axis.name] for axis in result.axes}}
         head = f'# {WORDS[kind]}\n' + SOURCE.format(
-            module=start.kind, rig=RIG, valve=valve, experiments=', '.join(SEARCHED),
+            option=' random' if purpose.ending else '', module=start.kind, rig=RIG,
+            valve=valve, experiments=', '.join(purpose.searched),
             rollouts=result.rollouts, seed=SEED, before=result.held_out_before,
             after=result.held_out_after)
-        path = config_dir() / 'controllers' / f'{preset(kind, valve)}.yaml'
+        path = config_dir() / 'controllers' / f'{preset(kind, valve, purpose.ending)}.yaml'
         write_text(path, head + dump_yaml({
             'controller': start.kind, 'settings': settings}))
         print(f'{path}: {result.text()}', flush=True)
@@ -116,7 +133,8 @@ def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
-    parser.add_argument('--tune', action='store_true', help='search the presets anew')
+    parser.add_argument('--tune', nargs='?', const='sines', choices=PURPOSES,
+                        help='search the presets anew, for sines or for random motions')
     parser.add_argument('--jobs', type=int, default=-1, help='threads; -1 = one a core')
     results_page.add_write(parser, 'baselines')
     return parser
@@ -128,7 +146,7 @@ def main():
     valves = args.valve.split(',')
     if args.tune:
         for valve in valves:
-            tune_presets(valve, args.jobs)
+            tune_presets(valve, args.jobs, PURPOSES[args.tune])
         return
     with results_page.printed(args, __file__):
         show_errors(valves)

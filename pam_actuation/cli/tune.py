@@ -15,13 +15,14 @@
 """``pam tune``: improve a controller offline, on a model, from what was recorded."""
 
 import argparse
+import math
 import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
     default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
-from pam_actuation.cli.options import count, out_path, Parser, source
+from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
@@ -63,6 +64,9 @@ def add_arguments(parser: Parser) -> None:
                         help='budget of simulated runs of the search (default: %(default)s)')
     parser.add_argument('--randomise', type=count(0, 1000), default=0, metavar='N',
                         help='tune on so many random rigs beside the model (default: 0)')
+    parser.add_argument('--preview', type=number(0.0, 10.0), default=None, metavar='SECONDS',
+                        help='how far ahead the controller is told the reference; 0 for motions '
+                        'nobody announces (default: without limit)')
     parser.add_argument('--patience', type=count(0), default=30, metavar='N',
                         help='stop after so many generations without progress, 0 = never '
                         '(default: %(default)s)')
@@ -116,7 +120,8 @@ def run(args: argparse.Namespace) -> int | None:
             rigs, controller, experiments, budget=args.rollouts, seed=args.seed, jobs=args.jobs,
             progress=lambda done: bar.update(max(done - bar.n, 0)), held_out=check,
             held_out_rigs=others, patience=args.patience, cluster=args.cluster,
-            learn_rules=not args.freeze)
+            learn_rules=not args.freeze,
+            preview_s=math.inf if args.preview is None else args.preview)
     recordings = check_recordings(runs, rig, result.controller)
     if result.controller.rules is None:
         del written['rules']

@@ -15,6 +15,7 @@
 """Closed loops of pairs of rig and experiment, of muscles or of joints, within their reach."""
 
 from collections.abc import Sequence
+import math
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.modes.tracked import tracked_by
@@ -51,11 +52,13 @@ def reachable(rig: 'Rig | JointRig', experiment: 'Experiment', controller: 'Law'
 
 
 def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment]', seed: int,
-             controller: 'Law', nominal: 'Rig | JointRig') -> 'tuple[list[Loop], int]':
+             controller: 'Law', nominal: 'Rig | JointRig',
+             preview_s: float = math.inf) -> 'tuple[list[Loop], int]':
     """
     Return the closed loops of all pairs that can be reached, and how many cannot.
 
-    The valve drivers know the data sheet of the ``nominal`` rig.
+    The valve drivers know the data sheet of the ``nominal`` rig, the controllers the reference
+    ``preview_s`` ahead.
 
     Raises
     ------
@@ -78,8 +81,10 @@ def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment
         raise InputError('no rig can reach any of the experiments', experiments[0].name)
     drivers = [driver_config(muscle) for muscle in nominal.muscles.values()]
     loops: 'list[Loop]' = [
-        JointLoop(rig, experiment, seed, controller.rate_hz, drivers=drivers)
+        JointLoop(rig, experiment, seed, controller.rate_hz, drivers=drivers,
+                  preview_s=preview_s)
         if isinstance(rig, JointRig) else
-        ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=drivers[0])
+        ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=drivers[0],
+                   preview_s=preview_s)
         for rig, experiment in kept]
     return loops, len(pairs) - len(kept)

@@ -22,6 +22,7 @@ The same seed gives the same result with any number of ``workers``.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
@@ -179,7 +180,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
          held_out: 'Experiment | list[Experiment] | None' = None,
          population: int | None = None, patience: int = 0, cluster: str | None = None,
          held_out_rigs: 'Sequence[Rig | JointRig] | None' = None,
-         learn_rules: bool = True) -> TuneResult:
+         learn_rules: bool = True, preview_s: float = math.inf) -> TuneResult:
     """
     Tune settings and initial rules of a controller on a model.
 
@@ -214,6 +215,8 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
         Rigs of the held-out runs; by default those of the search.
     learn_rules : bool
         Whether a controller with rules gets new initial ones.
+    preview_s : float
+        How far ahead the controller is told the reference; without limit by default.
 
     Returns
     -------
@@ -231,9 +234,9 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     check_axes(axes, controller.settings)
     rigs: list[Rig | JointRig] = _as_list(rig)
     experiments: list[Experiment] = _as_list(experiment)
-    train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0])
+    train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0], preview_s)
     test, _ = loops_of(held_out_rigs or rigs, _as_list(held_out or experiments),
-                       seed + HELD_OUT_SEED, controller, rigs[0])
+                       seed + HELD_OUT_SEED, controller, rigs[0], preview_s)
     members = population or default_members(budget // len(train))
     generations = budget // (members * len(train))
     if members < SMALLEST or generations < 2:

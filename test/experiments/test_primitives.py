@@ -227,7 +227,7 @@ BAD = {
     'segments:\n  - triangle: {low_m: 0.02, high_m: 0.01, period_s: 1, cycles: 1}\n':
         'low must be below high',
     'segments:\n  - knee_gait: {low_m: 0, high_m: 0.01, frequency_hz: 3, cycles: 1}\n':
-        'walking is 0.5 to 1 Hz',
+        'walking is 0.5 to 1.2 Hz',
     'segments:\n  - decay: {duration_s: 1.0}\n': 'makes no sense in the domain contraction',
     'domain: ppr_voltage\nsegments:\n  - step: {to_v: 7, duration_s: 1}\n': '0 to 6 v',
     'domain: hsv_duty\nsegments:\n  - step: {to_duty: -2, duration_s: 1}\n': '-1 to 1 duty',

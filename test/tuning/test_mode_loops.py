@@ -83,6 +83,11 @@ def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(name, limb
     assert np.array_equal(again.value, result.value)
 
 
+def sampled(loop):
+    """Return what the experiment wants at the ticks and a little beyond, and its rate."""
+    return np.transpose([loop.experiment.at(k / loop.rate_hz) for k in range(loop.ticks + 120)])
+
+
 def test_the_compiled_loop_of_force_mode_steps_the_live_class():
     rig = load_rig('dmsp_5_300_driven')
     experiment = load_experiment(SHORT.format(domain='force', values='to_n: 30.0'))
@@ -90,7 +95,7 @@ def test_the_compiled_loop_of_force_mode_steps_the_live_class():
     result = loop.run(load_controller('sofc_force_ppr', rig))
     controller = load_controller('sofc_force_ppr', rig)
     lead = controller.lead_s
-    position, rate = loop._position, loop._rate
+    position, rate = sampled(loop)
     for k in range(loop.ticks):
         ahead = k + lead * loop.rate_hz
         wanted = (position[k], rate[k], *(
@@ -108,7 +113,7 @@ def test_the_compiled_loop_of_joint_mode_steps_the_live_class():
     result = loop.run(load_controller('sofc_joint_ppr', joint))
     controller = load_controller('sofc_joint_ppr', joint)
     lead = controller.lead_s
-    position, rate = loop._position, loop._rate
+    position, rate = sampled(loop)
     for k in range(loop.ticks):
         ahead = k + lead * loop.rate_hz
         wanted = (position[k], rate[k], *(

@@ -73,13 +73,13 @@ class KneeGait(Primitive):
     start: float
     low: float = key('value of the straightest knee')
     high: float = key('value of the most flexed knee')
-    frequency_hz: float = key('strides per second, 0.5 to 1')
+    frequency_hz: float = key('strides per second, 0.5 to 1.2')
     cycles: int = key('number of strides')
 
     def problem(self) -> str:
         """Refuse what is no walking."""
-        if not 0.5 <= self.frequency_hz <= 1.0:
-            return f'frequency_hz is {self.frequency_hz:g}; walking is 0.5 to 1 Hz'
+        if not 0.5 <= self.frequency_hz <= 1.2:
+            return f'frequency_hz is {self.frequency_hz:g}; walking is 0.5 to 1.2 Hz'
         return '' if self.low < self.high else 'low must be below high'
 
     @property
