@@ -134,7 +134,7 @@ class CompiledController:
 
     def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return tuple(self._outputs.tolist())
+        return tuple(self._outputs[:len(self.state_names)].tolist())
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

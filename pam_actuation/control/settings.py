@@ -28,7 +28,8 @@ def setting(name: str, unit: str, default: float, lower: float, upper: float,
 
 
 def parameter_record(
-        specification: Sequence[Parameter], *derived: str) -> 'np.dtype[np.record]':
+        specification: Sequence[Parameter],
+        *derived: str | tuple[str, int]) -> 'np.dtype[np.record]':
     """
     Return the record of a law's compiled parameters.
 
@@ -36,8 +37,8 @@ def parameter_record(
     ----------
     specification : sequence of Parameter
         The settings of the law; each is a field of its name.
-    derived : str
-        Further fields, computed from the settings.
+    derived : str or (str, int)
+        Further fields, computed from the settings: a name, or one with the length of an array.
 
     """
     return record(*(one.name for one in specification), *derived)

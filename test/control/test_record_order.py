@@ -47,7 +47,8 @@ OUTPUTS = {
         'performance_index_m', 'learning_reason', 'credited_tick_valid',
         'feedback_rule_change_norm_pa', 'feedforward_rule_change_norm_pa',
         'motion_rule_change_norm_pa', 'start_offset_m', 'jump_to_go_m', 'window_rms_error_m',
-        'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back')}
+        'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back', 'path_rules_pa',
+        'disturbance_pa', 'predicted_feedback_pa', 'path_rule_change_norm_pa')}
 
 
 @pytest.mark.parametrize('law', LAWS)

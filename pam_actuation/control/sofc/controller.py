@@ -19,18 +19,25 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
-from pam_actuation.control.sofc.records import ENTRY, OUTPUT, STATE
+from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
-from pam_actuation.control.sofc.settings import parameter_array, PARAMETERS, SCALING, SETTINGS
+from pam_actuation.control.sofc.settings import (
+    parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters
 from pam_sim.records import fields, size_of
+
+
+# Settings of which one at least is not 0 where the model of the muscle does anything.
+_OF_MODEL = ('path_sets', 'model_noise_pa', 'disturbance_time_s',
+             'predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m')
 
 
 class SelfOrganizingFuzzyController(CompiledController):
@@ -66,7 +73,10 @@ class SelfOrganizingFuzzyController(CompiledController):
                  where: Callable[[str], str] | None = None) -> None:
         settings = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
         super().__init__(settings, STATE, rig_name)
-        for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots'):
+        if not any(self.settings[name] for name in _OF_MODEL):
+            self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
+        for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots',
+                     'path_sets'):
             self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
             raise InputError(
@@ -79,10 +89,14 @@ class SelfOrganizingFuzzyController(CompiledController):
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         scaling: dict[str, Any] = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
+        sets = int(self.settings['path_sets'])
+        if sets:
+            scaling |= {name: self.settings[name] for name in PATH_SCALING}
         self.rules = RuleBase(
             linear_feedback_table(), np.zeros((2, int(self.settings['reference_knots']))),
             scaling, np.zeros((int(self.settings['motion_position_knots']),
-                               int(self.settings['motion_rate_knots']))))
+                               int(self.settings['motion_rate_knots']))),
+            np.zeros((sets, int(self.settings['reference_knots']) if sets else 0)))
         if rules is not None:
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)
@@ -106,14 +120,23 @@ class SelfOrganizingFuzzyController(CompiledController):
         return REASONS[int(fields(self._outputs, OUTPUT).learning_reason)]
 
     def pause(self) -> None:
-        """Forget the motion, keep the rules: the next tick starts bumplessly."""
+        """Forget the motion, keep rules and model: the next tick starts bumplessly."""
+        model = fields(self._state, STATE).model
+        numbers, covariance = model.number_pa.copy(), model.covariance_pa2.copy()
         super().pause()
+        model.number_pa[:], model.covariance_pa2[:] = numbers, covariance
         self._ring[:] = 0.0
 
     def reset(self) -> None:
-        """Return to the initial rules and forget the motion."""
+        """Return to the initial rules, forget the model and the motion."""
         self.rules.reset()
+        self._forget_numbers()
         self.pause()
+
+    def _forget_numbers(self) -> None:
+        model = fields(self._state, STATE).model
+        model.number_pa[:] = 0.0
+        model.covariance_pa2[:] = 0.0
 
     def replace_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """
@@ -137,6 +160,7 @@ class SelfOrganizingFuzzyController(CompiledController):
         """Return to the initial rules without a step in the command."""
         before = self._rule_output_pa()
         self.rules.reset()
+        self._forget_numbers()
         self._keep_output(before)
 
     def _keep_output(self, before_pa: float) -> None:
@@ -165,4 +189,12 @@ class SelfOrganizingFuzzyController(CompiledController):
                 out.reference_knot_degree)
             + infer_motion(
                 self.rules.motion, int(out.motion_knot), out.motion_knot_degree,
-                int(out.motion_rate_knot), out.motion_rate_knot_degree))
+                int(out.motion_rate_knot), out.motion_rate_knot_degree)
+            + self._model_output_pa())
+
+    def _model_output_pa(self) -> float:
+        """Return what path rules and numbers of the model add [Pa] where the last tick was."""
+        state, par = fields(self._state, STATE), fields(self.parameters, PARAMETERS)
+        path, lead_m = state.model.lead_path, state.lead_m
+        return float(muscle_model.rules_pa(par, self.rules.path, path, lead_m)
+                     + muscle_model.numbers_pa(par, state.model, path, lead_m))

@@ -152,7 +152,7 @@ def load_shape(par: np.record, contraction_m: float) -> float:
 
 @compiled
 def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_per_s: float,
-                        rate_jumped: bool) -> float:
+                        rate_jumped: bool, damping: float, inertia: float) -> float:
     """
     Return what moving takes beyond the static pressure [Pa]; advances the filters.
 
@@ -169,8 +169,7 @@ def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_
     if abs(acceleration) < _ACCELERATION_FLOOR_M_PER_S2:
         acceleration = 0.0
     st.acceleration_m_per_s2 = acceleration
-    moving = (par.rate_feedforward_pa_s_per_m * rate_m_per_s
-              + par.acceleration_feedforward_pa_s2_per_m * acceleration)
+    moving = damping * rate_m_per_s + inertia * acceleration
     quasi_static = static_pa + moving
     if rate_jumped:
         st.quasi_static_pa = quasi_static

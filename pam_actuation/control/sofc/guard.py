@@ -44,8 +44,8 @@ _LEAST_FACTOR = 1.0 / 64.0
 @compiled
 def keep(values: Tables, kept: Tables) -> None:
     """Copy the rules of all tables."""
-    feedback, feedforward, motion = values
-    kept_feedback, kept_feedforward, kept_motion = kept
+    feedback, feedforward, motion, path = values
+    kept_feedback, kept_feedforward, kept_motion, kept_path = kept
     for d in range(2):
         for i in range(feedback.shape[1]):
             for j in range(feedback.shape[2]):
@@ -55,6 +55,9 @@ def keep(values: Tables, kept: Tables) -> None:
     for m in range(motion.shape[0]):
         for n in range(motion.shape[1]):
             kept_motion[m, n] = motion[m, n]
+    for q in range(path.shape[0]):
+        for k in range(path.shape[1]):
+            kept_path[q, k] = path[q, k]
 
 
 @compiled

@@ -29,8 +29,8 @@ from typing import Any
 import numpy as np
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
-from pam_actuation.control.sofc.rule_text import ARRAYS, digest_of, SCHEMA
-from pam_actuation.control.sofc.settings import SCALING, SETTINGS
+from pam_actuation.control.sofc.rule_text import ARRAYS, digest_of, OPTIONAL, SCHEMA
+from pam_actuation.control.sofc.settings import PATH_SCALING, SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
@@ -43,7 +43,8 @@ MAX_BYTES = 2**24         # more than the largest tables the settings allow
 _SHAPES: dict[str, tuple[int | str, ...]] = {
     'feedback': (2, SET_COUNT, SET_COUNT),
     'feedforward': (2, 'reference_knots'),
-    'motion': ('motion_position_knots', 'motion_rate_knots')}
+    'motion': ('motion_position_knots', 'motion_rate_knots'),
+    'path': ('path_sets', 'reference_knots')}
 _MEANINGS = {'': 'rules', '_initial': 'rules it started from', '_fired': 'how long each fired, s'}
 FILE_KEYS = (
     Key('schema', int, 'Version of the form of this file.', required=True, lower=SCHEMA,
@@ -51,11 +52,14 @@ FILE_KEYS = (
     Key('shape', dict, 'Lengths of the axes of every table.', required=True),
     Key('scaling', dict, 'Settings and rig that give the numbers their meaning.', required=True),
     *(Key(name, list, f'Table `{name.partition("_")[0]}`: '
-          f'{_MEANINGS[name.removeprefix(name.partition("_")[0])]}.', required=True)
+          f'{_MEANINGS[name.removeprefix(name.partition("_")[0])]}.',
+          required=name.partition('_')[0] not in OPTIONAL)
       for name in ARRAYS),
     Key('sha256', str, 'Checksum of all the rest.', required=True),
 )
 _KEYS = names_of(FILE_KEYS)
+_REQUIRED = [key.name for key in FILE_KEYS if key.required]
+_OF_PATH = [name for name in ARRAYS if name.partition('_')[0] == 'path']
 
 
 def rules_from_mapping(mapping: dict[str, Any], where: str,
@@ -81,8 +85,12 @@ def rules_from_mapping(mapping: dict[str, Any], where: str,
     """
     _check_whole(mapping, where)
     scaling = _checked_scaling(mapping['scaling'], where)
+    if ('path_sets' in scaling) != ('path' in mapping):
+        raise InputError('a rule file has path rules and path_sets in its scaling, or neither',
+                         where)
     rules = RuleBase(scaling=scaling, **{
-        name: _checked_array(mapping, name, scaling, where) for name in ARRAYS})
+        name: _checked_array(mapping, name, scaling, where) for name in ARRAYS
+        if name in mapping})
     for table in rules.tables():
         for kind in ('values', 'initial'):
             worst = float(np.max(np.abs(getattr(table, kind))))
@@ -103,7 +111,8 @@ def _check_whole(mapping: dict[str, Any], where: str) -> None:
     if type(mapping['schema']) is not int or mapping['schema'] != SCHEMA:
         raise InputError(
             f'not a rule file of schema {SCHEMA}, but of {_short(mapping["schema"])}', where)
-    missing = [name for name in _KEYS if name not in mapping]
+    required = _REQUIRED + _OF_PATH * any(name in mapping for name in _OF_PATH)
+    missing = [name for name in required if name not in mapping]
     if missing:
         raise InputError(f'rule file lacks {", ".join(missing)}', where)
     foreign = [_short(name) for name in mapping if name not in _KEYS]
@@ -122,7 +131,8 @@ def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     """Return the scaling of a file; InputError unless it says what the numbers mean."""
     if not isinstance(scaling, dict):
         raise InputError('scaling is not a mapping', where)
-    missing = [name for name in ('rig', *SCALING) if name not in scaling]
+    expected = ('rig', *SCALING, *PATH_SCALING * any(name in scaling for name in PATH_SCALING))
+    missing = [name for name in expected if name not in scaling]
     if missing:
         raise InputError(f'scaling lacks {", ".join(missing)}', where)
     if not isinstance(scaling['rig'], str):
@@ -130,7 +140,7 @@ def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     _check_tracked({name: scaling[name] for name in TRACKED_SCALING if name in scaling}, where)
     numbers = {name: value for name, value in scaling.items()
                if name != 'rig' and name not in TRACKED_SCALING}
-    foreign = [_short(name) for name in numbers if name not in SCALING]
+    foreign = [_short(name) for name in numbers if name not in (*SCALING, *PATH_SCALING)]
     if foreign:
         raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
     check_parameters(SETTINGS, numbers, 'setting', where)

@@ -14,6 +14,7 @@
 
 """State and outputs of the compiled controller, and what it remembers of one tick."""
 
+from pam_actuation.control.sofc.muscle_model import MODEL
 from pam_sim.records import record
 
 # Which rules are active: of two neighbouring sets or knots the lower one, and the degree
@@ -79,6 +80,7 @@ STATE = record(
     'jumped',                         # 1 from a jump until the reference moves by itself
     'settling_left_s',
     'freeze_left_s',
+    ('model', MODEL),                 # of the muscle
     # Guard.
     ('window', WINDOW),
     'direction',                      # sign of the last movement of the reference
@@ -91,6 +93,9 @@ STATE = record(
     'rate_ceiling',                   # the same, by roll-backs
     'times_rolled_back',
 )
+# Of a controller with a model of the muscle; the last of ``OUTPUT``.
+MODEL_OUTPUTS = (
+    'path_rules_pa', 'disturbance_pa', 'predicted_feedback_pa', 'path_rule_change_norm_pa')
 # The names on topic ``controller_state``.
 OUTPUT = record(
     'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'dynamic_feedforward_pa',
@@ -99,4 +104,5 @@ OUTPUT = record(
     'slew_limited', *ACTIVE_RULES, 'performance_index_m', 'learning_reason',
     'credited_tick_valid', 'feedback_rule_change_norm_pa', 'feedforward_rule_change_norm_pa',
     'motion_rule_change_norm_pa', 'start_offset_m', 'jump_to_go_m', 'window_rms_error_m',
-    'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back')
+    'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back',
+    *MODEL_OUTPUTS)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The three rule tables of the controller and their inference.
+The rule tables of the controller and their inference.
 
 Feedback rules: ``feedback[d, i, j]`` is the singleton in [-1, 1] of the rule
 "if moving in direction d and error is set i and change of error is set j".
@@ -22,7 +22,9 @@ reference is near r_k and moves in direction d then add c_k". Directions: 0
 contracting, 1 extending; a muscle with hysteresis needs different pressures on
 the two branches. Shortly after a reversal both are active in part. Motion rules:
 ``motion[m, n]`` [Pa] of "if the reference is near r_m and moves at about v_n then
-add c_mn"; the rates are dense about zero, where the muscle turns round.
+add c_mn"; the rates are dense about zero, where the muscle turns round. Path rules, where there
+are any: ``path[q, k]`` [Pa] of "if the contraction is near r_k and the path of length q before
+led there by contracting then add c_qk, by extending take it off"; set 0 is any path.
 
 Inference is product and weighted mean; degrees sum to 1, so the mean needs no division. This is
 the zero-order Sugeno form of the rule table of Procyk and Mamdani (Automatica 15, 1979).
@@ -41,8 +43,8 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.short_repr import short_repr
 
-# Feedback, feed-forward and motion rules.
-Tables: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+# Feedback, feed-forward, motion and path rules.
+Tables: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 CONTRACTING, EXTENDING = 0, 1
 DIRECTIONS = ('contracting', 'extending')
 
@@ -85,6 +87,20 @@ def infer_motion(table: FloatArray, m: int, wm: float, n: int, wn: float) -> flo
     """Return the output of the motion rules [Pa] at position knots m and rate knots n."""
     return ((1.0 - wm) * ((1.0 - wn) * table[m, n] + wn * table[m, n + 1])
             + wm * ((1.0 - wn) * table[m + 1, n] + wn * table[m + 1, n + 1]))
+
+
+def path_widths_m(sets: int, shortest_m: float, longest_m: float) -> FloatArray:
+    """Return the paths [m] that the sets beyond that of any path tell apart, evenly in ratio."""
+    return np.geomspace(shortest_m, longest_m, max(sets - 1, 0))
+
+
+@compiled
+def infer_path(table: FloatArray, path: FloatArray, k: int, wk: float) -> float:
+    """Return the output of the path rules [Pa] for the degrees of a path at the knots k, wk."""
+    total = 0.0
+    for q in range(table.shape[0]):
+        total += path[q] * ((1.0 - wk) * table[q, k] + wk * table[q, k + 1])
+    return total
 
 
 def linear_feedback_table() -> FloatArray:
@@ -150,7 +166,9 @@ class RuleBase:
         (2, K) singletons [Pa].
     motion, motion_initial : numpy.ndarray
         (M, N) singletons [Pa]; none that matter by default.
-    feedback_fired, feedforward_fired, motion_fired : numpy.ndarray
+    path, path_initial : numpy.ndarray
+        (Q, K) singletons [Pa]; (0, 0) where there are none.
+    feedback_fired, feedforward_fired, motion_fired, path_fired : numpy.ndarray
         Sum of the firing strengths of each rule since the rules were loaded.
     scaling : dict of str -> float
         What the numbers mean: universes, gains, knots, sample time, rig identity. Rules
@@ -164,12 +182,15 @@ class RuleBase:
     feedforward: FloatArray
     scaling: dict[str, Any] = field(default_factory=dict)
     motion: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
+    path: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     feedback_initial: FloatArray = field(default_factory=_not_given)
     feedforward_initial: FloatArray = field(default_factory=_not_given)
     motion_initial: FloatArray = field(default_factory=_not_given)
+    path_initial: FloatArray = field(default_factory=_not_given)
     feedback_fired: FloatArray = field(default_factory=_not_given)
     feedforward_fired: FloatArray = field(default_factory=_not_given)
     motion_fired: FloatArray = field(default_factory=_not_given)
+    path_fired: FloatArray = field(default_factory=_not_given)
 
     def __post_init__(self) -> None:
         for name in self.NAMES:
@@ -203,7 +224,7 @@ class RuleBase:
         rates = per_m * signed_logarithmic_knots(
             scaling.get('motion_rate_fine_m_per_s', 1.0),
             scaling.get('motion_rate_upper_m_per_s', 1.0), self.motion.shape[1])
-        described = (
+        described: list[tuple[str, tuple[Antecedent, ...], float, float]] = [
             ('feedback', (direction, error, change), 1.0, scaling.get('feedback_gain_pa', 1.0)),
             ('feedforward', (direction, Antecedent(
                 'reference', unit, np.linspace(
@@ -211,13 +232,24 @@ class RuleBase:
             ('motion', (
                 Antecedent('reference', unit, np.linspace(
                     lower, upper, self.motion.shape[0])),
-                Antecedent('rate of the reference', f'{unit}/s', rates)), limit_pa, 1.0))
+                Antecedent('rate of the reference', f'{unit}/s', rates)), limit_pa, 1.0)]
+        if self.path.size:
+            described.append(('path', (self._path_antecedent(unit, per_m), Antecedent(
+                'contraction', unit, np.linspace(
+                    lower, upper, self.path.shape[1]))), limit_pa, 1.0))
         return tuple(
             RuleTable(name, antecedents, getattr(self, name), getattr(self, name + '_initial'),
                       getattr(self, name + '_fired'), limit, scale, 'Pa')
             for name, antecedents, limit, scale in described)
 
-    def arrays(self, suffix: str = '') -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _path_antecedent(self, unit: str, per_m: float) -> Antecedent:
+        """Return the sets of the path."""
+        widths = per_m * path_widths_m(
+            self.path.shape[0], self.scaling.get('path_shortest_m', 1.0),
+            self.scaling.get('path_longest_m', 1.0))
+        return Antecedent('path', unit, np.concatenate([[0.0], widths]))
+
+    def arrays(self, suffix: str = '') -> Tables:
         """Return the arrays of all tables: values, or with '_initial', '_fired' those."""
         return tuple(getattr(self, name + suffix) for name in self.NAMES)
 
@@ -244,6 +276,8 @@ class RuleBase:
         """Return the sha256 of the rules as hexadecimal text."""
         total = hashlib.sha256()
         for value in self.arrays():
+            if not value.size:        # no path rules: the digest of those without
+                continue
             total.update(str(value.shape).encode())
             total.update(value.astype('<f8').tobytes())
         return total.hexdigest()

@@ -29,8 +29,11 @@ from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
 SCHEMA = 2
-NAMES = ('feedback', 'feedforward', 'motion')
-ARRAYS = tuple(name + suffix for suffix in ('', '_initial', '_fired') for name in NAMES)
+NAMES = ('feedback', 'feedforward', 'motion', 'path')
+OPTIONAL = ('path',)      # tables that may be empty; files then lack them
+SUFFIXES = ('', '_initial', '_fired')
+ARRAYS = tuple(name + suffix for suffix in SUFFIXES for name in NAMES)
+MOST_SETS = 6             # of the path, that of any path included
 
 
 class RuleNumbers(Protocol):
@@ -49,9 +52,11 @@ def rules_to_mapping(rules: RuleNumbers) -> dict[str, Any]:
     """Return a rule base as a mapping of plain numbers and lists, checksum included."""
     content = {
         'schema': SCHEMA,
-        'shape': {name: list(getattr(rules, name).shape) for name in NAMES},
+        'shape': {name: list(getattr(rules, name).shape) for name in NAMES
+                  if getattr(rules, name).size},
         'scaling': dict(rules.scaling)}
-    content.update({name: getattr(rules, name).tolist() for name in ARRAYS})
+    content.update({name: getattr(rules, name).tolist() for name in ARRAYS
+                    if getattr(rules, name).size})
     return {**content, 'sha256': digest_of(content)}
 
 

@@ -21,7 +21,10 @@ range in files follow from it.
 
 from collections.abc import Mapping
 
+import numpy as np
 from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.sofc.rule_table import path_widths_m
+from pam_actuation.control.sofc.rule_text import MOST_SETS
 from pam_sim.annotations import FloatArray
 from pam_sim.records import values_of
 
@@ -124,6 +127,31 @@ SETTINGS = (
             'share of what standing still counts that goes to the motion rules as well'),
     setting('jump_motion_learning', '-', 1.0, 0.0, 2.0,
             'factor of motion_learning from a jump until the reference moves by itself'),
+    setting('path_sets', '-', 0.0, 0.0, float(MOST_SETS),
+            'path rules: sets of the path, the first for any path; 0 = none'),
+    setting('path_shortest_m', 'm', 1.4e-4, 1e-6, 0.1, 'shortest path they tell apart'),
+    setting('path_longest_m', 'm', 2.5e-3, 1e-6, 0.1, 'longest path they tell apart'),
+    setting('path_learning', '-', 0.02, 0.0, 1.0,
+            'share of the residual the path rules mend per tick of a motion'),
+    setting('path_learning_floor', '-', 0.0, 0.0, 1.0, 'least part of that left'),
+    setting('lag_share', '-', 1.0, 0.0, 1.0,
+            'share of the lag of the valve made up for in what rules of the path and numbers add'),
+    setting('model_noise_pa', 'Pa', 0.0, 0.0, 1e6,
+            'residual that no number of the model explains; 0 = the numbers are not looked for'),
+    setting('model_drift_pa', 'Pa', 500.0, 0.0, 1e6, 'change of each such number in a second'),
+    setting('model_filter_s', 's', 0.015, 0.0, 0.5,
+            'both low passes on contraction and pressure for the residual'),
+    setting('disturbance_time_s', 's', 0.0, 0.0, 10.0,
+            'time in which the residual the rules do not explain is made up for; 0 = never'),
+    setting('predicted_proportional_pa_per_m', 'Pa/m', 0.0, 0.0, 5e7,
+            'feedback on the error predicted for when the command arrives'),
+    setting('predicted_derivative_pa_s_per_m', 'Pa s/m', 0.0, 0.0, 5e6, 'the same, on its change'),
+    setting('half_strength_m', 'm', 0.0, 0.0, 0.1,
+            'mean error at which that feedback and the disturbance act half; 0 = always in full'),
+    setting('strength_time_s', 's', 0.5, 0.01, 100.0, 'time over which that mean is taken'),
+    setting('predicted_filter_s', 's', 0.005, 0.0, 0.5, 'low pass on that feedback'),
+    setting('predicted_rate_filter_s', 's', 0.015, 0.0, 0.5,
+            'low pass on the rate with which the prediction begins'),
 )
 
 PARAMETERS = parameter_record(
@@ -132,6 +160,7 @@ PARAMETERS = parameter_record(
     'delay_ticks',                    # credit delay
     'spread_ticks',                   # credit spread, at most the delay
     'answer_ticks',                   # from a command to the answer of the valve
+    ('path_width_m', MOST_SETS),      # of the sets of the path; 0 for that of any path
 )
 
 # What rules mean depends on these; a file of rules must agree in all of them.
@@ -140,14 +169,20 @@ SCALING = (
     'reference_lower_m', 'reference_upper_m', 'reference_knots', 'feedforward_limit_pa',
     'motion_position_knots', 'motion_rate_knots', 'motion_rate_upper_m_per_s',
     'motion_rate_fine_m_per_s')
+# The same, where there are path rules.
+PATH_SCALING = ('path_sets', 'path_shortest_m', 'path_longest_m')
 
 
 def parameter_array(values: Mapping[str, float]) -> FloatArray:
     """Return the array of ``PARAMETERS`` for checked settings."""
     period_s = 1.0 / values['rate_hz']
     delay = round(values['credit_delay_s'] / period_s)
+    widths_m = np.zeros(MOST_SETS)
+    sets = min(int(values['path_sets']), MOST_SETS)
+    widths_m[1:max(sets, 1)] = path_widths_m(
+        sets, values['path_shortest_m'], values['path_longest_m'])
     return values_of(PARAMETERS, {
-        **values, 'period_s': period_s, 'delay_ticks': delay,
+        **values, 'path_width_m': widths_m, 'period_s': period_s, 'delay_ticks': delay,
         'spread_ticks': min(round(values['credit_spread_s'] / period_s), delay),
         # The preview covers the dead time; what the valve lags besides is filtered.
         'answer_ticks': round(values['lead_s'] / period_s)})

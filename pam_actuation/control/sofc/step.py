@@ -27,7 +27,8 @@ import numpy as np
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.sofc import credit, dynamics, guard, learning
+from pam_actuation.control.sofc import (
+    credit, dynamics, guard, learning, muscle_model, predictor)
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
@@ -132,8 +133,8 @@ def _reason(par: np.record, ring: Ring, st: np.record, inp: np.record, error: fl
 def _learn(par: np.record, values: Tables, initial: Tables, ring: Ring,
            st: np.record) -> tuple[float, float, float]:
     """Modify the rules whose indices are now all known; return the squares of the changes."""
-    feedback, feedforward, motion = values
-    first_feedback, first_feedforward, first_motion = initial
+    feedback, feedforward, motion, _ = values
+    first_feedback, first_feedforward, first_motion, _ = initial
     tick = int(st.tick)
     spread = int(par.spread_ticks)
     entry = ring[credit.row_of(ring, tick, int(par.delay_ticks) + spread)]
@@ -175,7 +176,7 @@ def _learn(par: np.record, values: Tables, initial: Tables, ring: Ring,
 def _count(fired: Tables, share: float, i: int, wi: float, j: int, wj: float, k: int, wk: float,
            m: int, wm: float, n: int, wn: float) -> None:
     """Add the firing strengths of this tick to the counts of the rules."""
-    feedback, feedforward, motion = fired
+    feedback, feedforward, motion, _ = fired
     for d in range(2):
         direction = share if d == 0 else 1.0 - share
         feedback[d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
@@ -224,7 +225,7 @@ def _passes(par: np.record, st: np.record, knot_place: float, motion_place: floa
 def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
           kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``sofc_step``."""
-    feedback_rules, feedforward_rules, motion_rules = values
+    feedback_rules, feedforward_rules, motion_rules, path_rules = values
     period = par.period_s
     if st.started < 0.5:
         _start(par, inverse, values, kept, st, inp)
@@ -277,8 +278,24 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
 
     # Inference and trim.
     base = inverse_pressure_pa(inverse, lead)
+    model = st.model
+    pressure = inp.pressure_pa if math.isfinite(inp.pressure_pa) else st.expected_pa
+    predictor.engage(par, model, error)
+    muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, inp.pressure_pa)
+    muscle_model.go(par, model.lead_path, way)
+    path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
+            + muscle_model.numbers_pa(par, model, model.lead_path, lead))
     dynamic = dynamics.dynamic_pressure_pa(
-        par, st, base, lead_rate, st.history_ticks < 0.5 or lead_jump != 0.0)
+        par, st, base + par.lag_share * path, lead_rate,
+        st.history_ticks < 0.5 or lead_jump != 0.0,
+        muscle_model.damping_pa_s_per_m(par, model), muscle_model.inertia_pa_s2_per_m(par, model))
+    predicted = 0.0
+    acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
+    if acts and st.history_ticks >= par.answer_ticks:
+        ahead_m, ahead_rate = predictor.predict(
+            par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure)
+        predicted = predictor.predicted_feedback_pa(
+            par, model, lead - ahead_m, lead_rate - ahead_rate)
     feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
     feedforward = infer_feedforward(feedforward_rules, share, k, wk)
     motion = infer_motion(motion_rules, m, wm, n, wn)
@@ -288,7 +305,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     st.integral_shape = dynamics.load_shape(par, lead)
     trim = integral * st.integral_shape
     wanted = (base + dynamic + feedback + feedforward + motion
-              + proportional + trim + derivative)
+              + proportional + trim + derivative
+              + path + model.disturbance_pa + predicted)
 
     # The limits of the actuator, then of its speed.
     lowest = P_ATM_PA + par.min_pressure_gauge_pa
@@ -335,9 +353,15 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     fb_squares = 0.0
     ff_squares = 0.0
     motion_squares = 0.0
+    path_squares = 0.0
     entry.index_m = index if reason == learning.LEARNING else 0.0
-    if reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE:
+    learns = reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE
+    surprised = reason == learning.FROZEN_SURPRISE
+    if learns or surprised:
+        muscle_model.find_numbers(par, model, surprised)
+    if learns:
         fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
+        path_squares = muscle_model.learn(par, path_rules, fired[3], model)
     _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
     out.command_pa = command
@@ -348,6 +372,9 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     out.feedback_rules_pa = feedback
     out.feedforward_rules_pa = feedforward
     out.motion_rules_pa = motion
+    out.path_rules_pa = path
+    out.disturbance_pa = model.disturbance_pa
+    out.predicted_feedback_pa = predicted
     out.proportional_pa = proportional
     out.integral_pa = trim
     out.derivative_pa = derivative
@@ -372,6 +399,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     out.feedback_rule_change_norm_pa = par.feedback_gain_pa * math.sqrt(fb_squares)
     out.feedforward_rule_change_norm_pa = math.sqrt(ff_squares)
     out.motion_rule_change_norm_pa = math.sqrt(motion_squares)
+    out.path_rule_change_norm_pa = math.sqrt(path_squares)
     out.start_offset_m = offset
     out.jump_to_go_m = to_go
     st.tick += 1.0
@@ -390,7 +418,7 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
         guard.restart_window(st)      # such errors tell nothing about the rules
     elif par.guard_ratio > 0.0 and guard.watch(
             par, st, error, inp.reference_rate_m_per_s, values, kept):
-        feedback, feedforward, motion = values
+        feedback, feedforward, motion, path = values
         share = out.contracting_share
         restored = (
             par.feedback_gain_pa * infer_feedback(
@@ -400,8 +428,11 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
                 feedforward, share, int(out.reference_knot), out.reference_knot_degree)
             + infer_motion(
                 motion, int(out.motion_knot), out.motion_knot_degree,
-                int(out.motion_rate_knot), out.motion_rate_knot_degree))
-        before = out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
+                int(out.motion_rate_knot), out.motion_rate_knot_degree)
+            + muscle_model.rules_pa(par, path, st.model.lead_path, st.lead_m)
+            + muscle_model.numbers_pa(par, st.model, st.model.lead_path, st.lead_m))
+        before = (out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
+                  + out.path_rules_pa)
         limit = par.integral_limit_pa
         st.integral_pa = min(
             max(st.integral_pa + (before - restored) / st.integral_shape, -limit), limit)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 NOTHING_KPA, LITTLE_KPA, MUCH_KPA = 0.05, 2.0, 10.0
 _ACTS_PA = 1.0            # a rule whose output is smaller does nothing
-DIRECTION = 'direction'
+DIRECTION, PATH = 'direction', 'path'
 # SI unit -> factor and unit for people.
 SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'm/s': (1e3, 'mm/s'),
          'rad': (180.0 / math.pi, 'deg'), 'rad/s': (180.0 / math.pi, 'deg/s')}
@@ -99,10 +99,12 @@ def sentence(table: 'RuleTable', place: tuple[int, ...]) -> str:
         Index of the rule, one entry per antecedent.
 
     """
-    named, knots, direction = [], [], ''
+    named, knots, direction, path = [], [], '', ''
     for antecedent, index in zip(table.antecedents, place):
         if antecedent.name == DIRECTION:
             direction = antecedent.words[index]
+        elif antecedent.name == PATH:
+            path = _path(antecedent, index)
         elif antecedent.words:
             named.append(f'{antecedent.name} is {antecedent.words[index]}')
         else:
@@ -111,7 +113,8 @@ def sentence(table: 'RuleTable', place: tuple[int, ...]) -> str:
     if named:
         side = f' ({direction})' if direction else ''
         return f'if {" and ".join(named + knots)}{side} then {_action(size_kpa)}'
-    return f'{", ".join(knots + [direction] * bool(direction))}: {_addition(size_kpa)}'
+    places = knots + [word for word in (direction, path) if word]
+    return f'{", ".join(places)}: {_addition(size_kpa)}'
 
 
 def _near(antecedent: 'Antecedent', index: int) -> str:
@@ -123,6 +126,15 @@ def _near(antecedent: 'Antecedent', index: int) -> str:
         return 'at rest'
     up, down = WAYS.get(antecedent.unit, ('rising', 'falling'))
     return f'{up if value > 0 else down} at {number(abs(value))} {unit}'
+
+
+def _path(antecedent: 'Antecedent', index: int) -> str:
+    """Return in words which path led there; the rule takes off as much after the opposite one."""
+    if index == 0:
+        return 'after any path'
+    value, unit = shown(float(antecedent.knots[index]), antecedent.unit)
+    up, down = WAYS.get(f'{antecedent.unit}/s', ('rising', 'falling'))
+    return f'after {up} by {number(value)} {unit} (after {down} the opposite)'
 
 
 def _action(size_kpa: float) -> str:

@@ -1,0 +1,259 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A model of the muscle within the controller, learned from the measured pressure.
+
+The static inverse and the feed-forward of moving give the pressure a motion should take. What is
+measured differs by friction, creep, load and errors of the force map::
+
+    residual = p - p_static(x) - k_v dx/dt - k_a d2x/dt2
+
+Contraction and pressure pass the same two low passes, so that they belong to the same moment.
+The residual has neither dead time nor lag of the valve in it, and needs no reference.
+
+A few *numbers* hold everywhere: offset, slope, friction for every set of the path, damping and
+inertia. Recursive least squares find them within seconds. *Path rules* learn the rest as a
+function of contraction and of the path before. This is direct inverse learning (Jordan and
+Rumelhart 1992). The degrees of the path are those of play operators of several widths, so the
+rules are the inverse of a Prandtl-Ishlinskii operator whose weights depend on the contraction.
+What is not explained yet is the *disturbance* (observer of Ohnishi). All are added to the
+feed-forward.
+"""
+
+import math
+
+import numpy as np
+from pam_actuation.control.sofc.membership import locate
+from pam_actuation.control.sofc.rule_table import infer_path
+from pam_actuation.control.sofc.rule_text import MOST_SETS
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled
+from pam_sim.records import record
+
+_LIFTED_M = 5e-4          # below this contraction the pressure says nothing of the muscle
+_MOVES_M_PER_S = 2e-3     # from this rate on a residual counts in full: at rest friction hides it
+_FADE = 0.99              # per tick, of a disturbance that is not observed any more
+
+# Numbers of the model that hold everywhere: offset, slope, the sets of the path beyond that of
+# any path, damping, inertia.
+_RATE, _ACCELERATION = 1 + MOST_SETS, 2 + MOST_SETS
+NUMBERS = 3 + MOST_SETS
+_SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5      # their scales
+_UNKNOWN_PA = 2e4         # standard deviation of each before the first measurement
+
+MODEL = record(
+    'known',                          # 1 once the filters have begun
+    'contraction_once_m',             # behind the first low pass
+    'contraction_m',                  # behind both
+    'rate_m_per_s',
+    'pressure_once_pa',
+    'pressure_pa',
+    'acceleration_m_per_s2',
+    ('number_pa', NUMBERS),           # the numbers of the model
+    ('covariance_pa2', NUMBERS * NUMBERS),
+    ('gain', NUMBERS),                # work space: of the update, and what the numbers multiply
+    ('regressor', NUMBERS),
+    ('path', MOST_SETS),              # degrees of the measured path
+    ('lead_path', MOST_SETS),         # the same of the reference one preview ahead
+    ('predicted_path', MOST_SETS),
+    'innovation_pa',                  # residual less the path rules
+    'disturbance_pa',
+    'fast_contraction_m',             # for the rate the prediction begins with
+    'feedback_pa',                    # on the predicted error, filtered
+    'squared_error_m2',               # of the reference, mean
+    'strength',                       # 0 to 1, of that feedback and of the disturbance
+)
+
+
+@compiled
+def go(par: np.record, path: FloatArray, way_m: float) -> None:
+    """Advance the degrees of a path; that of any path is 1, the others are -1 to 1."""
+    path[0] = 1.0
+    for q in range(1, int(par.path_sets)):
+        degree = path[q] + way_m / par.path_width_m[q]
+        path[q] = min(max(degree, -1.0), 1.0)
+
+
+@compiled
+def rules_pa(par: np.record, rules: FloatArray, path: FloatArray, contraction_m: float) -> float:
+    """Return what the path rules add at a contraction [Pa]."""
+    if par.path_sets < 1.0:
+        return 0.0
+    k, wk = locate(contraction_m, par.reference_lower_m, par.reference_upper_m, rules.shape[1])
+    return infer_path(rules, path, k, wk)
+
+
+@compiled
+def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: float) -> float:
+    """Return what offset, slope and path of the model add at a contraction [Pa]."""
+    if not par.model_noise_pa > 0.0:
+        return 0.0
+    middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
+    total: float = st.number_pa[0] + st.number_pa[1] * (contraction_m - middle) / _SPAN_M
+    for q in range(1, int(par.path_sets)):
+        total += st.number_pa[1 + q] * path[q]
+    return total
+
+
+@compiled
+def damping_pa_s_per_m(par: np.record, st: np.record) -> float:
+    """Return the pressure per rate: the setting and what the model found."""
+    found: float = par.rate_feedforward_pa_s_per_m + st.number_pa[_RATE] / _RATE_M_PER_S
+    return max(found, 0.0)
+
+
+@compiled
+def inertia_pa_s2_per_m(par: np.record, st: np.record) -> float:
+    """Return the pressure per acceleration: the setting and what the model found."""
+    setting: float = par.acceleration_feedforward_pa_s2_per_m
+    found = setting + st.number_pa[_ACCELERATION] / _ACCELERATION_M_PER_S2
+    return min(max(found, 0.5 * setting), 2.0 * setting)
+
+
+@compiled
+def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
+    """
+    Correct the numbers of the model by the innovation: recursive least squares.
+
+    In the form of a Kalman filter whose numbers drift: one that the motion does not tell keeps its
+    value, and its variance ends at that of the start.
+    """
+    if not par.model_noise_pa > 0.0 or st.contraction_m < _LIFTED_M or st.known < 0.5:
+        return
+    middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
+    phi, gain, cov = st.regressor, st.gain, st.covariance_pa2
+    phi[0] = 1.0
+    phi[1] = (st.contraction_m - middle) / _SPAN_M
+    for q in range(1, MOST_SETS):
+        phi[1 + q] = st.path[q] if q < par.path_sets else 0.0
+    phi[_RATE] = st.rate_m_per_s / _RATE_M_PER_S
+    phi[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
+    first = _UNKNOWN_PA * _UNKNOWN_PA
+    drift = par.model_drift_pa * par.model_drift_pa * par.period_s
+    if surprised:
+        for i in range(2):
+            for j in range(NUMBERS):
+                cov[i * NUMBERS + j] = 0.0
+                cov[j * NUMBERS + i] = 0.0
+    for i in range(NUMBERS):
+        at = i * NUMBERS + i
+        if cov[at] == 0.0:
+            cov[at] = first
+        elif cov[at] < first:
+            cov[at] += drift
+    moves = min(abs(st.rate_m_per_s) / _MOVES_M_PER_S, 1.0)
+    if moves < 0.1:
+        return
+    power = par.model_noise_pa * par.model_noise_pa / moves
+    for i in range(NUMBERS):
+        gain[i] = 0.0
+        for j in range(NUMBERS):
+            gain[i] += cov[i * NUMBERS + j] * phi[j]
+        power += gain[i] * phi[i]
+    for i in range(NUMBERS):
+        st.number_pa[i] += gain[i] * st.innovation_pa / power
+        for j in range(NUMBERS):
+            cov[i * NUMBERS + j] -= gain[i] * gain[j] / power
+
+
+@compiled
+def _begin(st: np.record, contraction_m: float, pressure_pa: float) -> None:
+    """Begin the filters where the muscle is."""
+    st.known = 1.0
+    st.contraction_once_m = contraction_m
+    st.contraction_m = contraction_m
+    st.fast_contraction_m = contraction_m
+    st.pressure_once_pa = pressure_pa
+    st.pressure_pa = pressure_pa
+
+
+@compiled
+def _low_pass(former: float, value: float, part: float) -> float:
+    return former + part * (value - former)
+
+
+@compiled
+def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record,
+            contraction_m: float, pressure_pa: float) -> None:
+    """
+    Compare one measurement with the model; ``st`` is a ``MODEL``.
+
+    A pressure that is not finite leaves the disturbance to fade.
+    """
+    period = par.period_s
+    if not math.isfinite(pressure_pa):
+        st.known = 0.0
+        st.innovation_pa = 0.0
+        st.disturbance_pa *= _FADE
+        return
+    if st.known < 0.5:
+        _begin(st, contraction_m, pressure_pa)
+    part = period / (par.model_filter_s + period)
+    former_m, former_rate = st.contraction_m, st.rate_m_per_s
+    once_m = _low_pass(st.contraction_once_m, contraction_m, part)
+    x = _low_pass(former_m, once_m, part)
+    once_pa = _low_pass(st.pressure_once_pa, pressure_pa, part)
+    p = _low_pass(st.pressure_pa, once_pa, part)
+    rate = (x - former_m) / period
+    acceleration = (rate - former_rate) / period
+    st.contraction_once_m, st.contraction_m = once_m, x
+    st.pressure_once_pa, st.pressure_pa = once_pa, p
+    st.rate_m_per_s, st.acceleration_m_per_s2 = rate, acceleration
+    go(par, st.path, x - former_m)
+    innovation = (
+        p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st) * rate
+        - inertia_pa_s2_per_m(par, st) * acceleration
+        - numbers_pa(par, st, st.path, x) - rules_pa(par, rules, st.path, x))
+    st.innovation_pa = innovation
+    if not par.disturbance_time_s > 0.0 or x < _LIFTED_M:
+        st.disturbance_pa *= _FADE
+        return
+    share = st.strength * period / (par.disturbance_time_s + period)
+    limit = par.integral_limit_pa
+    disturbance = _low_pass(st.disturbance_pa, innovation, share)
+    st.disturbance_pa = min(max(disturbance, -limit), limit)
+
+
+@compiled
+def learn(par: np.record, rules: FloatArray, fired: FloatArray, st: np.record) -> float:
+    """
+    Change the path rules by what the model did not explain; return the squared norm [Pa^2].
+
+    Normalised least mean squares: the active rules together mend ``path_learning`` of it.
+    """
+    if par.path_sets < 1.0 or st.contraction_m < _LIFTED_M or st.known < 0.5:
+        return 0.0
+    k, wk = locate(st.contraction_m, par.reference_lower_m, par.reference_upper_m, rules.shape[1])
+    moves = min(abs(st.rate_m_per_s) / _MOVES_M_PER_S, 1.0)
+    power = 0.0
+    sets = int(par.path_sets)
+    for q in range(sets):
+        power += st.path[q] * st.path[q]
+    power *= (1.0 - wk) * (1.0 - wk) + wk * wk
+    rate = par.path_learning * max(st.strength, par.path_learning_floor)
+    gain = rate * moves * st.innovation_pa / power
+    squares = 0.0
+    for q in range(sets):
+        for a in range(2):
+            degree = st.path[q] * (wk if a == 1 else 1.0 - wk)
+            step = min(max(gain * degree, -par.feedforward_step_limit_pa),
+                       par.feedforward_step_limit_pa)
+            limit = par.feedforward_limit_pa
+            new = min(max(rules[q, k + a] + step, -limit), limit)
+            squares += (new - rules[q, k + a]) * (new - rules[q, k + a])
+            rules[q, k + a] = new
+            fired[q, k + a] += abs(degree)
+    return squares

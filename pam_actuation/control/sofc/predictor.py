@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Feedback on the error that is on its way.
+
+The model of the muscle goes on from the last measurement with the commands under way. It predicts
+contraction and rate for the moment at which a command of now arrives. Feedback on that error has
+no dead time in its loop (Smith 1957; in the time domain Manitius and Olbrot 1979).
+"""
+
+import numpy as np
+from pam_actuation.control.sofc import credit
+from pam_actuation.control.sofc.credit import Ring
+from pam_actuation.control.sofc.muscle_model import (
+    damping_pa_s_per_m, go, inertia_pa_s2_per_m, numbers_pa, rules_pa)
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled
+
+
+@compiled
+def engage(par: np.record, st: np.record, error_m: float) -> None:
+    """
+    Decide how much predicted feedback and disturbance act.
+
+    Where errors are large they act in full. Where the rules already do it, they step back:
+    a strong feedback adds noise and takes the rules the error they learn from.
+    """
+    if not par.half_strength_m > 0.0:
+        st.strength = 1.0
+        return
+    square = error_m * error_m
+    share = par.period_s / (par.strength_time_s + par.period_s)
+    st.squared_error_m2 += share * (square - st.squared_error_m2)
+    half = par.half_strength_m * par.half_strength_m
+    st.strength = st.squared_error_m2 / (st.squared_error_m2 + half)
+
+
+@compiled
+def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
+            st: np.record, contraction_m: float,
+            pressure_pa: float) -> tuple[float, float]:
+    """
+    Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
+
+    The model goes on from the measurement with the commands of the ``answer_ticks`` before.
+    """
+    period = par.period_s
+    part = period / (par.predicted_rate_filter_s + period)
+    moved = part * (contraction_m - st.fast_contraction_m)
+    st.fast_contraction_m += moved
+    x, rate, p = contraction_m, moved / period, pressure_pa
+    for q in range(int(par.path_sets)):
+        st.predicted_path[q] = st.path[q]
+    lag = period / (par.valve_lag_s + period)
+    damping, inertia = damping_pa_s_per_m(par, st), inertia_pa_s2_per_m(par, st)
+    ticks = int(par.answer_ticks)
+    for ago in range(ticks, 0, -1):
+        p += lag * (ring[credit.row_of(ring, tick, ago)].command_pa - p)
+        go(par, st.predicted_path, rate * period)
+        missing = (
+            p - inverse_pressure_pa(inverse, x) - damping * rate
+            - numbers_pa(par, st, st.predicted_path, x)
+            - rules_pa(par, rules, st.predicted_path, x) - st.disturbance_pa)
+        rate += period * missing / inertia
+        x += period * rate
+    return x, rate
+
+
+@compiled
+def predicted_feedback_pa(par: np.record, st: np.record, error_m: float,
+                          change_m_per_s: float) -> float:
+    """Return the feedback on the predicted error and its change [Pa], ahead of the valve's lag."""
+    raw = st.strength * (
+        par.predicted_proportional_pa_per_m * error_m
+        + par.predicted_derivative_pa_s_per_m * change_m_per_s)
+    step = par.period_s / (par.predicted_filter_s + par.period_s) * (raw - st.feedback_pa)
+    st.feedback_pa += step
+    return st.feedback_pa + par.valve_lag_s * step / par.period_s

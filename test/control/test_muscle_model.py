@@ -1,0 +1,199 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The model within the self-organizing controller: path rules, disturbance, prediction."""
+
+import math
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc import muscle_model
+from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
+from pam_actuation.control.sofc.muscle_model import MODEL
+from pam_actuation.control.sofc.persistence import load_rules
+from pam_actuation.control.sofc.rule_text import rules_to_mapping
+from pam_actuation.control.sofc.settings import PARAMETERS
+from pam_actuation.control.sofc.words import sentence
+from pam_actuation.control.static_inverse import inverse_pressure_pa, tabulate_static_inverse
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.replay.controller import replay_controller
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.random_rigs import random_rigs
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.records import fields, zeros
+import pytest
+
+PERIOD_S = 0.005
+RANDOM_MOTION = """
+name: random
+segments:
+  - rest: {duration_s: 1.0}
+  - ramp: {to_m: 0.014, duration_s: 2.0}
+  - multisine: {center_m: 0.014, amplitude_m: 0.008, min_hz: 0.02, max_hz: 1.0, lines: 40,
+                duration_s: 31.0, seed: 77}
+"""
+PATHS = {'path_sets': 4, 'path_shortest_m': 2e-4, 'path_longest_m': 2e-3, 'path_learning': 0.1}
+
+
+@pytest.fixture(scope='module')
+def inverse():
+    return tabulate_static_inverse(load_rig('dmsp_5_300_hanging_mass'))
+
+
+def controller_with(inverse, **settings):
+    return SelfOrganizingFuzzyController(inverse, {**PATHS, **settings}, rig_name='a/ppr')
+
+
+def observed(controller, contraction_m, pressure_pa):
+    """Let the model of a controller see a motion and learn from it; return its innovations."""
+    par = fields(controller.parameters, PARAMETERS)
+    model = zeros(MODEL)
+    st = fields(model, MODEL)
+    st.strength = 1.0
+    innovations = []
+    for x, p in zip(contraction_m, pressure_pa):
+        muscle_model.observe(par, controller.static_inverse, controller.rules.path, st, x, p)
+        muscle_model.learn(par, controller.rules.path, controller.rules.path_fired, st)
+        innovations.append(float(st.innovation_pa))
+    return np.array(innovations)
+
+
+def slow_motion(seconds=60.0):
+    """Return a contraction [m] of many amplitudes, so slow that only its path matters."""
+    t = np.arange(0.0, seconds, PERIOD_S)
+    return 0.014 + 0.005 * np.sin(1.3 * t) + 0.003 * np.sin(0.41 * t)
+
+
+def play_pressure_pa(contraction_m, width_m=7e-4, level_pa=8e3):
+    """Return the pressure [Pa] a slip element adds."""
+    state, out = 0.0, []
+    for way in np.diff(contraction_m, prepend=contraction_m[0]):
+        state = min(max(state + way / width_m, -1.0), 1.0)
+        out.append(level_pa * state)
+    return np.array(out)
+
+
+def test_nothing_is_left_where_the_muscle_is_as_the_inverse_says(inverse):
+    controller = controller_with(
+        inverse, rate_feedforward_pa_s_per_m=0.0, acceleration_feedforward_pa_s2_per_m=0.0)
+    x = slow_motion(10.0)
+    p = [inverse_pressure_pa(controller.static_inverse, one) for one in x]
+    assert np.abs(observed(controller, x, p)[20:]).max() < 60.0
+
+
+def test_path_rules_learn_a_friction_loop_and_know_it_on_another_motion(inverse):
+    controller = controller_with(inverse)
+    x = slow_motion()
+    static = np.array([inverse_pressure_pa(inverse, one) for one in x])
+    observed(controller, x, static + play_pressure_pa(x))
+    t = np.arange(0.0, 20.0, PERIOD_S)
+    other = 0.013 + 0.004 * np.sin(0.9 * t) + 0.002 * np.sin(2.3 * t)
+    static = np.array([inverse_pressure_pa(inverse, one) for one in other])
+    taught = controller.rules.path.copy()
+    again = observed(controller, other, static + play_pressure_pa(other))
+    fresh = controller_with(inverse, path_learning=0.0)
+    untaught = observed(fresh, other, static + play_pressure_pa(other))
+    assert np.sqrt(np.mean(untaught[200:] ** 2)) > 4e3
+    assert np.sqrt(np.mean(again[200:] ** 2)) < 0.2 * np.sqrt(np.mean(untaught[200:] ** 2))
+    assert np.abs(taught).max() <= controller.settings['feedforward_limit_pa']
+
+
+def test_a_sensor_of_pressure_that_is_lost_lets_the_disturbance_fade(inverse):
+    controller = controller_with(inverse, disturbance_time_s=0.05, path_learning=0.0)
+    par = fields(controller.parameters, PARAMETERS)
+    model = zeros(MODEL)
+    st = fields(model, MODEL)
+    st.strength = 1.0
+    held_pa = inverse_pressure_pa(inverse, 0.014) + 20e3
+    for _ in range(200):
+        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, held_pa)
+    assert st.disturbance_pa == pytest.approx(20e3, rel=0.02)
+    before = st.disturbance_pa
+    muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, math.nan)
+    assert 0.9 * before < st.disturbance_pa < before
+    for _ in range(2000):
+        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, math.nan)
+    assert abs(st.disturbance_pa) < 1.0
+
+
+def test_without_path_rules_a_file_is_that_of_before(inverse):
+    plain = SelfOrganizingFuzzyController(inverse, {}, rig_name='a/ppr')
+    mapping = rules_to_mapping(plain.rules)
+    assert 'path' not in mapping and 'path' not in mapping['shape']
+    assert not set(PATHS) & set(mapping['scaling'])
+    assert [table.name for table in plain.rules.tables()] == ['feedback', 'feedforward', 'motion']
+
+
+def test_path_rules_come_back_from_a_file(inverse, tmp_path):
+    controller = controller_with(inverse)
+    controller.rules.path[1, 3] = 4e3
+    controller.rules.path_fired[1, 3] = 2.0
+    controller.rules.save(tmp_path / 'rules.json')
+    back = load_rules(tmp_path / 'rules.json', controller.rules)
+    assert np.array_equal(back.path, controller.rules.path)
+    assert back.digest() == controller.rules.digest()
+    other = controller_with(inverse, path_longest_m=1e-3)
+    with pytest.raises(InputError, match='path_longest_m'):
+        load_rules(tmp_path / 'rules.json', other.rules)
+    plain = SelfOrganizingFuzzyController(inverse, {}, rig_name='a/ppr')
+    with pytest.raises(InputError, match='path_sets 4 .here not stated'):
+        load_rules(tmp_path / 'rules.json', plain.rules)
+
+
+def test_a_path_rule_reads_as_a_sentence(inverse):
+    controller = controller_with(inverse)
+    table = {one.name: one for one in controller.rules.tables()}['path']
+    controller.rules.path[2, 10] = 3e3
+    assert sentence(table, (2, 10)) == (
+        'near 12.5 mm, after contracting by 0.632 mm (after extending the opposite): add 3.0 kPa')
+    controller.rules.path[0, 0] = -1e3
+    assert sentence(table, (0, 0)) == 'near 0 mm, after any path: take off 1.0 kPa'
+
+
+def test_exchanged_path_rules_make_no_step_in_the_command(inverse):
+    controller = controller_with(inverse)
+    standing = (0.014, 0.014, 0.0, 0.014, 0.0, True, math.nan, 4e5)
+    for _ in range(50):
+        command = controller.step(*standing)
+    taught = controller.rules.copy()
+    taught.path[0] = 5e3
+    controller.replace_rules(taught)
+    assert controller.step(*standing) == pytest.approx(command, abs=200.0)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_motion_nobody_announced_is_followed_from_the_first_seconds(valve):
+    nominal = load_rig('dmsp_5_300_realistic', valve=valve)
+    rig, = random_rigs(nominal, 1, seed=31)
+    loop = ClosedLoop(rig, load_experiment(RANDOM_MOTION), seed=5, preview_s=0.0,
+                      driver=driver_config(nominal))
+    errors = {name: loop.run(load_controller(name, nominal)).rmse_m(3.0, 33.0) for name in (
+        f'sofc_model_{valve}', f'sofc_{valve}', 'lqi' if valve == 'ppr' else 'lqi_hsv')}
+    with_model, *others = errors.values()
+    assert with_model < 0.5 * min(others)
+
+
+def test_a_recording_with_a_model_replays_to_the_bit(tmp_path):
+    rig = load_rig('dmsp_5_300_realistic')
+    experiment = load_experiment(RANDOM_MOTION.replace('duration_s: 31.0', 'duration_s: 6.0'))
+    controller = load_controller('sofc_model_ppr', rig)
+    simulate_experiment(experiment, rig, controller, tmp_path / 'bag', seed=2)
+    replayed = replay_controller(load_run(tmp_path / 'bag'), keep_states=True)
+    assert replayed.identical
+    assert np.abs(replayed.states['path_rules_pa']).max() > 1e3
+    assert np.abs(replayed.states['predicted_feedback_pa']).max() > 1e2
