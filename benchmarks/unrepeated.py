@@ -1,0 +1,191 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How well controllers track motions that never repeat and steps that nobody announced.
+
+Run ``python benchmarks/unrepeated.py``, with ``--valve ppr`` and ``--controller sofc_ppr`` for a
+part of it, ``--quick`` for one motion and two rigs. Offline, in compiled closed loop with sensor
+noise; errors are those of the muscle. No seed of motion, noise or rigs was used for a search.
+
+random  a sum of 40 sines of random phase from 0.02 to 1 Hz, at most 8 mm about 14 mm, told as it
+        comes or 0.3 s ahead: root mean square error of the first 30 s, untaught, and from 60 s on
+rigs    the same on random rigs a data sheet does not tell of; the driver knows the nominal rig
+step    10 mm up and down, not announced, on random rigs after 60 s of the random motion
+gait    knee flexion whose cadence changes every five strides, from the third stride on
+"""
+
+import argparse
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.random_rigs import random_rigs
+from pam_sim import load_rig
+import results_page
+
+RIG = 'dmsp_5_300_realistic'
+CONTROLLERS = {
+    'ppr': ('sofc_model_ppr', 'sofc_ppr', 'lqi_random', 'pid_random', 'pid_plain_random', 'lqi'),
+    'hsv': ('sofc_model_hsv', 'sofc_hsv', 'lqi_random_hsv', 'pid_random_hsv',
+            'pid_plain_random_hsv', 'lqi_hsv')}
+SEEDS = range(501, 506)
+RIGS, RIG_SEED = 30, 700
+DURATION_S = 100.0
+BEGIN_S = 3.0                     # end of rest and ramp
+IN_TIME_S = {'ppr': 0.6, 'hsv': 0.8}
+SETTLED_M = 1e-4
+STEPS, STEP_HOLD_S, STEPS_FROM_S = 4, 5.0, 64.0
+CADENCES_HZ = (0.6, 0.9, 0.7, 1.1, 0.8, 1.0)
+
+
+def random_motion(seed, duration_s=DURATION_S, then=''):
+    """Return the experiment: up to the middle, then the motion, then further segments."""
+    return load_experiment(f"""
+name: random
+segments:
+  - rest: {{duration_s: 1.0}}
+  - ramp: {{to_m: 0.014, duration_s: 2.0}}
+  - multisine: {{center_m: 0.014, amplitude_m: 0.008, min_hz: 0.02, max_hz: 1.0, lines: 40,
+                duration_s: {duration_s}, seed: {seed}}}
+{then}""")
+
+
+def steps_after_motion(seed):
+    """Return the experiment: 60 s of random motion, then steps of 10 mm up and down."""
+    steps = ''.join(f'  - step: {{to_m: {to_m}, duration_s: {STEP_HOLD_S}}}\n'
+                    for _ in range(STEPS // 2) for to_m in (0.018, 0.008))
+    ramp = '  - ramp: {to_m: 0.008, duration_s: 1.0}\n'
+    return random_motion(seed, STEPS_FROM_S - 4.0, f'{ramp}{steps}')
+
+
+def gait():
+    """Return the experiment: a knee whose cadence changes every five strides."""
+    strides = ''.join(
+        f'  - knee_gait: {{low_m: 0.006, high_m: 0.022, frequency_hz: {cadence_hz}, cycles: 5}}\n'
+        for cadence_hz in CADENCES_HZ)
+    return load_experiment(f"""
+name: gait
+segments:
+  - rest: {{duration_s: 1.0}}
+  - ramp: {{to_m: 0.006, duration_s: 2.0}}
+{strides}""")
+
+
+def closed_loop(rig, experiment, seed, preview_s):
+    """Return the closed loop with the driver of the nominal rig."""
+    return ClosedLoop(rig, experiment, seed=seed, preview_s=preview_s,
+                      driver=driver_config(load_rig(RIG, valve=rig.valve)))
+
+
+def errors_mm(result):
+    """Return the root mean square errors [mm] of the first 30 s and from 60 s on."""
+    return [1e3 * result.rmse_m(BEGIN_S, BEGIN_S + 30.0),
+            1e3 * result.rmse_m(BEGIN_S + 60.0, BEGIN_S + DURATION_S)]
+
+
+def step_figures(result):
+    """Return (settling time [s], overshoot [%]) of every step of a run."""
+    figures = []
+    for k in range(STEPS):
+        start_s = STEPS_FROM_S + k * STEP_HOLD_S
+        inside = (result.time_s >= start_s) & (result.time_s < start_s + STEP_HOLD_S)
+        error_m = result.error_m[inside] * (1 if k % 2 == 0 else -1)
+        outside = np.flatnonzero(np.abs(error_m) > SETTLED_M)
+        settled_s = (result.time_s[inside] - start_s)[outside[-1]] if outside.size else 0.0
+        figures.append((settled_s, max(0.0, -1e2 * float(error_m.min()) / 0.01)))
+    return figures
+
+
+def show_random(valve, controllers, seeds):
+    """Print the errors on the rig the controllers were made for."""
+    rig = load_rig(RIG, valve=valve)
+    print(f'\n## Random motion, {valve}: RMSE [mm]\n')
+    print('| controller | not announced: first 30 s | from 60 s | 0.3 s ahead: first 30 s '
+          '| from 60 s |')
+    print('|---|' + '---|' * 4)
+    for name in controllers:
+        cells = [np.mean([errors_mm(closed_loop(rig, random_motion(seed), seed, preview_s).run(
+            load_controller(name, rig))) for seed in seeds], axis=0) for preview_s in (0.0, 0.3)]
+        print(f'| {name} | ' + ' | '.join(f'{cell:.3f}' for cell in np.ravel(cells)) + ' |',
+              flush=True)
+
+
+def show_rigs(valve, controllers, count):
+    """Print errors and steps on random rigs, nothing announced."""
+    nominal = load_rig(RIG, valve=valve)
+    rigs = random_rigs(nominal, count, seed=RIG_SEED)
+    print(f'\n## {count} random rigs, {valve}: random motion [mm] and steps, not announced\n')
+    print('| controller | first 30 s: median | worst | from 60 s: median | worst '
+          f'| steps within {IN_TIME_S[valve]:g} s [%] | median [s] | largest overshoot [%] |')
+    print('|---|' + '---|' * 7)
+    for name in controllers:
+        runs = [closed_loop(rig, random_motion(RIG_SEED + k), k, 0.0).run(
+            load_controller(name, nominal)) for k, rig in enumerate(rigs)]
+        first, late = np.transpose([errors_mm(run) for run in runs])
+        settled_s, overshoot = np.transpose([
+            figure for k, rig in enumerate(rigs) for figure in step_figures(closed_loop(
+                rig, steps_after_motion(RIG_SEED + k), k, 0.0).run(
+                    load_controller(name, nominal)))])
+        print(f'| {name} | {np.median(first):.3f} | {first.max():.3f} | {np.median(late):.3f} '
+              f'| {late.max():.3f} | {100.0 * np.mean(settled_s <= IN_TIME_S[valve]):.0f} '
+              f'| {np.median(settled_s):.2f} | {overshoot.max():.1f} |', flush=True)
+
+
+def show_gait(valve, controllers):
+    """Print the error of a gait whose cadence changes."""
+    rig = load_rig(RIG, valve=valve)
+    experiment = gait()
+    start_s = BEGIN_S + 2.0 / CADENCES_HZ[0]
+    print(f'\n## Gait of changing cadence from the third stride on, {valve}\n')
+    print('| controller | not announced [mm] | of the stroke [%] | 0.3 s ahead [mm] '
+          '| of the stroke [%] |')
+    print('|---|' + '---|' * 4)
+    for name in controllers:
+        cells = []
+        for preview_s in (0.0, 0.3):
+            result = closed_loop(rig, experiment, SEEDS[0], preview_s).run(
+                load_controller(name, rig))
+            error_mm = 1e3 * result.rmse_m(start_s, experiment.duration_s)
+            cells += [f'{error_mm:.3f}', f'{0.1 * error_mm / np.ptp(result.reference_m):.2f}']
+        print(f'| {name} | ' + ' | '.join(cells) + ' |', flush=True)
+
+
+def command_line():
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
+    parser.add_argument('--controller', default='', help='presets, by commas')
+    parser.add_argument('--quick', action='store_true', help='one motion, two rigs')
+    results_page.add_write(parser, 'unrepeated')
+    return parser
+
+
+def main():
+    """Print the tables."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__):
+        for valve in args.valve.split(','):
+            controllers = CONTROLLERS[valve]
+            if args.controller:
+                controllers = args.controller.split(',')
+            show_random(valve, controllers, SEEDS[:1] if args.quick else SEEDS)
+            show_rigs(valve, controllers, 2 if args.quick else RIGS)
+            show_gait(valve, controllers)
+
+
+if __name__ == '__main__':
+    main()
