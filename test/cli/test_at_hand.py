@@ -127,8 +127,8 @@ def test_the_shell_is_answered_with_verbs_options_and_names():
     assert completed('pam simulate sta') == {'staircase'}
     assert '--controller' in completed('pam simulate staircase --con')
     assert completed('pam run rest --rig dmsp_5_300_real') == {'dmsp_5_300_realistic'}
-    assert completed('pam simulate rest --controller pid') == {
-        'pid', 'pid_hsv', 'pid_plain', 'pid_plain_hsv'}
+    assert completed('pam simulate rest --controller pid_p') == {
+        'pid_plain', 'pid_plain_hsv', 'pid_plain_random', 'pid_plain_random_hsv'}
     assert completed('pam nodes valve_') == {'valve_driver', 'valve_watchdog'}
 
 
