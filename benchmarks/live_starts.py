@@ -115,7 +115,7 @@ def exactly(one, rig, rules, folder, way_ns):
 
 
 def started(args, one, rig, rules, folder):
-    """Run all starts; return (errors, timing) of each, those that failed left out."""
+    """Run all starts; return (errors, timing) of each."""
     rows = []
     for start in range(args.starts):
         bag = os.path.join(args.keep or folder, f'{args.valve}_{start}')
