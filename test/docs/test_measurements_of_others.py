@@ -1,0 +1,70 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The guide from a file to a report: every command runs, each file ends in a report."""
+
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = ROOT.parent / 'shared' / 'data'
+PAGE = ROOT / 'docs' / 'guides' / 'measurements_of_others.md'
+FILES = re.compile(r'\$DATA/(\S+\.csv)')
+REPORTS = {
+    'steps_100hz': 'others_gap/report.html', 'quasi_static_loop': 'others_loop.html',
+    'contraction_00': 'others_00.html', 'contraction_25': 'others_identified/identify.json',
+    'contraction_50': 'others_50.html', 'contraction_75': 'others_75.html',
+    'A1_DMSP-20-300': 'others_map20/report.html', 'A2_DMSP-10-250': 'others_map10/report.html'}
+
+
+def recipes():
+    """Return the blocks of commands of the page, as lists of lines."""
+    blocks, block = [], []
+    for line in PAGE.read_text(encoding='utf-8').splitlines():
+        if line.startswith('    pam '):
+            block.append(line.strip())
+        elif block:
+            blocks.append(block)
+            block = []
+    return blocks
+
+
+def file_of(block):
+    """Return the stem of the file a block begins with."""
+    return Path(FILES.search(block[0])[1]).stem
+
+
+def test_every_file_has_a_recipe_of_at_most_three_commands():
+    assert {file_of(block) for block in recipes()} == set(REPORTS)
+    assert max(map(len, recipes())) <= 3
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'needs the measurements by others in {DATA}')
+@pytest.mark.parametrize('block', recipes(), ids=file_of)
+def test_a_file_becomes_a_report(block, tmp_path):
+    scripts = Path(sys.executable).parent
+    for command in block:
+        done = subprocess.run(
+            ['sh', '-c', command], cwd=tmp_path, capture_output=True, text=True,
+            env={**os.environ, 'DATA': str(DATA), 'OPENBLAS_NUM_THREADS': '1',
+                 'PATH': f'{scripts}{os.pathsep}{os.environ["PATH"]}'})
+        # 1: done, with remarks on the measurement.
+        assert done.returncode in (0, 1), f'{command}\n{done.stdout}{done.stderr}'
+        assert 'Traceback' not in done.stderr
+    assert (tmp_path / REPORTS[file_of(block)]).stat().st_size > 1000
