@@ -50,6 +50,7 @@ IN_TIME_S = {'ppr': 0.6, 'hsv': 0.8}
 SETTLED_M = 1e-4
 STEPS, STEP_HOLD_S, STEPS_FROM_S = 4, 5.0, 64.0
 CADENCES_HZ = (0.6, 0.9, 0.7, 1.1, 0.8, 1.0)
+LOW_M, HIGH_M = 0.006, 0.022
 
 
 def random_motion(seed, duration_s=DURATION_S, then=''):
@@ -75,7 +76,8 @@ def steps_after_motion(seed):
 def gait():
     """Return the experiment: a knee whose cadence changes every five strides."""
     strides = ''.join(
-        f'  - knee_gait: {{low_m: 0.006, high_m: 0.022, frequency_hz: {cadence_hz}, cycles: 5}}\n'
+        f'  - knee_gait: {{low_m: {LOW_M}, high_m: {HIGH_M}, frequency_hz: {cadence_hz}, '
+        'cycles: 5}\n'
         for cadence_hz in CADENCES_HZ)
     return load_experiment(f"""
 name: gait
@@ -160,7 +162,7 @@ def show_gait(valve, controllers):
             result = closed_loop(rig, experiment, SEEDS[0], preview_s).run(
                 load_controller(name, rig))
             error_mm = 1e3 * result.rmse_m(start_s, experiment.duration_s)
-            cells += [f'{error_mm:.3f}', f'{0.1 * error_mm / np.ptp(result.reference_m):.2f}']
+            cells += [f'{error_mm:.3f}', f'{0.1 * error_mm / (HIGH_M - LOW_M):.2f}']
         print(f'| {name} | ' + ' | '.join(cells) + ' |', flush=True)
 
 
