@@ -23,6 +23,8 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from pam_actuation.rig_files.description import Description
     from pam_sim.rig import Rig
 
@@ -51,7 +53,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--angle-deg', type=number(6.0, 51.0, 'degrees'), default=None,
                         metavar='DEG', help='angle between thread and axis at rest')
     parser.add_argument('--force-map', type=source, default=None, metavar='FILE.csv',
-                        help='static table of the muscle, as "pam characterise" writes it')
+                        help='static table of the muscle, as "pam characterise" writes it, or '
+                        'force over pressure and length as others measure it')
     parser.add_argument('--load', default='hanging_mass', metavar='NAME',
                         help='hanging_mass, isometric or driven (default: %(default)s)')
     parser.add_argument('--valve', metavar='ppr|hsv', default='ppr',
@@ -97,13 +100,26 @@ def _new(args: argparse.Namespace) -> int:
     described = _described(args)
     if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
         described = ask_description(_read_line, print)
-    described.work_out()
-    text, rig = rig_file(described, args.out)
-    write_text(args.out, text)
+    with _force_map(args) as table:
+        described.force_map = table or described.force_map
+        described.work_out()
+        text, rig = rig_file(described, args.out)
+        write_text(args.out, text)
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), f'next: {following}']
     emit(args, {'file': args.out, **_numbers(rig), 'next': following}, '\n'.join(lines))
     return EXIT_DONE
+
+
+def _force_map(args: argparse.Namespace) -> 'AbstractContextManager[str | None]':
+    """Return the context in which the table of the force map is there, None without one."""
+    from contextlib import nullcontext
+    from pam_actuation.rig_files.force_map import force_map_of
+    if args.force_map is None:
+        return nullcontext(None)
+    length_m, bore_m = (None if mm is None else round(1e-3 * mm, 12)
+                        for mm in (args.length_mm, args.bore_mm))
+    return force_map_of(args.force_map, length_m, bore_m, args.out, args.overwrite)
 
 
 def _read_line(question: str) -> str:
@@ -134,7 +150,6 @@ def _described(args: argparse.Namespace) -> 'Description':
     from pam_actuation.rig_files.description import Description
     from pam_actuation.rig_files.numbers import read_range
     from pam_sim.load import LOADS
-    from pam_sim.muscle.lookup_table import read_table
     from pam_sim.muscle.muscle import get_muscle
     from pam_sim.rig_parameters import VALVES
     found = Description(args.muscle, load=_one_of('--load', args.load, LOADS),
@@ -145,9 +160,7 @@ def _described(args: argparse.Namespace) -> 'Description':
                                 ('braid_angle_rad', args.angle_deg, math.pi / 180.0)):
         if value is not None:
             found.dimensions[name] = round(value * factor, 12)
-    if args.force_map is not None:
-        read_table(args.force_map)
-        found.force_map = args.force_map
+    found.force_map = args.force_map
     if args.regulator_volts is not None:
         found.volts = read_range(args.regulator_volts, '--regulator-volts', 'V')
     if args.regulator_kpa is not None:

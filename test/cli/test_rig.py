@@ -26,6 +26,7 @@ from pam_actuation.rig_files.questions import ask_description
 from pam_actuation.rig_files.text import rig_file
 from pam_sim import load_rig
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
+from pam_sim.units import P_ATM_PA
 from pam_sim.valve.regulator_presets import get_regulator, regulator_names
 import pytest
 
@@ -100,6 +101,26 @@ def test_a_force_map_is_found_from_another_folder(folder, monkeypatch):
 
 
 @pytest.mark.filterwarnings('error')
+def test_forces_measured_by_others_become_a_muscle(folder, capsys):
+    lines = ['pressure_Pa,length_m,force_N']
+    for gauge_pa in range(50_000, 650_000, 50_000):
+        for contraction in (0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24):
+            force_n = max(0.0, 2.5e-3 * gauge_pa * (1.0 - contraction / 0.25) - 30.0)
+            lines.append(f'{gauge_pa},{0.3 * (1.0 - contraction)},{force_n:.3f}')
+    (folder / 'others.csv').write_text('\n'.join(lines) + '\n')
+    rig = new('--force-map', 'others.csv', '--length-mm', '300', '--bore-mm', '20')
+    assert rig.muscle.law.name == 'lookup'
+    # (49 N + 30 N) / (1 - 0.15 / 0.25) / 2.5 mN per Pa, from the formula above
+    assert float(rig.static_pressure_pa(0.045)) - P_ATM_PA == pytest.approx(79e3, rel=0.03)
+    assert (folder / 'made_force_map.csv').is_file()
+    before = sorted(path.name for path in folder.iterdir())
+    assert main(['rig', 'new', '--force-map', 'others.csv', '--out', 'other.yaml']) == 2
+    assert '--length-mm' in capsys.readouterr().err
+    assert main(['rig', 'new', '--force-map', 'others.csv', '--length-mm', '300', '--bore-mm',
+                 '20', '--load', 'driven', '--known', 'mass_kg=1', '--out', 'other.yaml']) == 2
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
 def test_a_force_map_from_60_kpa_on_gives_no_warning(folder):
     from pam_sim.muscle.laws.lookup import SHIPPED
     lines = (SHIPPED / 'dmsp_5_300.csv').read_text(encoding='utf-8').splitlines(keepends=True)

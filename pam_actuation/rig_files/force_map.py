@@ -1,0 +1,74 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The table of a force map for a rig file: as it is, or made from what others measured."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+
+from pam_sim.characterise import characterise_table
+from pam_sim.characterise.dimensions import Dimensions
+from pam_sim.characterise.tables import read_measured_table
+from pam_sim.errors import InputError
+from pam_sim.files import check_file
+from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
+
+
+@contextmanager
+def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: str,
+                 overwrite: bool) -> Iterator[str]:
+    """
+    Give the path of the table the muscle law ``lookup`` reads.
+
+    A table of another form (force over pressure and length, for instance) is characterised. The
+    result stands beside the rig file, and is removed if the block fails.
+
+    Parameters
+    ----------
+    path : str
+        A table of ``pam characterise``, or one measured by others.
+    length_m, bore_m : float or None
+        Size of the muscle at rest; the length is needed for a table measured by others.
+    out : str
+        The rig file.
+    overwrite : bool
+        Whether a table beside it may be replaced.
+
+    Raises
+    ------
+    InputError
+        The table is of neither form, or the length is missing.
+
+    """
+    rows, _ = read_commented_csv(path)
+    if rows and tuple(rows[0]) == COLUMNS:
+        read_table(path)
+        yield path
+        return
+    measured = read_measured_table(path)
+    if length_m is None or bore_m is None:
+        raise InputError('a table measured by others needs --length-mm and --bore-mm, the size of '
+                         'the muscle at rest', path)
+    table_path = f'{os.path.splitext(out)[0]}_force_map.csv'
+    check_file(table_path, overwrite)
+    table = characterise_table(measured, Dimensions(length_m, bore_m)).table()
+    there = os.path.exists(table_path)
+    table.write_csv(check_file(table_path, overwrite))
+    try:
+        yield table_path
+    except BaseException:
+        if not there:
+            os.remove(table_path)
+        raise
