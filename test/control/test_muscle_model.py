@@ -32,6 +32,7 @@ from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.replay.controller import replay_controller
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.loop_parts import READINGS
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_sim import load_rig
 from pam_sim.errors import InputError
@@ -197,3 +198,13 @@ def test_a_recording_with_a_model_replays_to_the_bit(tmp_path):
     assert replayed.identical
     assert np.abs(replayed.states['path_rules_pa']).max() > 1e3
     assert np.abs(replayed.states['predicted_feedback_pa']).max() > 1e2
+
+
+@pytest.mark.parametrize('off_pa', [60e3, math.nan])
+def test_a_pressure_sensor_that_is_off_or_lost_does_no_harm(off_pa):
+    rig = load_rig('dmsp_5_300_realistic')
+    loop = ClosedLoop(rig, load_experiment(RANDOM_MOTION), seed=5, preview_s=0.0)
+    loop._noise.view(READINGS)['pressure_pa'][3600:] += off_pa      # from 18 s on
+    error_m = loop.run(load_controller('sofc_model_ppr', rig)).error_m
+    assert np.abs(error_m[3600:]).max() < 1.5e-3
+    assert np.sqrt(np.mean(error_m[4600:] ** 2)) < 0.6e-3

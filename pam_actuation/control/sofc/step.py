@@ -279,9 +279,11 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     # Inference and trim.
     base = inverse_pressure_pa(inverse, lead)
     model = st.model
-    pressure = inp.pressure_pa if math.isfinite(inp.pressure_pa) else st.expected_pa
+    # A pressure that does not follow the command may be that of a sensor that is off.
+    measured = math.nan if lags else inp.pressure_pa
+    pressure = measured if math.isfinite(measured) else st.expected_pa
     predictor.engage(par, model, error)
-    muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, inp.pressure_pa)
+    muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
     muscle_model.go(par, model.lead_path, way)
     path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
             + muscle_model.numbers_pa(par, model, model.lead_path, lead))
