@@ -27,17 +27,12 @@ from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STA
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.settings import (
-    parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
+    OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters
 from pam_sim.records import fields, size_of
-
-
-# Settings of which one at least is not 0 where the model of the muscle does anything.
-_OF_MODEL = ('path_sets', 'model_noise_pa', 'disturbance_time_s',
-             'predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m')
 
 
 class SelfOrganizingFuzzyController(CompiledController):
@@ -73,7 +68,7 @@ class SelfOrganizingFuzzyController(CompiledController):
                  where: Callable[[str], str] | None = None) -> None:
         settings = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
         super().__init__(settings, STATE, rig_name)
-        if not any(self.settings[name] for name in _OF_MODEL):
+        if not any(self.settings[name] for name in OF_MODEL):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots',
                      'path_sets'):

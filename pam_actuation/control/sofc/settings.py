@@ -160,8 +160,14 @@ PARAMETERS = parameter_record(
     'delay_ticks',                    # credit delay
     'spread_ticks',                   # credit spread, at most the delay
     'answer_ticks',                   # from a command to the answer of the valve
+    'has_model',                      # 1 where the model of the muscle does anything
     ('path_width_m', MOST_SETS),      # of the sets of the path; 0 for that of any path
 )
+
+# Settings of which one at least is not 0 where the model of the muscle does anything.
+OF_MODEL = (
+    'path_sets', 'model_noise_pa', 'disturbance_time_s', 'predicted_proportional_pa_per_m',
+    'predicted_derivative_pa_s_per_m')
 
 # What rules mean depends on these; a file of rules must agree in all of them.
 SCALING = (
@@ -182,7 +188,9 @@ def parameter_array(values: Mapping[str, float]) -> FloatArray:
     widths_m[1:max(sets, 1)] = path_widths_m(
         sets, values['path_shortest_m'], values['path_longest_m'])
     return values_of(PARAMETERS, {
-        **values, 'path_width_m': widths_m, 'period_s': period_s, 'delay_ticks': delay,
+        **values, 'path_width_m': widths_m,
+        'has_model': float(any(values[name] for name in OF_MODEL)),
+        'period_s': period_s, 'delay_ticks': delay,
         'spread_ticks': min(round(values['credit_spread_s'] / period_s), delay),
         # The preview covers the dead time; what the valve lags besides is filtered.
         'answer_ticks': round(values['lead_s'] / period_s)})

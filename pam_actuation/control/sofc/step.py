@@ -282,15 +282,20 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     # A pressure that does not follow the command may be that of a sensor that is off.
     measured = math.nan if lags else inp.pressure_pa
     pressure = measured if math.isfinite(measured) else st.expected_pa
-    predictor.engage(par, model, error)
-    muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
-    muscle_model.go(par, model.lead_path, way)
-    path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
-            + muscle_model.numbers_pa(par, model, model.lead_path, lead))
+    path = 0.0
+    damping = par.rate_feedforward_pa_s_per_m
+    inertia = par.acceleration_feedforward_pa_s2_per_m
+    if par.has_model > 0.5:
+        predictor.engage(par, model, error)
+        muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
+        muscle_model.go(par, model.lead_path, way)
+        path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
+                + muscle_model.numbers_pa(par, model, model.lead_path, lead))
+        damping = muscle_model.damping_pa_s_per_m(par, model)
+        inertia = muscle_model.inertia_pa_s2_per_m(par, model)
     dynamic = dynamics.dynamic_pressure_pa(
         par, st, base + par.lag_share * path, lead_rate,
-        st.history_ticks < 0.5 or lead_jump != 0.0,
-        muscle_model.damping_pa_s_per_m(par, model), muscle_model.inertia_pa_s2_per_m(par, model))
+        st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia)
     predicted = 0.0
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     if acts and st.history_ticks >= par.answer_ticks:
@@ -359,11 +364,12 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     entry.index_m = index if reason == learning.LEARNING else 0.0
     learns = reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE
     surprised = reason == learning.FROZEN_SURPRISE
-    if learns or surprised:
+    if par.has_model > 0.5 and (learns or surprised):
         muscle_model.find_numbers(par, model, surprised)
     if learns:
         fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
-        path_squares = muscle_model.learn(par, path_rules, fired[3], model)
+        if par.has_model > 0.5:
+            path_squares = muscle_model.learn(par, path_rules, fired[3], model)
     _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
     out.command_pa = command
