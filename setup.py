@@ -97,7 +97,7 @@ TEST_REQUIRES = [
     'setuptools>=70.1',  # builds a wheel by itself; colcon sets the upper bound
 ]
 
-# To run `pam tune --cluster` on a Dask scheduler that exists already.
+# To run with `--cluster` on a Dask scheduler that exists already.
 CLUSTER_REQUIRES = [
     'distributed>=2022.12',
 ]

@@ -37,7 +37,7 @@ from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_actuation.tuning.problem import cost_of, Problem
 from pam_actuation.tuning.space import default_axes, from_unit
-from pam_actuation.tuning.workers import Workers
+from pam_actuation.workers import Workers
 from pam_sim import load_rig
 from pam_sim.joint import load_joint
 from pam_sim.muscle.laws.sarosi import tension_n

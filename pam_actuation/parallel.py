@@ -38,7 +38,7 @@ def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
 
     """
     # The start of a tracker lets signals through again, in the middle of those of the workers.
-    with _silent_trackers():
+    with silent_trackers():
         for tracker in (resource_tracker, standard_tracker):
             tracker.ensure_running()
     with kept_from_children():
@@ -47,7 +47,7 @@ def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
 
 
 @contextmanager
-def _silent_trackers() -> Iterator[None]:
+def silent_trackers() -> Iterator[None]:
     """
     Let trackers that are started meanwhile give no warnings.
 

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = (
     ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'parallel', 'random_levels',
      'ros_missing', 'slow_rise', 'transport', 'control', 'drivers', 'loops', 'bags', 'hardware',
-     'plant_loop'),
+     'plant_loop', 'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models'),
     ('rigging',),

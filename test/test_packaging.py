@@ -54,7 +54,7 @@ ROSDEP_KEYS = {
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
-# Only where a cluster is named; tuning/workers.py says what to install.
+# Only where a cluster is named; pam_actuation/workers says what to install.
 OPTIONAL = {'dask', 'ray', 'h5py'}
 
 

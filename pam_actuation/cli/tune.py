@@ -70,6 +70,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--patience', type=count(0), default=30, metavar='N',
                         help='stop after so many generations without progress, 0 = never '
                         '(default: %(default)s)')
+    parser.add_argument('--population', type=count(5, 10000, {0: 'after the budget'}), default=0,
+                        metavar='N', help='points of a generation, 5 or more; on a cluster as '
+                        'many as it has workers or more (default: 0, 24 or a tenth of the budget)')
     parser.add_argument('--jobs', type=count(1, 1024, {-1: 'one a core'}), default=-1,
                         metavar='N',
                         help='threads; -1 = one a core (default)')
@@ -120,6 +123,7 @@ def run(args: argparse.Namespace) -> int | None:
             rigs, controller, experiments, budget=args.rollouts, seed=args.seed, jobs=args.jobs,
             progress=lambda done: bar.update(max(done - bar.n, 0)), held_out=check,
             held_out_rigs=others, patience=args.patience, cluster=args.cluster,
+            population=args.population or None,
             learn_rules=not args.freeze,
             preview_s=math.inf if args.preview is None else args.preview)
     recordings = check_recordings(runs, rig, result.controller)

@@ -28,7 +28,7 @@ from pam_actuation.tuning.problem import Problem, rebuild
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
-    from pam_actuation.tuning.workers import Workers
+    from pam_actuation.workers import Workers
 
 _PASSES = 3                     # times a rig's experiments are tracked
 

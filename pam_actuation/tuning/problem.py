@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
     from pam_actuation.tuning.closed_loop import ClosedLoop
     from pam_actuation.tuning.joint_loop import JointLoop
+    from pam_actuation.workers import Workers
 
     Loop = ClosedLoop | JointLoop
 
@@ -72,6 +73,10 @@ class Problem:
             costs[i] = loop.cost(controller)
         return costs
 
+    def cost_on(self, settings: dict[str, float], i: int) -> float:
+        """Return the entry of ``costs`` for one loop."""
+        return float(Problem([self.loops[i]], self.controller).costs(settings)[0])
+
     def cost(self, settings: dict[str, float]) -> float:
         """Return the mean cost [mm, of a joint degrees] of settings over the loops."""
         return float(np.mean(self.costs(settings)))
@@ -80,6 +85,35 @@ class Problem:
 def cost_of(problem: Problem, settings: dict[str, float]) -> float:
     """Return ``problem.cost(settings)``: the function workers are given."""
     return problem.cost(settings)
+
+
+def cost_on(problem: Problem, task: tuple[dict[str, float], int]) -> float:
+    """Return the cost of a task of settings and loop: the smallest one for workers."""
+    return problem.cost_on(*task)
+
+
+def costs_of(workers: 'Workers', problem: Problem,
+             points: Sequence[dict[str, float]]) -> list[float]:
+    """
+    Return the cost of many settings, equal to ``problem.cost`` to the bit.
+
+    Parameters
+    ----------
+    workers : Workers
+        Where the rollouts run. A task is one loop where tasks leave this process, or where
+        the settings are too few for all threads; else all loops of one point.
+    problem : Problem
+        The closed loops and the controller.
+    points : list of dict of str -> float
+        Settings of every point.
+
+    """
+    if not workers.spread and 2 * workers.size <= len(points):
+        return workers.map(cost_of, problem, points)
+    count = len(problem.loops)
+    flat = workers.map(cost_on, problem, [(point, i) for point in points for i in range(count)])
+    return [float(np.mean(np.array(flat[k * count:(k + 1) * count])))
+            for k in range(len(points))]
 
 
 def rebuild(controller: Law, settings: dict[str, float],

@@ -32,10 +32,10 @@ from pam_actuation.control.made_for import facts_of
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.tuning.initial_rules import initial_rules
 from pam_actuation.tuning.loops_of_rigs import loops_of
-from pam_actuation.tuning.problem import cost_of, Problem, rebuild
+from pam_actuation.tuning.problem import costs_of, Problem, rebuild
 from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
-from pam_actuation.tuning.workers import Workers
+from pam_actuation.workers import Workers
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
+WARM = ('pam_actuation.tuning.rollouts', 'pam_actuation.tuning.mode_rollouts')
 HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
 SHOWN_UNIT = {'mm': ' mm', 'deg': '°'}      # of costs, as people read it
 
@@ -210,7 +211,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     patience : int
         Stop after so many generations without improvement; 0 = never.
     cluster : str, optional
-        Address of a Dask or Ray cluster to run on, see ``workers``.
+        Address of a Dask or Ray cluster to run on, see ``pam_actuation.workers``.
     held_out_rigs : list of Rig, optional
         Rigs of the held-out runs; by default those of the search.
     learn_rules : bool
@@ -248,19 +249,19 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     done = [0]
     history: list[tuple[int, float]] = []
 
-    with Workers(jobs, cluster) as workers:
-        def costs_of(points: list[FloatArray]) -> list[float]:
-            costs = workers.map(cost_of, problem, [from_unit(axes, p) for p in points])
+    with Workers(jobs, cluster, modules=WARM) as workers:
+        def of_generation(points: list[FloatArray]) -> list[float]:
+            costs = costs_of(workers, problem, [from_unit(axes, p) for p in points])
             done[0] += len(points) * len(train)
             history.append((done[0], min(costs + [cost for _, cost in history[-1:]])))
             if progress is not None:
                 progress(min(done[0], budget))
             return costs
 
-        cost_before, held_before = (workers.map(cost_of, one, [{}])[0] for one in (problem, check))
+        cost_before, held_before = (costs_of(workers, one, [{}])[0] for one in (problem, check))
         history.append((0, cost_before))
         found = minimise(
-            costs_of, to_unit(axes, before), members, generations, seed, patience)
+            of_generation, to_unit(axes, before), members, generations, seed, patience)
         after, cost_after = from_unit(axes, found.point), found.cost
         if cost_after >= cost_before:       # the start may lie outside the box of the axes
             after, cost_after = {}, cost_before
@@ -268,7 +269,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
         if learn_rules and controller.rules is not None:
             (rules, table, cost_after), extra = initial_rules(workers, problem, after)
             tuned = rebuild(controller, after, table)
-        held_after = workers.map(cost_of, Problem(test, tuned), [{}])[0]
+        held_after = costs_of(workers, Problem(test, tuned), [{}])[0]
     improved = held_after < held_before
     if not improved:
         tuned, rules = rebuild(controller, {}), ''

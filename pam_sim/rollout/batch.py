@@ -193,7 +193,12 @@ def residual_sums(rigs: 'list[Rig]', records: list[Record],
 
 
 def default_workers() -> int:
-    """Return the number of cores this process may use."""
+    """Return PAM_THREADS of the environment, by default the cores this process may use."""
+    given = os.environ.get('PAM_THREADS', '')
+    if given:
+        if not given.isdecimal() or int(given) < 1:
+            raise InputError(f'is {given!r}; a whole number, 1 or more, is needed', 'PAM_THREADS')
+        return int(given)
     if hasattr(os, 'sched_getaffinity'):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -42,6 +42,7 @@ NUMBERS = {
     ('rig', '--angle-deg'): '6 to 51 degrees',
     ('tune', '--rollouts'): '10 or more', ('tune', '--randomise'): '0 to 1000',
     ('tune', '--patience'): '0 or more', ('tune', '--jobs'): '1 to 1024, or -1 for one a core',
+    ('tune', '--population'): '5 to 10000, or 0 for after the budget',
     ('tune', '--seed'): '0 to 4294967295', ('tune', '--preview'): '0 to 10',
     ('characterise', '--seed'): '0 to 4294967295', ('characterise', '--jobs'): '1 to 64',
     ('characterise', '--load-n'): '0 to 10000 N',

@@ -23,7 +23,7 @@ from pam_actuation.tuning.loops_of_rigs import reachable
 from pam_actuation.tuning.problem import Problem, rebuild
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_actuation.tuning.tune import tune
-from pam_actuation.tuning.workers import Workers
+from pam_actuation.workers import Workers
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest

@@ -12,15 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where rollouts run: threads and a Dask cluster give the same bits, mistakes one sentence."""
+"""Where tasks run: threads, processes and a Dask cluster give the same, mistakes a sentence."""
 
+import os
+import signal
 import sys
 
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
-from pam_actuation.tuning.problem import cost_of
+from pam_actuation.tuning.loops_of_rigs import loops_of
+from pam_actuation.tuning.problem import cost_of, costs_of, Problem
 from pam_actuation.tuning.tune import tune
-from pam_actuation.tuning.workers import Workers
+from pam_actuation.workers import WorkerLost, Workers
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
@@ -81,3 +84,32 @@ def test_results_keep_the_order_of_the_items():
 
     with Workers(jobs=2) as workers:
         assert workers.map(cost_of, Square(), range(20)) == [i * i for i in range(20)]
+
+
+def divided(folder, item):
+    """Return 10 / item; 3 ends its process the first time, 5 always."""
+    mark = folder / str(item)
+    if item == 5 or item == 3 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 10 / item
+
+
+def test_a_lost_process_costs_its_own_task_only(tmp_path):
+    with Workers(jobs=2, processes=True) as workers:
+        found = dict(workers.stream(divided, tmp_path, range(6)))
+        assert workers.map(divided, tmp_path, [1, 2, 4]) == [10.0, 5.0, 2.5]
+    assert isinstance(found.pop(0), ZeroDivisionError)
+    assert isinstance(found.pop(5), WorkerLost)
+    assert found == {1: 10.0, 2: 5.0, 3: 10 / 3, 4: 2.5}
+
+
+def test_points_and_loops_apart_cost_the_same(rig):
+    experiments = [load_experiment('short_sine'), load_experiment('tuning_one_hz')]
+    for name in ('pid', 'sofc_untuned'):
+        controller = load_controller(name, rig)
+        loops, _ = loops_of([rig], experiments, 0, controller, rig)
+        problem, points = Problem(loops, controller), [{}, {'max_pressure_gauge_pa': 5e5}]
+        with Workers(jobs=2) as two, Workers(jobs=1) as one:
+            apart, together = costs_of(two, problem, points), costs_of(one, problem, points)
+        assert apart == together == [problem.cost(point) for point in points]

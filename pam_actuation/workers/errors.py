@@ -1,0 +1,23 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What can be lost while tasks run elsewhere."""
+
+
+class WorkerLost(RuntimeError):
+    """The process of one task ended several times: killed, out of memory, or a crash."""
+
+
+class ClusterLost(RuntimeError):
+    """The scheduler or head of a cluster answers no more; what it had to do is lost."""
