@@ -25,7 +25,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
-from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
+from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -177,8 +177,12 @@ class Plant:
 
     @property
     def supply_pa(self) -> float:
-        """Supply pressure, absolute, Pa."""
+        """Supply pressure, absolute, Pa; may be set, from the next step on."""
         return self._now.supply_pa.item()
+
+    @supply_pa.setter
+    def supply_pa(self, supply_pa: float) -> None:
+        fields(self.par, PARAMETERS).supply_pa = supply_pa
 
     @property
     def outputs(self) -> FloatArray:

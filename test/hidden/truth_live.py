@@ -35,7 +35,7 @@ def hold(n, valve, y, work, anchors, plays, raw_a, raw_b, start, steps):
 
 class LiveRig:
     """
-    A hidden rig with a regulator, from rest at atmosphere, its supply constant.
+    A hidden rig, from rest at atmosphere, its reservoir always full.
 
     It has what a simulated plant has: ``step`` with the valve signal held, and readings.
 
@@ -45,17 +45,24 @@ class LiveRig:
         Numbers of the rig that are not neutral.
     readings : callable, optional
         ``readings(pressure, contraction, force)`` returns what the sensors show.
+    valve : {'ppr', 'hsv'}
 
     """
 
     dt_s = 1e-3
 
-    def __init__(self, numbers, readings=lambda *values: values):
+    def __init__(self, numbers, readings=lambda *values: values, valve='ppr'):
         self._n, self._readings = truth_numbers.numbers(**numbers), readings
+        self._valve = rig.PPR if valve == 'ppr' else rig.HSV
         self._y, self._work = np.zeros(rig.SIZE), np.zeros((2, rig.SIZE))
         self._anchors, self._plays = np.zeros(6), np.zeros(3)
-        self._y[rig.Y_AIR] = rig.ATM
-        self._waiting, self._acting, self._done = [], 0.0, 0
+        room = rig.volume(0.0) + self._n[rig.V_DEAD]
+        self._y[rig.Y_AIR] = rig.ATM if valve == 'ppr' else rig.ATM * room / rig.RT
+        self._y[rig.Y_ENERGY] = rig.ATM * room / (rig.GAMMA - 1.0)
+        self._y[rig.Y_SECOND] = rig.ATM * self._n[rig.SECOND_VOLUME] / rig.RT
+        self._y[rig.Y_STORE] = self._n[rig.SUPPLY] * self._n[rig.RESERVOIR] / rig.RT
+        self._given = self._acting = (0.0, 0.0)
+        self._waiting, self._done = [], 0
         self.pressure_pa, self.contraction_m, self.force_n = readings(rig.ATM, 0.0, 0.0)
 
     @property
@@ -68,21 +75,39 @@ class LiveRig:
         """Return the plant of each muscle by its place: this one."""
         return {'': self}
 
+    @property
+    def supply_pa(self):
+        """Return the supply pressure [Pa absolute]; it may be set."""
+        return self._n[rig.SUPPLY].item()
+
+    @supply_pa.setter
+    def supply_pa(self, supply_pa):
+        self._n[rig.SUPPLY] = supply_pa
+
     def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
         """
-        Advance by ``steps`` times ``dt_s`` with the signal held.
+        Advance by ``steps`` times ``dt_s`` with the signal held, and a force against contraction.
 
         A signal acts after the hidden delay, at the next step of 1 ms.
         """
-        if external_force_n or contraction_m is not None:
-            raise ValueError('the hidden rig knows no disturbance and no driven load')
+        if contraction_m is not None:
+            raise ValueError('the hidden rig knows no driven load')
+        self._n[rig.PULL] = external_force_n
         late = int(round(self._n[rig.DELAY] / rig.STEP_S))
         fine = int(round(self.dt_s / rig.STEP_S))
-        for _ in range(steps):
-            self._waiting.append((self._done + late, float(signal[0])))
+        given = (float(signal[0]), float(signal[-1]))
+        while steps:
+            if given != self._given:
+                self._given = given
+                self._waiting.append((self._done + late, given))
             while self._waiting and self._waiting[0][0] <= self._done:
                 self._acting = self._waiting.pop(0)[1]
-            found = hold(self._n, rig.PPR, self._y, self._work, self._anchors, self._plays,
-                         self._acting, 0.0, self._done, fine)
-            self._done += fine
+            # All steps at once up to that in which another signal acts.
+            count = steps
+            if self._waiting:
+                count = min(steps, -((self._done - self._waiting[0][0]) // fine))
+            found = hold(self._n, self._valve, self._y, self._work, self._anchors, self._plays,
+                         *self._acting, self._done, count * fine)
+            self._done += count * fine
+            steps -= count
         self.pressure_pa, self.contraction_m, self.force_n = self._readings(*found)

@@ -41,6 +41,8 @@ NUMBERS = {
     'gain_drift': 0.0, 'drag_x2': 0.0, 'drag_v2': 0.0, 'dry_growing': 0.0, 'dry_pull': 0.0,
     'stop_stiffness': 0.0, 'stop_at': 0.0, 'resonance_hz': 0.0, 'resonance_damping': 0.3,
     'wander': 0.0, 'wander_hz': 1.3,
+    # What somebody does to the load: a force against contraction.
+    'pull': 0.0,
 }
 
 

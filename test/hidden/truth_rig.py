@@ -36,7 +36,7 @@ EVERY = 2                     # one row of output per so many steps
  CREEP_T2, CREEP_T3, CREEP_T4, SOFTEN, SOFTEN_T1, SOFTEN_T2, THRESHOLD, TAPER, TAPER_GROWTH,
  TUBE, TUBE_HARDENING, GUIDE, SPRING, SPRING_CUBIC, RIPPLE, RIPPLE_PERIOD, CONTACT, PULSATION,
  PULSATION_HZ, GAIN_DRIFT, DRAG_X2, DRAG_V2, DRY_GROWING, DRY_PULL, STOP_STIFFNESS, STOP_AT,
- RESONANCE_HZ, RESONANCE_DAMPING, WANDER, WANDER_HZ) = range(len(NUMBERS))
+ RESONANCE_HZ, RESONANCE_DAMPING, WANDER, WANDER_HZ, PULL) = range(len(NUMBERS))
 
 # Physical constants and the muscle.
 ATM, AMBIENT, GAS, GRAVITY, RHO = 101325.0, 293.15, 287.05, 9.80665, 1.185
@@ -299,7 +299,7 @@ def load_push(y, t, n, d):
         force += n[STOP_STIFFNESS] * (x - n[STOP_AT])
     if n[CONTACT] != 0.0 and math.sin(0.83 * t) + math.sin(1.97 * t + 1.0) > 0.7:
         force += n[CONTACT]
-    return force
+    return force + n[PULL]
 
 
 @jit
