@@ -67,6 +67,7 @@ class CompiledController:
         self._state = zeros(state)
         self._inputs = zeros(INPUT)
         self._outputs = np.zeros(len(self.state_names))
+        self._told = self._outputs      # those of ``state_names``
 
     @property
     def rate_hz(self) -> float:
@@ -134,7 +135,7 @@ class CompiledController:
 
     def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
-        return tuple(self._outputs[:len(self.state_names)].tolist())
+        return tuple(self._told.tolist())
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

@@ -30,7 +30,8 @@ class Watched:
 
     def __init__(self, **settings):
         self.controller = sofc(settings)
-        par, _, self.values, _, _, self.kept, *_ = self.controller.compiled_arguments()
+        par, _, tables, *_ = self.controller.compiled_arguments()
+        self.values, self.kept = (tuple(table[k] for table in tables) for k in (0, 3))
         self.parameters, self.state = fields(par, PARAMETERS), fields(zeros(STATE), STATE)
         self.state.rate_factor = self.state.rate_ceiling = 1.0
         self.window(1.0)             # up to the first turn the window is not a whole one

@@ -70,6 +70,7 @@ class SelfOrganizingFuzzyController(CompiledController):
         super().__init__(settings, STATE, rig_name)
         if not any(self.settings[name] for name in OF_MODEL):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
+            self._told = self._outputs[:len(self.state_names)]
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots',
                      'path_sets'):
             self.settings[name] = float(round(self.settings[name]))
@@ -99,12 +100,11 @@ class SelfOrganizingFuzzyController(CompiledController):
         par = fields(self.parameters, PARAMETERS)
         rows = ring_rows(int(par.delay_ticks), int(par.spread_ticks), int(par.answer_ticks))
         self._ring = np.zeros(rows * size_of(ENTRY))
-        rules = self.rules
-        self._kept = tuple(array.copy() for array in rules.arrays())
+        tables = self.rules.stacked()
+        self._kept = tuple(table[3] for table in tables)
         self._step = sofc_step
         self._arguments = (
-            self.parameters, self.static_inverse, rules.arrays(), rules.arrays('_initial'),
-            rules.arrays('_fired'), self._kept, self._ring, self._state, self._inputs,
+            self.parameters, self.static_inverse, tables, self._ring, self._state, self._inputs,
             self._outputs)
         # Compile, or load what was compiled before, now and not in the first real tick.
         sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)

@@ -253,6 +253,24 @@ class RuleBase:
         """Return the arrays of all tables: values, or with '_initial', '_fired' those."""
         return tuple(getattr(self, name + suffix) for name in self.NAMES)
 
+    def stacked(self) -> Tables:
+        """
+        Let the arrays of each table lie in one array; return these arrays.
+
+        Their first axis is value, initial value, count of firing, and a copy of the value. A
+        compiled step that takes them is called faster than with each array by itself.
+        """
+        feedback, feedforward, motion, path = (self._stack(name) for name in self.NAMES)
+        return feedback, feedforward, motion, path
+
+    def _stack(self, name: str) -> FloatArray:
+        value = getattr(self, name)
+        stack = np.stack(
+            [value, getattr(self, name + '_initial'), getattr(self, name + '_fired'), value])
+        for suffix, layer in zip(('', '_initial', '_fired'), stack):
+            setattr(self, name + suffix, layer)
+        return stack
+
     def copy(self) -> 'RuleBase':
         """Return an independent copy."""
         return RuleBase(scaling=dict(self.scaling), **{

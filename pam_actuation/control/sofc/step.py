@@ -452,20 +452,26 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
 
 
 @compiled
-def _step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
-          kept: Tables, ring: FloatArray, st: FloatArray, inp: FloatArray,
-          out: FloatArray) -> float:
+def _layer(tables: Tables, k: int) -> Tables:
+    """Return one layer of every table: values, initial values, counts or values kept."""
+    feedback, feedforward, motion, path = tables
+    return feedback[k], feedforward[k], motion[k], path[k]
+
+
+@compiled
+def _step(par: FloatArray, inverse: FloatArray, tables: Tables, ring: FloatArray,
+          st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``sofc_step``."""
-    return _tick(part(par, 0, PARAMETERS), inverse, values, initial, fired, kept,
-                 ring.view(ENTRY), part(st, 0, STATE), part(inp, 0, INPUT), part(out, 0, OUTPUT))
+    return _tick(part(par, 0, PARAMETERS), inverse, _layer(tables, 0), _layer(tables, 1),
+                 _layer(tables, 2), _layer(tables, 3), ring.view(ENTRY), part(st, 0, STATE),
+                 part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
 def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
-    def sofc_step(par: FloatArray, inverse: FloatArray, values: Tables, initial: Tables,
-                  fired: Tables, kept: Tables, ring: FloatArray, st: FloatArray,
-                  inp: FloatArray, out: FloatArray) -> float:
+    def sofc_step(par: FloatArray, inverse: FloatArray, tables: Tables, ring: FloatArray,
+                  st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
@@ -473,9 +479,9 @@ def _entry(key: int) -> Compiled[..., float]:
         ----------
         par, inverse : float64[:]
             Array of ``settings.PARAMETERS`` and static inverse table.
-        values, initial, fired, kept : tuple of arrays
-            Feedback, feed-forward and motion rules; their initial values, their firing counts,
-            the last good ones.
+        tables : tuple of arrays
+            Feedback, feed-forward, motion and path rules, each with one axis more in front:
+            values, initial values, firing counts, the last good values.
         ring : float64[:]
             Credit memory: ``credit.ring_rows`` of ``records.ENTRY``, one behind the other.
         st, inp, out : float64[:]
@@ -484,7 +490,7 @@ def _entry(key: int) -> Compiled[..., float]:
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _step(par, inverse, values, initial, fired, kept, ring, st, inp, out)
+        return _step(par, inverse, tables, ring, st, inp, out)
 
     return sofc_step
 
