@@ -76,7 +76,7 @@ def _names_for(verb: str, argument: str) -> Names | None:
         return lambda: presets(RIG) + presets(JOINT)
     if argument in ('rig', 'model', 'simulate'):
         return lambda: presets(RIG)
-    if (verb, argument) == ('nodes', 'name'):
+    if (verb, argument) in (('nodes', 'name'), ('status', 'name'), ('param', 'node')):
         return nodes
     if (verb, argument) == ('models', 'name'):
         return lambda: presets(RIG) + presets(JOINT) + presets(MUSCLE)

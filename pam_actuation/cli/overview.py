@@ -30,6 +30,11 @@ GROUPS = {
         'import': 'make a bag of a table measured elsewhere: CSV, Parquet, MAT, HDF5',
         'rig': 'write a commented file of a rig, known and unknown numbers, or check one',
         'demo': 'see everything once with live nodes, in about three minutes'},
+    'Operate running nodes': {
+        'status': 'how each node is, and why',
+        'estop': 'emergency stop: every driver vents until it is reset',
+        'reset': 'end a latched stop of the drivers',
+        'param': 'list, read or set parameters'},
     'Look at a recording': {
         'info': 'topics, rates, losses and plausibility',
         'report': 'one HTML page with plots and metrics',
@@ -53,9 +58,9 @@ def overview() -> str:
     """Return the text that ``pam`` prints without arguments."""
     wide = max(len(command) for command, _ in FIRST_STEPS) + 2
     lines = ['Simulate, run, record, replay and tune a pneumatic muscle rig.', '', 'First steps']
-    lines += [f'  {command:{wide}}{text}' for command, text in FIRST_STEPS]
+    lines += [*(f'  {command:{wide}}{text}' for command, text in FIRST_STEPS), '']
     for title, verbs in GROUPS.items():
-        lines += ['', title, *(f'  {verb:14}{text}' for verb, text in verbs.items())]
+        lines += [title, *(f'  {verb:14}{text}' for verb, text in verbs.items())]
     return '\n'.join(lines)
 
 

@@ -81,6 +81,7 @@ class ValveDriver(ManagedNode):
     loop: Any = None            # a DriverLoop, once configured
     output: Any = None          # what the valve hangs on
     _not_vented = ''        # why not, at the end
+    _refusal = ''           # of the last signal by the device
     _stopped: Any = None    # what a latched stop is carried over from
     _safety_services: Sequence[Any] = ()
 
@@ -217,7 +218,7 @@ class ValveDriver(ManagedNode):
         self.loop.set_sender_fault(fault)
         self._answering.every(ANSWER_PERIOD_S if fault else IDLE_PERIOD_S)
         signal, status = self.loop.tick(now_ns)
-        problem = self.output.send(signal.efforts)
+        problem = self._refusal = self.output.send(signal.efforts)
         self.loop.on_device(problem)
         self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
         followed = self.loop.followed()
@@ -232,7 +233,7 @@ class ValveDriver(ManagedNode):
         """Send the signal that vents, again if the device refuses it."""
         if self.loop is None:
             return
-        problem = self._not_vented = self.output.vent(TRIES)
+        problem = self._not_vented = self._refusal = self.output.vent(TRIES)
         self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
         if problem:
             self.result_code = 1
@@ -267,6 +268,10 @@ class ValveDriver(ManagedNode):
                 self._guarded(self.tick)        # not a moment later
             else:
                 self.safe_stop('emergency stop')
+            if self._refusal:
+                response.success = False
+                response.message = ('The emergency stop is latched, but the valve did not take '
+                                    f'the signal that vents: {self._refusal}.')
         return response
 
     def _on_reset(self, request: Any, response: Any) -> Any:

@@ -43,16 +43,27 @@ def local_context(domain_id: int, arguments: Sequence[str] = ()) -> rclpy.Contex
     context = rclpy.Context()
     before = os.environ.get(RANGE)
     os.environ[RANGE] = 'LOCALHOST'
-    prepare_middleware()
     try:
-        rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
-                   signal_handler_options=SignalHandlerOptions.NO)
+        _open(context, domain_id, arguments)
     finally:
         if before is None:
             del os.environ[RANGE]
         else:
             os.environ[RANGE] = before
     return context
+
+
+def context_by_environment(domain_id: int, arguments: Sequence[str] = ()) -> rclpy.Context:
+    """Return an open context that looks as far as the nodes of this environment do."""
+    context = rclpy.Context()
+    _open(context, domain_id, arguments)
+    return context
+
+
+def _open(context: rclpy.Context, domain_id: int, arguments: Sequence[str]) -> None:
+    prepare_middleware()
+    rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
+               signal_handler_options=SignalHandlerOptions.NO)
 
 
 class RigClient:
@@ -63,6 +74,8 @@ class RigClient:
     ----------
     domain_id : int
         ROS domain; only this machine is looked at.
+    name : str
+        Of the node, and of its enclave.
 
     Attributes
     ----------
@@ -73,12 +86,12 @@ class RigClient:
 
     """
 
-    def __init__(self, domain_id: int) -> None:
-        context = local_context(domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
-        self.node = Node(NAME, context=context, use_global_arguments=False, enable_rosout=False,
+    def __init__(self, domain_id: int, name: str = NAME) -> None:
+        context = self.open_context(domain_id, ['--ros-args', '--enclave', f'/{name}'])
+        self.node = Node(name, context=context, use_global_arguments=False, enable_rosout=False,
                          start_parameter_services=False)
-        self._executor = SingleThreadedExecutor(context=self.node.context)
-        self._executor.add_node(self.node)
+        self.executor = SingleThreadedExecutor(context=self.node.context)
+        self.executor.add_node(self.node)
         self._clients: dict[str, Any] = {}
         self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
         self.changes: list[tuple[float, str, int, str]] = []
@@ -86,6 +99,10 @@ class RigClient:
         # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
         self.node.create_subscription(
             DiagnosticArray, '/diagnostics', self._on_diagnostics, USUAL.consumer.depth, raw=True)
+
+    def open_context(self, domain_id: int, arguments: Sequence[str]) -> rclpy.Context:
+        """Return an open context for the node."""
+        return local_context(domain_id, arguments)
 
     def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():
@@ -102,7 +119,7 @@ class RigClient:
             left_s = deadline - time.monotonic()
             if left_s <= 0.0:
                 return
-            self._executor.spin_once(timeout_sec=left_s)
+            self.executor.spin_once(timeout_sec=left_s)
 
     def change_states(self, full_names: Iterable[str], transition: str, timeout_s: float,
                       alive: Callable[[str], bool] = lambda name: True) -> list[str]:
@@ -142,7 +159,7 @@ class RigClient:
                     del waiting[name]
                     refused.append(name)
             if waiting:
-                self._executor.spin_once(timeout_sec=0.02)
+                self.executor.spin_once(timeout_sec=0.02)
         return refused + list(waiting)
 
     def _request(self, full_name: str, transition: str) -> Any:
@@ -169,6 +186,6 @@ class RigClient:
 
     def close(self) -> None:
         """Leave the graph."""
-        self._executor.shutdown(timeout_sec=1.0)
+        self.executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.node.context)

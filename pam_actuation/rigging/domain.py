@@ -15,6 +15,7 @@
 """A ROS domain of one's own, so that two sessions on a machine do not mix."""
 
 import fcntl
+import glob
 import os
 import socket
 import tempfile
@@ -29,6 +30,8 @@ PORT_BASE, PORTS_PER_DOMAIN, FIRST_PARTICIPANT = 7400, 250, 10
 class DomainLock:
     """
     Hold a ROS domain id: no other session on this machine gets the same.
+
+    ``domains_in_use`` finds it for as long as it is held.
 
     Parameters
     ----------
@@ -48,6 +51,7 @@ class DomainLock:
             if not 0 <= domain_id <= 232:
                 raise InputError(f'{domain_id} is not allowed, give 0 to 232', 'domain id')
             self.domain_id = domain_id
+            self._file = _locked(domain_id)
             return
         span = HIGHEST - LOWEST + 1
         for k in range(span):
@@ -58,15 +62,8 @@ class DomainLock:
         raise InputError(f'all ROS domains from {LOWEST} to {HIGHEST} are in use', 'domain id')
 
     def _take(self, candidate: int) -> bool:
-        path = os.path.join(tempfile.gettempdir(), f'pam_actuation_domain_{candidate}.lock')
-        try:
-            handle = open(path, 'a')
-        except OSError:
-            return False        # the lock of another user
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            handle.close()
+        handle = _locked(candidate)
+        if handle is None:
             return False
         if not _silent(candidate):
             handle.close()
@@ -79,6 +76,41 @@ class DomainLock:
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def _locked(domain_id: int) -> TextIO | None:
+    """Return the locked file of a domain, None if another session or user has it."""
+    try:
+        handle = open(_path(domain_id), 'a')
+    except OSError:
+        return None         # the lock of another user
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        handle.close()
+        return None
+    return handle
+
+
+def _path(domain_id: object) -> str:
+    return os.path.join(tempfile.gettempdir(), f'pam_actuation_domain_{domain_id}.lock')
+
+
+def domains_in_use() -> list[int]:
+    """Return the ROS domains in which sessions on this machine run, sorted."""
+    before, after = _path('*').split('*')
+    found = []
+    for path in glob.glob(f'{glob.escape(before)}*{after}'):
+        number = path.removeprefix(before).removesuffix(after)
+        try:
+            with open(path) as handle:
+                fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if number.isdigit():
+                found.append(int(number))
+        except OSError:
+            pass            # gone meanwhile, or not ours to look at
+    return sorted(found)
 
 
 def _silent(domain_id: int) -> bool:

@@ -130,6 +130,7 @@ def test_the_shell_is_answered_with_verbs_options_and_names():
     assert completed('pam simulate rest --controller pid_p') == {
         'pid_plain', 'pid_plain_hsv', 'pid_plain_random', 'pid_plain_random_hsv'}
     assert completed('pam nodes valve_') == {'valve_driver', 'valve_watchdog'}
+    assert completed('pam param get sofc') == {'sofc_controller'}
 
 
 def test_completion_loads_no_simulator():

@@ -25,7 +25,8 @@ import pytest
 NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
          'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
          'valves': ['compare'], 'rules': ['sofc_ppr'], 'import': ['table.csv'],
-         'export': ['bag', '--out', 'table.csv'], 'rig': ['new']}
+         'export': ['bag', '--out', 'table.csv'], 'rig': ['new'],
+         'param': ['list', 'valve_driver']}
 WRONG_NUMBERS = {
     'number': ('-5', 'nan', 'inf', 'five', '3,5', '', '1e999'),
     'count': ('-5', 'nan', '2.5', 'five', '3,5', '', '99999999999999999999x')}
@@ -35,6 +36,8 @@ NUMBERS = {
     ('simulate', '--seed'): '0 to 4294967295',
     ('up', '--domain-id'): '0 to 232', ('up', '--realtime-priority'): '0 to 96',
     ('up', '--seconds'): '0 s or more',
+    **{(verb, option): allowed for verb in ('status', 'estop', 'reset', 'param')
+       for option, allowed in (('--domain-id', '0 to 232'), ('--wait', '0.1 to 60 s'))},
     ('import', '--rate'): '0.1 to 1000000 Hz', ('import', '--every'): '1 to 1000000',
     ('import', '--from'): '0 s or more', ('import', '--to'): '0 s or more',
     ('export', '--rate'): '0.1 to 100000 Hz',

@@ -28,6 +28,7 @@ from fake_sysfs import (                                                    # no
     break_attribute, DAC_SCALE_MV, duties, make_adc, make_dac, make_pwm, number_in, PERIOD_NS,
     put)
 from live_rig import Commander, LiveRig, wait_for                           # noqa: E402
+from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.processes import node_environment                # noqa: E402
 from std_srvs.srv import Trigger                                            # noqa: E402
@@ -130,7 +131,7 @@ def test_a_silent_controller_vents_the_device_within_the_limit(rig):
     follows(rig)
 
 
-def test_a_device_that_refuses_is_a_fault_and_vents_once_it_is_back(rig):
+def test_a_device_that_refuses_is_a_fault_and_vents_once_it_is_back(rig, capsys):
     follows(rig)
     break_attribute(rig.raw)
     wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 5.0, 'the fault')
@@ -138,6 +139,9 @@ def test_a_device_that_refuses_is_a_fault_and_vents_once_it_is_back(rig):
     assert rig.heard['valve_signal'][-1].plain.efforts == (0.0,)
     answer = rig.call(Trigger, 'valve_driver/reset')
     assert not answer.success and 'No space left' in answer.message
+    assert main(['estop', '--domain-id', str(rig.domain_id), '--wait', '20']) == 1
+    told = capsys.readouterr().out
+    assert 'NOT KNOWN TO VENT' in told and 'No space left' in told and 'dump valve' in told
     put(rig.raw, 2222)
     wait_for(lambda: number_in(rig.raw) == 0, 5.0, 'the safe voltage')
     time.sleep(0.05)

@@ -14,8 +14,11 @@
 
 """Test all nodes together, each started as ``ros2 run`` does: topics, services, a kill."""
 
+import json
 import signal
 import statistics
+import subprocess
+import sys
 import time
 
 import pytest
@@ -25,6 +28,7 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition                                   # noqa: E402, I100
 from lifecycle_msgs.srv import ChangeState, GetState                        # noqa: E402
 from live_rig import LiveRig, wait_for                                      # noqa: E402
+from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.control.sofc.persistence import load_rules               # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue     # noqa: E402
@@ -116,6 +120,52 @@ def test_parameters_are_described_and_guarded(rig):
         Parameter(name='max_pressure_gauge_pa', value=value)])
     answer = rig.call(SetParameters, 'valve_driver/set_parameters', request)
     assert not answer.results[0].successful and answer.results[0].reason
+
+
+def _pam(rig, capsys, code, verb, *words):
+    """Run a verb in the domain of the rig; return its result."""
+    assert main([verb, *words, '--domain-id', str(rig.domain_id), '--wait', '20', '--json']) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_the_rig_is_operated_without_the_command_of_ros(rig, capsys):
+    assert main(['status', '--domain-id', str(rig.domain_id), '--wait', '20']) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in told] == [
+        [f'/muscle/{name}', 'ok'] for name in sorted(NODES)]
+
+    described = _pam(rig, capsys, 0, 'param', 'get', 'valve_driver', 'max_pressure_gauge_pa')
+    limit = described['parameters']['max_pressure_gauge_pa']
+    assert (limit['value'], limit['read_only']) == (6e5, True) and 'to 1e+06' in limit['allowed']
+    _pam(rig, capsys, 0, 'param', 'set', 'sofc_controller', 'learning', 'false')
+    wait_for(lambda: _last_state(rig)['learning'] == 0.0, 3.0, 'the end of learning')
+    changed = _pam(rig, capsys, 0, 'param', 'set', '/muscle/sofc_controller', 'learning', 'true')
+    assert changed['parameters']['learning']['value'] is True
+    for words, why in (
+            (('set', 'valve_driver', 'max_pressure_gauge_pa', '1e5'), 'start it with -p'),
+            (('set', 'sofc_controller', 'learning', 'maybe'), 'it must be true or false'),
+            (('get', 'sofc_controller', 'lerning'), 'did you mean `learning`?')):
+        error = _pam(rig, capsys, 2, 'param', *words)['error']
+        assert why in error, error
+
+    stopped = _pam(rig, capsys, 0, 'estop', '--namespace', 'muscle')
+    answered_ns = time.time_ns()
+    assert stopped['all_vent'] and len(stopped['drivers']) == 1
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 5.0, 'the reason')
+    after = [heard.plain.efforts for heard in rig.heard['valve_signal']
+             if heard.plain.stamp_ns > answered_ns]
+    assert set(after) <= {(0.0,)}
+    driver = _pam(rig, capsys, 1, 'status', 'muscle/valve_driver')['nodes'][0]
+    assert 'emergency stop' in driver['message']
+    assert driver['values']['state'] == 'emergency_stop'
+    assert _pam(rig, capsys, 0, 'reset')['all_reset']
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 0, 5.0, 'the driver to follow')
+    # As from a shell: by the environment alone.
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'param', 'list', 'sofc_controller',
+         '--wait', '20'],
+        env=rig.environment, capture_output=True, text=True)
+    assert done.returncode == 0 and '\nlearning: true\n' in done.stdout, done.stderr
 
 
 def test_an_impossible_transition_is_refused_and_hurts_nobody(rig):

@@ -1,0 +1,97 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam status``: how the running nodes are, without the ``ros2`` command."""
+
+import argparse
+from typing import Any, TYPE_CHECKING
+
+from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.live import add_live_options, nobody, operators
+from pam_actuation.cli.options import Parser, source
+
+if TYPE_CHECKING:
+    from pam_actuation.nodes.operator import Operator
+
+HELP = """Show how the running nodes are: level, reason, lost messages; of one node, all values.
+
+Exit code 1: a node reports an error (a driver that vents, for instance), lost a message or
+sent no status."""
+EXAMPLE = 'pam status valve_driver'
+LEVELS = ('ok', 'WARN', 'ERROR', 'STALE', 'silent')
+WELL = LEVELS[:2]
+SILENT: tuple[int, str, dict[str, str]] = (
+    LEVELS.index('silent'), 'sent no status: not active yet, or stopped', {})
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('name', type=source, nargs='?', default=None, metavar='NODE',
+                        help='show all values of this node, by its full or its last name')
+    add_live_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen to all nodes for a moment; exit code 1 if one is not well, 2 if there is none."""
+    from pam_sim.errors import InputError
+    with operators(args) as opened:
+        rows = _rows(opened, args.wait)
+        if not rows:
+            raise InputError(nobody(opened, 'node of a rig'))
+    if args.name is not None:
+        rows = [row for row in rows if _is_called(row['node'], args.name)]
+        if not rows:
+            raise InputError('no node of this name is running', args.name)
+    several = len({row['domain_id'] for row in rows}) > 1
+    text = []
+    wide = max(len(row['node']) for row in rows)
+    for row in rows:
+        domain = f'domain {row["domain_id"]:<4}' if several else ''
+        lost = f'; {row["lost"]} messages lost' if row['lost'] else ''
+        text.append(f'{domain}{row["node"]:{wide}}  {row["level"]:6}{row["message"]}{lost}')
+        if args.name is not None:
+            text += [f'  {key}: {value}' for key, value in row['values'].items()]
+    emit(args, {'schema': 1, 'nodes': rows}, '\n'.join(text))
+    well = all(row['level'] in WELL and not row['lost'] for row in rows)
+    return EXIT_DONE if well else EXIT_FINDING
+
+
+def _rows(opened: 'list[Operator]', wait_s: float) -> list[dict[str, Any]]:
+    """Return the status of each node, and who sent none."""
+    from pam_actuation.cli.completion import nodes as executables
+    from pam_actuation.nodes.operator import watch
+    known = set(executables())
+
+    def there(operator: 'Operator') -> set[str]:
+        found = {name for name in operator.statuses if operator.concerns(name)}
+        return found | {name for name in operator.nodes() if name.rpartition('/')[2] in known}
+
+    watch(opened, lambda: frozenset(
+        (one.domain_id, name, name in one.statuses) for one in opened for name in there(one)),
+        wait_s)
+    rows = []
+    for operator in opened:
+        for name in sorted(there(operator)):
+            level, message, values = operator.statuses.get(name, SILENT)
+            lost = sum(int(value) for key, value in values.items()
+                       if key.startswith('lost.') and value.isdigit())
+            rows.append({'node': name, 'domain_id': operator.domain_id,
+                         'level': LEVELS[level], 'message': message,
+                         'lost': lost, 'values': values})
+    return rows
+
+
+def _is_called(full_name: str, asked: str) -> bool:
+    """Tell whether a node is the one asked for, by its full name or the end of it."""
+    return full_name.strip('/') == asked.strip('/') or full_name.endswith(f'/{asked.strip("/")}')

@@ -1,0 +1,124 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the verbs of an operator say of drivers that refuse, hang, or are not there."""
+
+import json
+import threading
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.cli.main import main                                     # noqa: E402, I100
+from pam_actuation.nodes import operator                                    # noqa: E402
+from pam_actuation.rigging.client import local_context                      # noqa: E402
+from pam_actuation.rigging.domain import DomainLock, domains_in_use         # noqa: E402
+import rclpy                                                                # noqa: E402
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node                                                 # noqa: E402
+from std_srvs.srv import Trigger                                            # noqa: E402
+
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
+
+
+def _refuse(request, response):
+    response.success, response.message = False, 'the valve does not move'
+    return response
+
+
+@pytest.fixture(scope='module')
+def domain():
+    """Three nodes that pass for drivers: one refuses, one hangs, one is not configured."""
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    nodes = {name: Node('valve_driver', namespace=f'/{name}', context=context)
+             for name in ('refuses', 'hangs', 'begins')}
+    for name in ('refuses', 'hangs'):
+        for service in ('emergency_stop', 'reset'):
+            nodes[name].create_service(Trigger, f'~/{service}', _refuse)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(nodes['refuses'])
+
+    def spin():
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    thread = threading.Thread(target=spin)
+    thread.start()
+    yield lock.domain_id
+    executor.shutdown()
+    rclpy.try_shutdown(context=context)
+    thread.join()
+    for node in nodes.values():
+        node.destroy_node()
+    lock.release()
+
+
+def _pam(capsys, *words):
+    code = main([*words, '--json'])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_a_stop_counts_only_where_the_driver_says_so(domain, capsys, monkeypatch):
+    monkeypatch.setattr(operator, 'ANSWER_S', 1.0)
+    code, said = _pam(capsys, 'estop', '--domain-id', str(domain))
+    assert code == 1 and not said['all_vent']
+    assert [(one['node'], one['vents'], one['message']) for one in said['drivers']] == [
+        ('/hangs/valve_driver', False, 'no answer within 1 s'),
+        ('/refuses/valve_driver', False, 'the valve does not move')]
+    assert any('/begins/valve_driver is not configured' in one for one in said['findings'])
+    assert any('2 of 2 drivers did not say' in one for one in said['findings'])
+    code, said = _pam(capsys, 'reset', '--domain-id', str(domain), '--namespace', 'refuses')
+    assert code == 1 and [one['message'] for one in said['drivers']] == [
+        'the valve does not move']
+
+
+def test_a_node_without_a_status_is_named(domain, capsys):
+    code, said = _pam(capsys, 'status', '--domain-id', str(domain))
+    assert code == 1 and {one['level'] for one in said['nodes']} == {'silent'}
+    assert len(said['nodes']) == 3
+
+
+@pytest.mark.parametrize('words', [
+    ['status'], ['estop'], ['reset'], ['param', 'list', 'valve_driver']])
+def test_where_nobody_is_there_it_is_one_sentence(domain, capsys, words):
+    assert main([*words, '--domain-id', str(domain), '--namespace', '/nowhere', '--wait',
+                 '0.3']) == 2
+    said = capsys.readouterr().err
+    assert f'found in or below /nowhere in ROS domain {domain}' in said
+    assert said.count('\n') == 1
+
+
+def test_a_node_nearly_right_is_told_with_the_right_one(domain, capsys):
+    assert main(['param', 'get', 'valve_drver', 'backend', '--domain-id', str(domain)]) == 2
+    assert '(did you mean `valve_driver`?)' in capsys.readouterr().err
+
+
+def test_words_that_are_missing_are_told(capsys):
+    assert main(['param', 'set', 'valve_driver', 'backend']) == 2
+    assert 'pam param set: takes NODE NAME VALUE, 2 of them are given' in capsys.readouterr().err
+
+
+def test_the_domain_of_every_session_is_found(domain):
+    assert domain in domains_in_use()
+    lock = DomainLock()
+    with_lock = domains_in_use()
+    lock.release()
+    assert lock.domain_id in with_lock and lock.domain_id not in domains_in_use()
+    given = DomainLock(231)
+    assert 231 in domains_in_use()
+    given.release()
