@@ -124,7 +124,8 @@ def test_parameters_are_described_and_guarded(rig):
 
 def _pam(rig, capsys, code, verb, *words):
     """Run a verb in the domain of the rig; return its result."""
-    assert main([verb, *words, '--domain-id', str(rig.domain_id), '--wait', '20', '--json']) == code
+    words = (*words, '--domain-id', str(rig.domain_id), '--wait', '20', '--json')
+    assert main([verb, *words]) == code
     return json.loads(capsys.readouterr().out)
 
 
