@@ -40,14 +40,13 @@ from pam_actuation.report.gap import write_gap
 from pam_actuation.report.metrics import run_metrics
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
-from pam_sim.rig import Rig
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'test' / 'hidden'))
 
-import results_page  # noqa: E402, I100
+from hidden_rig import hiding  # noqa: E402, I100
+import results_page  # noqa: E402
 import truth_commands  # noqa: E402
 import truth_effects  # noqa: E402
-import truth_live  # noqa: E402
 import truth_run  # noqa: E402
 import truth_sensors  # noqa: E402
 
@@ -65,24 +64,9 @@ SEEDS = (11,)                  # of the sensor noise on the hidden rig
 TUNING_SEED, CASE_SEED = 1, 2026
 
 
-class OnHiddenRig(Rig):
-    """The nominal rig in name: what moves is a hidden one with ``numbers``."""
-
-    numbers = {}
-
-    def plant(self, seed=0, dt_s=0.001, **initial):
-        """Return the hidden rig at rest."""
-        plant = truth_live.LiveRig(self.numbers)
-        plant.rig = self
-        return plant
-
-
 def hidden_rig(numbers):
     """Return the hidden rig with the sensor noise of a real one."""
-    nominal = load_rig(MODEL).with_(sensors=NOISE)
-    found = OnHiddenRig(**{name: getattr(nominal, name) for name in Rig.__dataclass_fields__})
-    object.__setattr__(found, 'numbers', numbers)
-    return found
+    return hiding(load_rig(MODEL).with_(sensors=NOISE), numbers)
 
 
 def hidden_numbers(effects, seed):
