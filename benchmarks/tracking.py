@@ -29,14 +29,16 @@ loop; every error is that of the muscle (reference less true contraction, no sen
   rules taught on the nominal rig, beside the same rules frozen.
 - ``change``: 1 kg more and 15 % less supply in the middle of a run at 0.5 Hz, rules taught.
 
-The valve driver is told of the nominal rig throughout.
+The valve driver is told of the nominal rig throughout. With ``--hidden`` all runs are on rigs of
+the independent simulator under test/hidden, which are off by up to 30 % and have other equations.
+Rules then are taught there too, but for ``rigs``.
 """
 
 import argparse
 from dataclasses import dataclass
-import sys
 from typing import Callable
 
+from hidden_rig import hidden_loop, hidden_rig, OnHiddenRig
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.drivers.for_rig import driver_config
@@ -52,6 +54,7 @@ FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
 CYCLES = 20
 SEED = 3
 TEACHING = ((0.1, 3), (1.0, 30), (0.25, 8), (0.5, 20))      # frequency and cycles, in order
+HIDDEN_SEED, HIDDEN_RIGS = 821, 30
 SETTLED_M = 1e-4
 STEPS, STEP_HOLD_S, STEP_SEEDS = 6, 5.0, range(8)
 IN_TIME_S = 0.6
@@ -73,6 +76,8 @@ def preset(name):
 
 CONTROLLERS = (
     Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
+    Controller('SOFC with model', lambda rig: load_controller(f'sofc_model_{rig.valve}', rig),
+               learns=True),
     Controller('LQI, tuned', preset('lqi')),
     Controller('PID + inverse, tuned', preset('pid')),
     Controller('PID, tuned', preset('pid_plain')),
@@ -108,8 +113,20 @@ segments:
 
 def closed_loop(rig, experiment, seed=SEED, **more):
     """Return the closed loop with the driver of the nominal rig."""
+    if isinstance(rig, OnHiddenRig):
+        return hidden_loop(rig, experiment, seed=seed, **more)
     driver = driver_config(load_rig(RIG, valve=rig.valve))
     return ClosedLoop(rig, experiment, seed=seed, driver=driver, **more)
+
+
+def chosen_rig(valve, hidden):
+    """Return the rig of all tables but that of random rigs."""
+    return hidden_rig(valve, HIDDEN_SEED) if hidden else load_rig(RIG, valve=valve)
+
+
+def named(rig):
+    """Return the valve of a rig, and whether that rig is a hidden one, for headings."""
+    return f'{rig.valve}, a hidden rig' if isinstance(rig, OnHiddenRig) else rig.valve
 
 
 def cycles_m(result):
@@ -133,11 +150,12 @@ def taught(controller, rig, center_m, amplitude_m):
     return controller
 
 
-def show_sines(valve, controllers):
+def show_sines(valve, controllers, hidden):
     """Print error per frequency and controller."""
-    rig = load_rig(RIG, valve=valve)
+    rig = chosen_rig(valve, hidden)
     loops = [closed_loop(rig, sine(f)) for f in FREQUENCIES_HZ]
-    print(f'\n## Sine, {valve}: RMSE (largest error; part that repeats) of cycle {CYCLES} [mm]\n')
+    print(f'\n## Sine, {named(rig)}: '
+          f'RMSE (largest error; part that repeats) of cycle {CYCLES} [mm]\n')
     print('| controller | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
     print('|---|' + '---|' * len(FREQUENCIES_HZ))
     for one in controllers:
@@ -168,12 +186,12 @@ def staircase_figures(result):
     return np.reshape(figures, (STEPS, 2, 3))
 
 
-def show_steps(valve, controllers):
+def show_steps(valve, controllers, hidden):
     """Print what a step of 10 mm up and one down do, once and over several seeds."""
-    rig = load_rig(RIG, valve=valve)
+    rig = chosen_rig(valve, hidden)
     loops = [closed_loop(rig, steps(), seed) for seed in (SEED, *STEP_SEEDS)]
     shares = []
-    print(f'\n## Step of 10 mm, {valve}\n')
+    print(f'\n## Step of 10 mm, {named(rig)}\n')
     print('| controller | step | up: end [mm] | overshoot [%] | settled [s] '
           '| down: end [mm] | overshoot [%] | settled [s] |')
     print('|---|' + '---|' * 7)
@@ -201,15 +219,15 @@ def show_steps(valve, controllers):
     print('\n'.join(shares), flush=True)
 
 
-def show_gait(valve, controllers):
+def show_gait(valve, controllers, hidden):
     """Print the error of the tenth stride of a knee at 0.8 Hz."""
-    rig = load_rig(RIG, valve=valve)
+    rig = chosen_rig(valve, hidden)
     experiment = load_experiment('knee_gait')
     loop = closed_loop(rig, experiment)
     stroke_m = np.ptp(loop.reference_m[round(6.0 * loop.rate_hz):])
     end = round((experiment.duration_s - 0.5) * loop.rate_hz)
     stride = round(loop.rate_hz / 0.8)
-    print(f'\n## Knee gait at 0.8 Hz, {valve}: stroke {stroke_m * 1e3:.1f} mm\n')
+    print(f'\n## Knee gait at 0.8 Hz, {named(rig)}: stroke {stroke_m * 1e3:.1f} mm\n')
     print('| controller | first stride [mm] | tenth stride [mm] | of the stroke [%] |')
     print('|---|---|---|---|')
     for one in controllers:
@@ -220,12 +238,14 @@ def show_gait(valve, controllers):
               flush=True)
 
 
-def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
+def show_random_rigs(valve, controllers, hidden, count, frequency_hz=0.5):
     """Print how the same taught rules fare on rigs they were not taught on."""
     nominal = load_rig(RIG, valve=valve)
     experiment = sine(frequency_hz, CYCLES, 0.012, 0.006)
-    print(f'\n## {count} random rigs, {valve}: RMSE of cycle {CYCLES} at {frequency_hz:g} Hz, '
-          '+-6 mm about 12 mm\n')
+    rigs = ([hidden_rig(valve, HIDDEN_SEED + 1 + k) for k in range(count)] if hidden
+            else random_rigs(nominal, count, SEED))
+    print(f'\n## {count} {"hidden" if hidden else "random"} rigs, {valve}: '
+          f'RMSE of cycle {CYCLES} at {frequency_hz:g} Hz, +-6 mm about 12 mm\n')
     print('| controller | nominal [mm] | median | worst | median/nominal | worst/nominal '
           '| worst ratio to frozen rules | highest pressure [kPa] |')
     print('|---|' + '---|' * 7)
@@ -234,7 +254,7 @@ def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
             continue
         teacher = taught(one.build(nominal), nominal, 0.012, 0.006)
         figures = []
-        for k, rig in enumerate((nominal, *random_rigs(nominal, count, SEED))):
+        for k, rig in enumerate((nominal, *rigs)):
             loop = closed_loop(rig, experiment, SEED + k)
             ends = []
             for learn in (True, False):
@@ -250,9 +270,9 @@ def show_random_rigs(valve, controllers, count, frequency_hz=0.5):
               f'| {np.max(learned / frozen):.2f} | {table[:, 2].max():.0f} |', flush=True)
 
 
-def show_changes(valve, controllers):
+def show_changes(valve, controllers, hidden):
     """Print the cycles after a change in the middle of the run."""
-    rig = load_rig(RIG, valve=valve)
+    rig = chosen_rig(valve, hidden)
     supply_pa = rig.parameters['supply_pa']
     frequency_hz, cycles, change = 0.5, 30, 20
     begins_s = 5.0 + change / frequency_hz
@@ -262,7 +282,7 @@ def show_changes(valve, controllers):
         'supply -15 %': {
             'supply_pa': lambda t: supply_pa * (0.85 if t >= begins_s else 1.0)}}
     print(f'\n## Change in cycle {change + 1} at {frequency_hz:g} Hz, +-6 mm about 12 mm, '
-          f'{valve}: RMSE per cycle [mm]\n')
+          f'{named(rig)}: RMSE per cycle [mm]\n')
     print('| controller | change | cycle before | 1 after | 2 | 3 | 4 | 5 | 6 | 10 |')
     print('|---|' + '---|' * 9)
     for one in controllers:
@@ -285,7 +305,10 @@ def command_line():
     parser.add_argument('--part', default=','.join(PARTS), help='tables, by commas')
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--controller', default='', help='only those whose name has this in it')
-    parser.add_argument('--rigs', type=int, default=200, help='number of random rigs')
+    parser.add_argument('--rigs', type=int, default=0,
+                        help=f'number of random rigs; default 200, of hidden ones {HIDDEN_RIGS}')
+    parser.add_argument('--hidden', action='store_true',
+                        help='on rigs of the independent simulator')
     results_page.add_write(parser, 'tracking')
     return parser
 
@@ -296,11 +319,19 @@ def show(args):
     for part in args.part.split(','):
         for valve in args.valve.split(','):
             if part == 'rigs':
-                show_random_rigs(valve, chosen, args.rigs)
+                show_random_rigs(valve, chosen, args.hidden, args.rigs or (
+                    HIDDEN_RIGS if args.hidden else 200))
             else:
                 {'sine': show_sines, 'step': show_steps, 'gait': show_gait,
-                 'change': show_changes}[part](valve, chosen)
+                 'change': show_changes}[part](valve, chosen, args.hidden)
+
+
+def main():
+    """Print the tables."""
+    args = command_line().parse_args()
+    with results_page.printed(args, __file__, 'hidden' * args.hidden):
+        show(args)
 
 
 if __name__ == '__main__':
-    sys.exit(results_page.run(command_line(), __file__, show))
+    main()

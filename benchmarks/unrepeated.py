@@ -47,7 +47,7 @@ CONTROLLERS = {
             'pid_plain_random_hsv', 'lqi_hsv')}
 SEEDS = range(501, 506)
 RIGS, RIG_SEED = 30, 700
-HIDDEN_RIGS, HIDDEN_SEED = 10, 811
+HIDDEN_RIGS, HIDDEN_SEED = 5, 811
 BARS = (0.7, 0.4, 0.5, 0.25)      # of the best baseline: first 30 s and from 60 s; then ahead
 DURATION_S = 100.0
 BEGIN_S = 3.0                     # end of rest and ramp
