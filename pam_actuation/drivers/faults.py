@@ -117,6 +117,10 @@ FAULT_TABLE = (
     Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
           'as above, from the lag of the regulator', IGNORE, False,
           'warning: the regulator closes its own loop; ends with a reading that differs'),
+    Fault('air_missing', 'No air at the regulator (PPR)',
+          'measured pressure more than 50 kPa below all that was commanded within lag and dead '
+          'time, and falling for 0.03 s, or below 20 kPa gauge for 0.2 s', IGNORE, False,
+          'warning; the pressure rises slowly from atmospheric pressure as the air returns'),
     Fault('supply_low', 'Supply loss',
           'measured supply pressure less than 20 kPa above the command', IGNORE, False,
           'warning: the muscle gets what there is; ends when the supply returns'),

@@ -212,3 +212,63 @@ class CommandOrder:
         if self._mixed_ns is not None and now_ns - self._mixed_ns > self.clear_s * NS_PER_S:
             self._mixed_ns = None
         return self._mixed_ns is not None
+
+
+class AirMonitor:
+    """
+    Notices that a regulator gets no air: the pressure falls although more is commanded.
+
+    A pressure that rises is only late. Lowest of what was commanded within lag and dead time is
+    what the muscle must have at least.
+
+    Parameters
+    ----------
+    lag_s, dead_time_s : float
+        Of the pressure behind a command [s]; an infinite lag counts as none.
+
+    """
+
+    MISSING_PA, EMPTY_PA = 50_000.0, P_ATM_PA + 20_000.0
+    FALLS_S, EMPTY_S = 0.03, 0.2
+    _FALL_PA = 1_000.0
+
+    def __init__(self, lag_s: float = math.inf, dead_time_s: float = 0.0) -> None:
+        self._window_s = 2.0 * (lag_s if math.isfinite(lag_s) else 0.0) + dead_time_s + 0.05
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._commands: deque[tuple[float, float]] = deque()       # time [s], pressure
+        self._readings: deque[tuple[float, float]] = deque()
+        self._time_s = 0.0
+        self._falls_s = 0.0
+        self._empty_s = 0.0
+
+    def missing(self, command_pa: float, measured_pa: float, elapsed_s: float) -> bool:
+        """
+        Take one tick; return whether no air comes.
+
+        Parameters
+        ----------
+        command_pa, measured_pa : float
+            Pressure that is followed, and newest measured one [absolute Pa]; NaN: not known.
+        elapsed_s : float
+            Time since the former tick [s].
+
+        """
+        self._time_s += elapsed_s
+        now_s = self._time_s
+        for kept, value, longest_s in ((self._commands, command_pa, self._window_s),
+                                       (self._readings, measured_pa, self.FALLS_S)):
+            kept.append((now_s, value))
+            while now_s - kept[0][0] > longest_s:
+                kept.popleft()
+        lowest_pa = min(value for _, value in self._commands)
+        if not measured_pa < lowest_pa - self.MISSING_PA:
+            self._falls_s = self._empty_s = 0.0
+            return False
+        if measured_pa < self._readings[0][1] - self._FALL_PA:
+            self._falls_s += elapsed_s
+        if measured_pa < self.EMPTY_PA:
+            self._empty_s += elapsed_s
+        return self._falls_s >= self.FALLS_S or self._empty_s >= self.EMPTY_S

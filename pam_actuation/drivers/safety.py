@@ -31,7 +31,8 @@ from typing import TypeVar
 
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
-from pam_actuation.drivers.monitors import Channel, CommandOrder, FrozenMonitor, stamp_problem
+from pam_actuation.drivers.monitors import (
+    AirMonitor, Channel, CommandOrder, FrozenMonitor, stamp_problem)
 from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
@@ -117,6 +118,7 @@ class SafetySupervisor:
                                 lim.highest_plausible_pa)
         self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest, 5e6)
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
+        self.air = AirMonitor(lag_s, dead_time_s)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
         # A regulator is told of each command as it comes: nothing waits there.
         self.ages = SteadyAge(
@@ -255,7 +257,7 @@ class SafetySupervisor:
 
     def _forget(self) -> None:
         self._pending = _Pending()
-        for part in (self.pressure, self.supply, self.frozen, self.order, self.ages):
+        for part in (self.pressure, self.supply, self.frozen, self.air, self.order, self.ages):
             part.forget()
         self.command_stamp_ns = None
         self.command_pa = math.nan
@@ -389,6 +391,7 @@ class SafetySupervisor:
         if self._fault is None or _without_figures(self._fault) != _without_figures(fault):
             self._fault = fault
         self._rise.begin()
+        self.air.forget()
         self.ages.forget()
         key, text = self._fault
         if FAULTS[key].latched:
@@ -419,7 +422,15 @@ class SafetySupervisor:
         lim = self.limits
         target = self.ages.at(now_ns, self.command_pa)
         target = min(max(target, P_ATM_PA), P_ATM_PA + lim.max_pressure_gauge_pa)
-        target = self._rise.limited(target, self._dt_s, self.pressure.pressure_pa)
+        measured = self.pressure.pressure_pa
+        target = self._rise.limited(target, self._dt_s, measured)
+        if not self.needs_pressure and self.air.missing(target, measured, self._dt_s):
+            self._warn('air_missing', (
+                f'the pressure does not follow: {gauge_kpa(measured):.0f} kPa gauge measured at '
+                f'a command of {gauge_kpa(target):.0f} kPa, no air supply?'), now_ns)
+            if not self._rise.active:
+                self._rise.begin()
+                target = self._rise.limited(target, 0.0, measured)
         self._watch_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)
 

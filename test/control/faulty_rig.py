@@ -35,9 +35,42 @@ HELD_M = 0.0089
 FIELD = {'contraction': 'contraction_m', 'force': 'force_n'}
 
 
+class SuppliedPlant(PlantLoop):
+    """A plant whose compressed air may fail: its supply line is then at atmosphere."""
+
+    _usual_pa = None
+
+    def supply(self, there):
+        """Take the compressed air away, or give it back."""
+        if self.rig.valve == 'hsv':
+            self._usual_pa = self._usual_pa or self.plant.supply_pa
+            self.plant.supply_pa = self._usual_pa if there else P_ATM_PA
+        else:
+            self._usual_pa = None if there else P_ATM_PA
+
+    def step(self, count):
+        """Advance; a regulator without supply lets the air back into the line, as at 0 V."""
+        if self.rig.valve == 'ppr' and self._usual_pa:
+            self.plant.step((0.0,), self._external, steps=count)
+        else:
+            super().step(count)
+
+
 class FaultyRig:
     """
     Controller, driver and the realistic rig on one bus.
+
+    Parameters
+    ----------
+    valve : {'ppr', 'hsv'}
+    controller : str
+        Its preset.
+    tells : bool
+        Whether the driver tells which pressure it follows.
+    seed : int
+        Of the sensor noise.
+    rig : pam_sim.rig.Rig, optional
+        What moves, in place of the realistic rig.
 
     Attributes
     ----------
@@ -50,7 +83,8 @@ class FaultyRig:
 
     """
 
-    def __init__(self, valve, controller, tells=True, seed=1):
+    def __init__(self, valve, controller, tells=True, seed=1, rig=None):
+        moved = rig
         rig = load_rig('dmsp_5_300_realistic', valve=valve)
         self.contraction_m, self.gauge_pa, self.reference_m = [], [], []
         self.reasons = set()
@@ -61,7 +95,8 @@ class FaultyRig:
         self._now_ns = START_NS
         self._bus = bus = Bus(on_sent=self._heard)
         driver = DriverLoop(valve, driver_config(rig))
-        self._measure = attach_plant(bus, PlantLoop(rig, seed=seed))
+        self._plant = SuppliedPlant(moved or rig, seed=seed)
+        self._measure = attach_plant(bus, self._plant)
         self._decide = controller_tick(bus, self._control)
         for loop in (driver, self._control):
             for topic, take in loop.takes().items():
@@ -80,13 +115,17 @@ class FaultyRig:
             How long.
         reference : callable
             Time [s] -> wanted contraction [m], rate [m/s].
-        fault : {'', 'nan', 'silent', 'past', 'future', 'frozen', 'stopped', 'apart'}
-            What is wrong with the readings of ``topics``; ``stopped``: with the controller;
-            ``apart``: controller and driver have not found each other yet.
+        fault : {'', 'nan', 'silent', 'past', 'future', 'frozen', 'shifted', 'stopped', 'apart', \
+'no_supply'}
+            What is wrong with the readings of ``topics``; ``shifted``: 30 kPa are added;
+            ``stopped``: with the controller; ``apart``: controller and driver have not found each
+            other yet; ``no_supply``: the compressed air is gone.
         topics : tuple of str
             Which readings.
 
         """
+        if 'no_supply' in (fault, self._fault):
+            self._plant.supply(fault != 'no_supply')
         self._fault, self._topics, self._reference = fault, topics, reference
         self._now_ns += round(duration_s * 1e9)
         self._bus.run_until(self._now_ns - 1)
@@ -148,6 +187,8 @@ def _spoiled(message, field, fault, sound):
         return None
     if fault in ('past', 'future'):
         later_ns = 1_000_000_000 if fault == 'future' else -1_000_000_000
+    elif fault == 'shifted':
+        value += 30e3
     elif fault == 'frozen':
         value = sound
     else:
