@@ -63,6 +63,11 @@ DOCS_REQUIRES = [
     'myst-nb>=1.1',      # tutorials that are notebooks; brings nbclient and ipykernel
 ]
 
+# `pam view`: the page in the browser. Loaded by this verb only.
+VIEW_REQUIRES = [
+    'tornado>=6.4',
+]
+
 # Tables of `pam import` and `pam export` that pandas reads with another library.
 TABLE_REQUIRES = [
     'pyarrow>=14.0',     # Parquet
@@ -72,6 +77,7 @@ TABLE_REQUIRES = [
 TEST_REQUIRES = [
     *DOCS_REQUIRES,
     *TABLE_REQUIRES,
+    *VIEW_REQUIRES,
     'pytest>=7.4',
     'pytest-timeout>=2.1',
     'pytest-xdist>=3.7',
@@ -133,7 +139,7 @@ setup(
     name=PACKAGE,
     version=VERSION,
     packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
-    package_data={'pam_actuation': ['py.typed'], 'pam_sim': [
+    package_data={'pam_actuation': ['py.typed', 'view/page/*'], 'pam_sim': [
         'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
         'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'valve/regulators/*.yaml',
         'gap/*.schema.json']},
@@ -146,7 +152,7 @@ setup(
     install_requires=RUN_REQUIRES,
     extras_require={
         'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES,
-        'tables': TABLE_REQUIRES,
+        'tables': TABLE_REQUIRES, 'view': VIEW_REQUIRES,
         'cluster': CLUSTER_REQUIRES, 'ray': RAY_REQUIRES, 'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',

@@ -27,7 +27,7 @@ LAYERS = (
      'ros_missing', 'slow_rise', 'transport', 'control', 'drivers', 'loops', 'bags', 'hardware',
      'plant_loop', 'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
-    ('report', 'models'),
+    ('report', 'models', 'view'),
     ('rigging',),
     ('nodes',),
     ('cli', 'demo', 'warm_up'))

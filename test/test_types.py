@@ -41,7 +41,8 @@ def bare_parts(path):
     bare = []
     tree = ast.parse(path.read_text(encoding='utf-8'))
     methods = {id(function) for parent in ast.walk(tree) if isinstance(parent, ast.ClassDef)
-               for function in parent.body if isinstance(function, ast.FunctionDef)
+               for function in parent.body
+               if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
                and not any(getattr(d, 'id', '') == 'staticmethod'
                            for d in function.decorator_list)}
     for function in ast.walk(tree):

@@ -37,6 +37,7 @@ GROUPS = {
         'param': 'list, read or set parameters'},
     'Look at a recording': {
         'info': 'topics, rates, losses and plausibility',
+        'view': 'a live page of a running rig in the browser, or a recording with a slider',
         'report': 'one HTML page with plots and metrics',
         'replay': 'step controller, driver and plant again on what was recorded',
         'rules': 'what the rules of a controller say, and what learning changed',

@@ -48,5 +48,7 @@ class Service:
 # then stayed behind by the whole history of the publisher for good. Physics that stood still
 # goes through all signals since, not the last. The recorder may be five seconds late.
 USUAL = Service(Quality(1000), Quality(1000), Quality(5000))
+# The live page only looks on: nothing is sent to it again, so no publisher ever waits for it.
+ONLOOKER = Quality(1000, reliability='best_effort')
 # What is said once, such as a robot description: who comes later hears it too.
 LATCHED = Quality(1, durability='transient_local')

@@ -56,7 +56,8 @@ NUMBERS = {
     ('identify', '--added-kg'): '0 to 500 kg', ('identify', '--seed'): '0 to 4294967295',
     ('gap', '--seconds'): '1 s or more', ('gap', '--materiality'): '0.01 to 1000',
     ('valves', '--seed'): '0 to 4294967295', ('valves', '--hold'): '2 to 3600 s',
-    ('rules', '--top'): '0 or more'}
+    ('rules', '--top'): '0 or more',
+    ('view', '--domain-id'): '0 to 232', ('view', '--port'): '0 to 65535'}
 
 
 def _options():

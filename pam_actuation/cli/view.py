@@ -1,0 +1,114 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam view``: a rig that runs, or a bag, as a page in the browser."""
+
+import argparse
+import json
+import os
+import threading
+from typing import TYPE_CHECKING
+
+from pam_actuation.cli.common import add_recover_option, EXIT_DONE
+from pam_actuation.cli.options import count, Parser, source
+from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_actuation.nodes.view_listener import ViewListener
+    from pam_actuation.view.server import ViewServer
+    from pam_actuation.view.source import Source
+
+HELP = ('Show a running rig live in the browser: plots, state of every node, emergency stop. '
+        'With a bag: the same page with a time slider.')
+EXAMPLE = 'pam view runs/first'
+NICENESS = 10           # whatever the rig does goes before
+
+
+def add_arguments(parser: Parser) -> None:
+    """Declare the options of the verb."""
+    parser.add_argument('bag', nargs='?', type=source, default=None,
+                        help='recording to show (default: the rig that runs)')
+    parser.add_argument('--namespace', default=None,
+                        help='show this namespace only (default: all)')
+    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
+                        help='ROS domain (default: ROS_DOMAIN_ID, else 0)')
+    parser.add_argument('--host', type=source, default=None, metavar='ADDRESS',
+                        help='address to listen on, 0.0.0.0 for all; who comes then needs the '
+                             'token that is printed (default: this machine only)')
+    parser.add_argument('--port', type=count(0, 65535), default=None, metavar='N',
+                        help='port, 0 for any (default: the first free one from 8750 on)')
+    parser.add_argument('--open', action='store_true', help='open the page in a browser here')
+    add_recover_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C, which is the ordinary end."""
+    need_tornado()
+    from pam_actuation.namespaces import namespace_of
+    from pam_actuation.view.access import Access
+    from pam_actuation.view.server import ViewServer
+    access = Access(args.host)
+    namespace = '' if args.namespace is None else namespace_of(args.namespace, '--namespace')
+    if args.bag is not None:
+        if args.domain_id is not None:
+            raise InputError('is for a running rig, not for a bag', '--domain-id')
+        from pam_actuation.view.recording import load
+        from pam_actuation.view.source import BagSource
+        recording = load(args.bag, args.recover, namespace)
+        return _serve(args, ViewServer(BagSource(recording), access, args.port), None)
+    try:
+        from pam_actuation.nodes.view_listener import ViewListener
+    except ImportError as error:
+        from pam_actuation.ros_missing import ros_missing
+        raise InputError(ros_missing(error.name or 'rclpy')) from None
+    os.nice(NICENESS)
+    listener = ViewListener(args.domain_id, namespace)
+    try:
+        return _serve(args, ViewServer(listener, access, args.port), listener)
+    finally:
+        listener.close()
+
+
+def need_tornado() -> None:
+    """Raise InputError where the library that serves the page is missing."""
+    from importlib.util import find_spec
+    if find_spec('tornado') is None:
+        raise InputError('pam view needs tornado, which is not installed: install the extra view, '
+                         'pip install "pam_actuation[view]"')
+
+
+def _serve(args: argparse.Namespace, server: 'ViewServer', listener: 'ViewListener | None') -> int:
+    server.start()
+    try:
+        _say(args, server.source, server.url)
+        while True:
+            if listener is None:
+                threading.Event().wait(3600.0)
+            else:
+                listener.run_once()
+    except KeyboardInterrupt:
+        return EXIT_DONE
+    finally:
+        server.stop()
+
+
+def _say(args: argparse.Namespace, shown: 'Source', url: str) -> None:
+    if args.json:
+        print(json.dumps({'url': url, 'live': shown.live}), flush=True)
+    else:
+        print(f'page: {url}\nCtrl-C ends it; the rig goes on without it' if shown.live
+              else f'page: {url}\nCtrl-C ends it', flush=True)
+    if args.open:
+        import webbrowser
+        webbrowser.open(url)

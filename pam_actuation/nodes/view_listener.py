@@ -1,0 +1,192 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the live page hears of a rig, and how it asks the drivers to vent.
+
+A node without parameters and services of its own. It subscribes as an onlooker: publishers send
+each message once and keep nothing for it, so it may be slow, stop or be killed at any time.
+"""
+
+from collections.abc import Iterator
+import os
+import queue
+import time
+from typing import Any, Final
+
+from pam_actuation.bags.series import table
+from pam_actuation.nodes import qos
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.ros_messages import message_class
+from pam_actuation.topics.codec import Reader
+from pam_actuation.topics.quality import ONLOOKER
+from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.transport import prepare_middleware
+from pam_actuation.view.plots import KEPT
+from pam_actuation.view.requests import EMERGENCY_STOP
+from pam_actuation.view.source import Answer
+from pam_actuation.view.store import Store
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+NAME: Final = 'pam_view'
+DIAGNOSTICS: Final = '/diagnostics'
+POLL_S, LOOK_S = 0.02, 1.0          # for messages; for new topics and drivers
+ANSWER_S: Final = 2.0               # a driver answers within a tick; later it is told as silent
+SERVICE: Final = 'std_srvs/srv/Trigger'
+
+
+class ViewListener:
+    """
+    A source of the page: the rigs of a ROS domain.
+
+    Parameters
+    ----------
+    domain_id : int, optional
+        ROS domain; default: that of the environment.
+    namespace : str
+        Only this namespace and those below it; '' for all.
+
+    """
+
+    live = True
+
+    def __init__(self, domain_id: int | None = None, namespace: str = '') -> None:
+        self.title = namespace
+        self.store = Store()
+        self._namespace = namespace
+        prepare_middleware()
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=domain_id, args=[],
+                   signal_handler_options=SignalHandlerOptions.NO)
+        # Several pages may look at one rig.
+        self._node = Node(f'{NAME}_{os.getpid()}', context=context, use_global_arguments=False,
+                          enable_rosout=False, start_parameter_services=False)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self._node)
+        self._topics: dict[str, PolledSubscription] = {}
+        self._read = Reader(short_name(DIAGNOSTICS))
+        self._add(DIAGNOSTICS)
+        self._clients: dict[str, dict[str, Any]] = {}       # driver: action: client
+        self._asked: queue.SimpleQueue[tuple[str, Answer]] = queue.SimpleQueue()
+        self._waiting: list[_Question] = []
+        self._look_at_s = 0.0
+
+    def drivers(self) -> list[str]:
+        """Return the full names of the nodes that can be asked to vent."""
+        return sorted(self._clients)
+
+    def act(self, action: str, answer: Answer) -> None:
+        """Ask every driver for an action; ``answer`` is called from the thread of ``run_once``."""
+        self._asked.put((action, answer))
+
+    def run_once(self) -> None:
+        """Take what has arrived, and wait a little; to be called again and again."""
+        now_s = time.monotonic()
+        if now_s >= self._look_at_s:
+            self._look_at_s = now_s + LOOK_S
+            self._look()
+        for full_name, subscription in self._topics.items():
+            self._take(full_name, subscription)
+        while not self._asked.empty():
+            self._waiting.append(_Question(self._clients, *self._asked.get()))
+        self._waiting = [one for one in self._waiting if not one.is_over()]
+        deadline_s = now_s + POLL_S
+        while (left_s := deadline_s - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left_s)
+
+    def _look(self) -> None:
+        """Find topics and drivers that came, forget drivers that went."""
+        for name, types in self._node.get_topic_names_and_types():
+            if name not in self._topics and self._is_drawn(name, types):
+                self._add(name)
+        found = set(self._found_drivers())
+        for driver in self._clients.keys() - found:
+            for client in self._clients.pop(driver).values():
+                self._node.destroy_client(client)
+        for driver in found - self._clients.keys():
+            self._clients[driver] = {
+                action: self._node.create_client(Trigger, f'{driver}/{action}')
+                for action in (EMERGENCY_STOP, 'reset')}
+
+    def _is_drawn(self, name: str, types: list[str]) -> bool:
+        short = short_name(name)
+        return (short in KEPT and BY_NAME[short].type_name in types
+                and (not self._namespace or name.startswith(f'{self._namespace}/')))
+
+    def _found_drivers(self) -> Iterator[str]:
+        for name, types in self._node.get_service_names_and_types():
+            node, _, action = name.rpartition('/')
+            if action == EMERGENCY_STOP and SERVICE in types and (
+                    not self._namespace or node.startswith(f'{self._namespace}/')):
+                yield node
+
+    def _add(self, full_name: str) -> None:
+        self._topics[full_name] = PolledSubscription(
+            self._node, message_class(BY_NAME[short_name(full_name)].type_name), full_name,
+            qos.profile(ONLOOKER), raw=True)
+
+    def _take(self, full_name: str, subscription: PolledSubscription) -> None:
+        raws = [raw for raw, _ in subscription.take()]
+        if not raws:
+            return
+        if full_name == DIAGNOSTICS:
+            for raw in raws:
+                self.store.add_statuses(
+                    status for status in self._read(raw) or () if self._is_of(status.name))
+            return
+        namespace, _, short = full_name.rpartition('/')
+        stamps_ns, values, bad = table(short, raws, KEPT[short])
+        if bad.any():
+            stamps_ns = stamps_ns[~bad]
+            values = {name: column[~bad] for name, column in values.items()}
+        self.store.add(namespace, short, stamps_ns, values, subscription.lost)
+
+    def _is_of(self, node: str) -> bool:
+        return not self._namespace or node.startswith(f'{self._namespace}/')
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown(timeout_sec=1.0)
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._node.context)
+
+
+class _Question:
+    """An action that some drivers were asked for."""
+
+    def __init__(self, clients: dict[str, dict[str, Any]], action: str, answer: Answer) -> None:
+        self._answer, self._until_s = answer, time.monotonic() + ANSWER_S
+        self._futures = {
+            driver: of_driver[action].call_async(Trigger.Request())
+            for driver, of_driver in clients.items()}
+
+    def is_over(self) -> bool:
+        """Tell whether all have answered or the time is over; hand on what they said."""
+        late = time.monotonic() > self._until_s
+        if not late and not all(future.done() for future in self._futures.values()):
+            return False
+        self._answer([_result(driver, future) for driver, future in self._futures.items()])
+        return True
+
+
+def _result(driver: str, future: Any) -> dict[str, Any]:
+    """Return what a driver answered, or that it did not."""
+    if not future.done():
+        return {'node': driver, 'ok': False, 'message': f'no answer within {ANSWER_S:g} s'}
+    response = future.result()
+    return {'node': driver, 'ok': bool(response.success), 'message': response.message}

@@ -1,0 +1,20 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The live page in the browser: what a rig does now, or did in a bag.
+
+No ROS here. ``nodes/view_listener.py`` fills a ``store.Store`` from topics, ``recording.py`` fills
+one from a bag, ``server.py`` serves it. The page itself is in ``page/``.
+"""

@@ -1,0 +1,101 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A bag as the page shows it."""
+
+from dataclasses import dataclass
+from functools import partial
+
+from pam_actuation.bags.series import table
+from pam_actuation.bags.source import Bag, read_bag
+from pam_actuation.topics.codec import decode
+from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.view.plots import KEPT
+from pam_actuation.view.store import Store
+from pam_sim.errors import InputError
+from pam_sim.files import StrPath
+
+DIAGNOSTICS = 'diagnostics'
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A bag that was read: its signals, and what it says of its experiment."""
+
+    path: str
+    store: Store
+    title: str
+    remarks: tuple[str, ...]
+
+
+def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording:
+    """
+    Read all signals of a bag that the page draws, and what its nodes said.
+
+    Parameters
+    ----------
+    path : path
+        As of ``bags.load.load_run``.
+    recover : bool
+        Also read what precedes the damage in a bag that ended early.
+    namespace : str
+        Only this namespace and those below it; '' for all.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        As ``bags.source.read_bag``; or nothing in it is drawn.
+
+    """
+    bag = read_bag(path, recover, _is_shown)
+    store = Store(span_ns=None)
+    for full_name, topic in bag.topics.items():
+        if not len(topic.payloads) or not _is_shown(full_name, topic.type_name, topic.encoding):
+            continue
+        short = short_name(full_name)
+        if short == DIAGNOSTICS:
+            _add_statuses(store, bag, full_name)
+            continue
+        if namespace and not full_name.startswith(f'{namespace}/'):
+            continue
+        stamps_ns, values, bad = table(short, topic.payloads, KEPT[short])
+        good = ~bad
+        order = stamps_ns[good].argsort(kind='stable')
+        store.add(full_name.rpartition('/')[0], short, stamps_ns[good][order],
+                  {name: column[good][order] for name, column in values.items()})
+    if not store.lines(''):
+        named = f' in the namespace {namespace}' if namespace else ''
+        raise InputError(f'the bag has no signal of a rig{named}; its topics: '
+                         f'{", ".join(sorted(bag.topics)) or "none"}', path)
+    return Recording(str(path), store, bag.experiment.get('experiment_name', ''),
+                     tuple(bag.remarks))
+
+
+def _is_shown(name: str, type_name: str, encoding: str) -> bool:
+    short = short_name(name)
+    return (encoding == 'cdr' and (short in KEPT or short == DIAGNOSTICS)
+            and BY_NAME[short].type_name == type_name)
+
+
+def _add_statuses(store: Store, bag: Bag, full_name: str) -> None:
+    read = partial(decode, DIAGNOSTICS)
+    for raw in bag.topics[full_name].payloads:
+        try:
+            store.add_statuses(read(raw))
+        except InputError:
+            continue            # pam info tells of it

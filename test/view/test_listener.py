@@ -1,0 +1,138 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The listener on real DDS: it finds topics and drivers that come later, and lost ones."""
+
+import time
+
+from pam_actuation import messages
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.nodes import qos  # noqa: E402, I100
+from pam_actuation.nodes.ros_messages import class_of  # noqa: E402
+from pam_actuation.nodes.view_listener import ViewListener  # noqa: E402
+from pam_actuation.rigging.client import local_context  # noqa: E402
+from pam_actuation.rigging.domain import DomainLock  # noqa: E402
+from pam_actuation.topics.codec import encode  # noqa: E402
+import rclpy  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
+
+
+@pytest.fixture
+def domain():
+    """Return a ROS domain of its own."""
+    lock = DomainLock()
+    yield lock.domain_id
+    lock.release()
+
+
+@pytest.fixture
+def driver(domain):
+    """Return (node, executor, calls) of a driver that answers its services."""
+    context = local_context(domain)
+    node = Node('valve_driver', namespace='/muscle', context=context)
+    calls = []
+
+    def answer(action):
+        def called(request, response):
+            calls.append(action)
+            response.success, response.message = True, f'{action} done'
+            return response
+        return called
+
+    for action in ('emergency_stop', 'reset'):
+        node.create_service(Trigger, f'~/{action}', answer(action))
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    yield node, executor, calls
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def until(listener, executor, condition, each=lambda: None, timeout_s=15.0):
+    """Run listener and driver in turn until a condition holds."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline
+        each()
+        executor.spin_once(timeout_sec=0.0)
+        listener.run_once()
+
+
+def test_signals_states_and_the_emergency_stop_of_a_driver(domain, driver):
+    node, executor, calls = driver
+    listener = ViewListener(domain)
+    try:
+        pressure = node.create_publisher(class_of('pressure'), 'pressure', qos.PUBLISHER)
+        health = node.create_publisher(class_of('diagnostics'), '/diagnostics', qos.PUBLISHER)
+
+        def send():
+            now_ns = time.time_ns()
+            pressure.publish(encode('pressure', messages.Pressure(now_ns, 3.0e5)))
+            health.publish(encode('diagnostics', messages.Status(
+                now_ns, 2, '/muscle/valve_driver', 'vents: no command')))
+
+        store = listener.store
+        until(listener, executor, lambda: store.namespaces() == ['/muscle'] and listener.drivers()
+              and store.state(store.now_ns())['nodes'], send)
+        assert listener.drivers() == ['/muscle/valve_driver']
+        history = store.histories['/muscle', 'pressure']
+        assert (history.values('pressure_pa') == 3.0e5).all()
+        known, = store.state(store.now_ns())['nodes']
+        assert (known['level'], known['message']) == (2, 'vents: no command')
+        answers = []
+        listener.act('emergency_stop', answers.append)
+        until(listener, executor, lambda: answers, send)
+        assert calls == ['emergency_stop'] and answers[0] == [
+            {'node': '/muscle/valve_driver', 'ok': True, 'message': 'emergency_stop done'}]
+        # A driver that hangs: its executor does not run.
+        answers.clear()
+        listener.act('reset', answers.append)
+        begin_s = time.monotonic()
+        while not answers:
+            listener.run_once()
+            assert time.monotonic() < begin_s + 10.0
+        assert answers[0][0]['ok'] is False and 'no answer' in answers[0][0]['message']
+    finally:
+        listener.close()
+
+
+def test_publishers_keep_nothing_for_it(domain, driver):
+    node, executor, _ = driver
+    listener = ViewListener(domain)
+    try:
+        pressure = node.create_publisher(class_of('pressure'), 'pressure', qos.PUBLISHER)
+
+        def send():
+            pressure.publish(encode('pressure', messages.Pressure(time.time_ns(), 3.0e5)))
+
+        until(listener, executor, listener.store.namespaces, send)
+        # The listener takes nothing meanwhile; a reliable one would leave these unconfirmed.
+        for _ in range(3000):
+            send()
+        assert pressure.wait_for_all_acked(rclpy.duration.Duration(seconds=0.0))
+        infos = node.get_subscriptions_info_by_topic('/muscle/pressure')
+        assert [info.qos_profile.reliability.name for info in infos] == ['BEST_EFFORT']
+        listener.run_once()
+        # Only its own last messages are there, and it tells how many are not.
+        assert listener.store.lost['/muscle', 'pressure'] >= 2000
+    finally:
+        listener.close()
