@@ -84,6 +84,11 @@ class LiveRig:
     def supply_pa(self, supply_pa):
         self._n[rig.SUPPLY] = supply_pa
 
+    def change(self, **numbers):
+        """Give some numbers of the rig other values from now on."""
+        for name, value in numbers.items():
+            self._n[list(truth_numbers.NUMBERS).index(name)] = value
+
     def step(self, signal, external_force_n=0.0, contraction_m=None, steps=1):
         """
         Advance by ``steps`` times ``dt_s`` with the signal held, and a force against contraction.

@@ -62,6 +62,8 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
         ('Vented for missing or old input', [interrupted_text(m) for _, m in named]),
         ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
         ('Air through the fill valve', [_air(m.air_fed_kg) for _, m in named]),
+        ('From command to pressure', [None if m.path is None else m.path.text()
+                                      for _, m in named]),
         ('Controller loop', [_loop(m, 'pressure_command') for _, m in named]),
         ('Driver loop', [_loop(m, 'valve_signal') for _, m in named]),
     ]
