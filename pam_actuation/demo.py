@@ -104,6 +104,7 @@ class DemoResult:
         lines += [f'finding: {text}' for text in self.findings]
         lines += [f'bag: {bag}' for bag in self.bags.values()]
         lines.append(f'page: {self.page}')
+        lines.append('see one live in the browser: pam run sine_quarter_hz --view')
         return '\n'.join(lines)
 
 

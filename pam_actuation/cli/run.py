@@ -22,6 +22,7 @@ import time
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
+from pam_actuation.cli.viewed import add_view_option, viewed
 
 HELP = ('Run an experiment on live nodes (real ROS 2 processes), of a muscle or a joint, and '
         'record it. The rig is simulated; `pam up rig --hardware FILE --record DIR` drives and '
@@ -38,6 +39,7 @@ def add_arguments(parser: Parser) -> None:
                         help='ROS domain (default: a free one, this machine only)')
     parser.add_argument('--namespace', default=None,
                         help='namespace of the rig (default: /muscle, of a joint /knee)')
+    add_view_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -50,10 +52,11 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     check_bag_target(out, args.overwrite)
-    with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
+    with viewed(args) as domain_id, progress(
+            args, experiment.duration_s, ' s', experiment.name) as bar:
         result = run_experiment(
             experiment, rig, controller, rig.valve, out, learning=not args.freeze,
-            seed=args.seed, domain_id=args.domain_id, namespace=args.namespace,
+            seed=args.seed, domain_id=domain_id, namespace=args.namespace,
             overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n))
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
@@ -66,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     lines += [f'finding: {text}' for text in result.findings]
     if result.bag:
         lines.insert(1, f'bag: {result.bag}')
-        lines.append(f'next: pam report {result.bag}')
+        lines.append(f'next: pam {"view" if args.view else "report"} {result.bag}')
     elif result.stopped:
         lines = ['nothing is recorded']
     emit(args, {

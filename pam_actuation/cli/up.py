@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from pam_actuation.cli.common import (
     add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
+from pam_actuation.cli.viewed import add_view_option, viewed
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 
@@ -54,6 +55,7 @@ def add_arguments(parser: Parser) -> None:
                         metavar='N', help='of all nodes, 1 to 96 (default: none)')
     parser.add_argument('--seconds', type=number(0.0, None, 's'), default=None, metavar='S',
                         help='end after this time (default: on Ctrl-C, or when a node ends)')
+    add_view_option(parser)
     parser.add_argument('--policy', type=out_path, metavar='FILE', default=None,
                         help='start nothing; write the access policy of these nodes (SROS2)')
     add_overwrite_option(parser, 'a policy that is there already')
@@ -82,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
     if args.policy is not None:
         return _write_policy(args, nodes)
     failure, problems, is_up = '', [], False
-    with termination_as_interrupt(), Supervisor(
-            nodes, args.domain_id, args.realtime_priority) as supervisor:
+    with termination_as_interrupt(), viewed(args, environment=True) as domain_id, Supervisor(
+            nodes, domain_id, args.realtime_priority) as supervisor:
         try:
             supervisor.start()
             is_up = True

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import add_recover_option, EXIT_DONE
 from pam_actuation.cli.options import count, Parser, source
+from pam_actuation.cli.viewed import need_tornado
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--namespace', default=None,
                         help='show this namespace only (default: all)')
     parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
-                        help='ROS domain (default: ROS_DOMAIN_ID, else 0)')
+                        help='ROS domain (default: ROS_DOMAIN_ID, else 0; if pam runs nodes in '
+                             'another domain of this machine only, that one)')
     parser.add_argument('--host', type=source, default=None, metavar='ADDRESS',
                         help='address to listen on, 0.0.0.0 for all; who comes then needs the '
                              'token that is printed (default: this machine only)')
@@ -72,20 +74,21 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         from pam_actuation.ros_missing import ros_missing
         raise InputError(ros_missing(error.name or 'rclpy')) from None
-    os.nice(NICENESS)
-    listener = ViewListener(args.domain_id, namespace)
+    os.nice(max(NICENESS - os.nice(0), 0))
+    listener = ViewListener(_domain(args), namespace)
     try:
         return _serve(args, ViewServer(listener, access, args.port), listener)
     finally:
         listener.close()
 
 
-def need_tornado() -> None:
-    """Raise InputError where the library that serves the page is missing."""
-    from importlib.util import find_spec
-    if find_spec('tornado') is None:
-        raise InputError('pam view needs tornado, which is not installed: install the extra view, '
-                         'pip install "pam_actuation[view]"')
+def _domain(args: argparse.Namespace) -> int | None:
+    """Return the domain to look at, None for that of the environment."""
+    from pam_actuation.rigging.domain import domains_in_use
+    if args.domain_id is not None or 'ROS_DOMAIN_ID' in os.environ:
+        return args.domain_id
+    others = domains_in_use()
+    return others[0] if len(others) == 1 else None
 
 
 def _serve(args: argparse.Namespace, server: 'ViewServer', listener: 'ViewListener | None') -> int:

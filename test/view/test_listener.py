@@ -15,6 +15,8 @@
 """The listener on real DDS: it finds topics and drivers that come later, and lost ones."""
 
 import time
+import urllib.error
+import urllib.request
 
 from pam_actuation import messages
 import pytest
@@ -26,6 +28,7 @@ from pam_actuation.nodes.ros_messages import class_of  # noqa: E402
 from pam_actuation.nodes.view_listener import ViewListener  # noqa: E402
 from pam_actuation.rigging.client import local_context  # noqa: E402
 from pam_actuation.rigging.domain import DomainLock  # noqa: E402
+from pam_actuation.rigging.view_process import page_beside  # noqa: E402
 from pam_actuation.topics.codec import encode  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
@@ -136,3 +139,11 @@ def test_publishers_keep_nothing_for_it(domain, driver):
         assert listener.store.lost['/muscle', 'pressure'] >= 2000
     finally:
         listener.close()
+
+
+def test_a_page_beside_a_rig_is_there_while_the_rig_is(domain, tmp_path):
+    with page_beside(domain, tmp_path) as url:
+        with urllib.request.urlopen(url) as answer:
+            assert b'<title>pam view</title>' in answer.read()
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(url)
