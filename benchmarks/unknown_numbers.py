@@ -30,11 +30,14 @@ must say so and name an experiment; the experiment is run on the hidden rig and 
 """
 
 import argparse
+import os
 from pathlib import Path
 import sys
 import time
 
-import numpy as np
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')       # as `pam` does
+
+import numpy as np  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
@@ -55,6 +58,8 @@ NOMINAL = 'dmsp_5_300_hanging_mass'
 NUMBERS = {'mass_kg': ('mass', 3.0, 7.0), 'spring_n_per_m': ('spring', 100.0, 800.0),
            'K_m': ('k_m', 80e3, 125e3), 'pressure_zero_pa': ('pressure_bias', -15e3, 15e3),
            'contraction_zero_m': ('contraction_bias', -2e-3, 2e-3)}
+UNITS = {'mass_kg': 'kg', 'spring_n_per_m': 'N/m', 'K_m': 'Pa/V', 'pressure_zero_pa': 'Pa',
+         'contraction_zero_m': 'm'}
 SENSORS = ('pressure_zero_pa', 'contraction_zero_m')
 HIDDEN = ('', 'hysteresis', '', 'creep', '', 'valve_dead_time', '', 'coulomb_friction', '',
           'viscous_damping')
@@ -173,6 +178,16 @@ def shares(rows):
             known = sum(r['status'] == 'determined' for r in chosen)
             lines.append(f'- {title}: {held} of {len(chosen)} intervals hold the true value '
                          f'({100.0 * held / len(chosen):.0f} %), {known} are determined')
+    lines += ['', '| number | unit | no effect | an effect |', '|---|---|---|---|']
+    for name in NUMBERS:
+        halves = [[0.5 * (r['high'] - r['low']) for r in rows if r['number'] == name and (
+            r['effect'] == 'none') is plain] for plain in (True, False)]
+        lines.append(f'| {name} | {UNITS[name]} | ' + ' | '.join(
+            f'{np.median(half):.3g} ({len(half)})' if half else '–' for half in halves) + ' |')
+    lines.append('\nMedian half width of the intervals; in brackets how many there are.')
+    seconds = list({r['case']: r['seconds'] for r in rows}.values())
+    lines.append(f'\nA case takes {np.median(seconds):.1f} s of processor (median), at most '
+                 f'{max(seconds):.1f} s.')
     return '\n'.join(lines)
 
 

@@ -20,14 +20,14 @@ of ten leaves no slope to follow. Weights are the noise floors, lowered by misfi
 what is left. An incomplete model then does not seem to know its numbers better than it does.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 import math
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
-from pam_sim.gap.data.split import FIT, SELECT, UNUSED
+from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.solver import REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.numbers import Number, with_values
@@ -49,6 +49,9 @@ TIE_BREAKER = 0.3
 FOLLOWED_STEPS = 6           # of a profile, with the slopes of the solution
 NOWHERE = 1e-9               # information of a number that nothing depends on
 GAIN, TIGHT = 0.02, 1e-9     # of the cost, which ends them; least room of a number
+# What a wrong formulation leaves of a signal acts alike through the whole record: it counts as
+# so many independent errors, however long the record is.
+FORMS = 12
 
 
 @dataclass
@@ -64,6 +67,8 @@ class Weighted:
         Unknown ones first.
     temper : list of numpy.ndarray
         By how much the weight of each signal is lowered, by subsystem.
+    incomplete : bool
+        Whether the model misses an effect: what is left beyond noise then weighs less.
 
     """
 
@@ -71,6 +76,7 @@ class Weighted:
     problems: Sequence[SubsystemProblem]
     numbers: Sequence[Number]
     temper: list[FloatArray] = field(default_factory=list)
+    incomplete: bool = False
 
     def __post_init__(self) -> None:
         """Start from full weights."""
@@ -91,9 +97,9 @@ class Weighted:
         try:
             rig = with_values(self.rig, self.numbers, values)
         except InputError:          # each is within its range, but not all of them go together
-            return np.where(problem.part == UNUSED, 0.0, REFUSED)
+            return np.where(used(problem), REFUSED, 0.0)
         z = np.array([(values.get(k.name, k.value) - k.value) / k.sd for k in problem.known])
-        return np.where(problem.part == UNUSED, 0.0, simulated_errors(problem, rig, z))
+        return np.where(used(problem), simulated_errors(problem, rig, z), 0.0)
 
     def _scaled(self, errors: FloatArray, place: int) -> FloatArray:
         return errors / np.sqrt(self.temper[place][self.problems[place].signal])
@@ -104,11 +110,16 @@ class Weighted:
             self._scaled(self.errors(x, p), k) for k, p in enumerate(self.problems)]
             + [self.prior * x])
 
-    def slopes(self, x: FloatArray) -> FloatArray:
-        """Return the derivatives of ``residuals``, each from the subsystems a number acts in."""
+    def slopes(self, x: FloatArray, places: Iterable[int] | None = None) -> FloatArray:
+        """
+        Return the derivatives of ``residuals``, each from the subsystems a number acts in.
+
+        Of the numbers at ``places`` alone, or of all.
+        """
         base = [self.errors(x, p) for p in self.problems]
         rows = []
-        for j, number in enumerate(self.numbers):
+        for j in range(len(self.numbers)) if places is None else places:
+            number = self.numbers[j]
             step = STEP if x[j] + STEP <= self.high[j] else -STEP
             if not number.unknown and (number.effect or number.subsystem):
                 step *= COARSE              # a time needs whole steps of the grid
@@ -174,11 +185,20 @@ class Weighted:
 
     def retemper(self, x: FloatArray) -> bool:
         """Set the weights after the errors; return whether they had settled."""
-        fresh = [tempering(p, self.errors(x, p), (FIT, SELECT)) for p in self.problems]
+        fresh = [self._tempering(p, self.errors(x, p)) for p in self.problems]
         settled = all(bool(np.all(np.abs(new / old - 1.0) < SETTLED))
                       for new, old in zip(fresh, self.temper))
         self.temper = fresh
         return settled
+
+    def _tempering(self, problem: SubsystemProblem, errors: FloatArray) -> FloatArray:
+        found = tempering(problem, errors, (FIT, SELECT))
+        if self.incomplete:
+            for s in range(len(problem.signals)):
+                chosen = errors[(problem.signal == s) & used(problem)]
+                beyond = max(float(np.mean(chosen ** 2)) - 1.0, 0.0)
+                found[s] = max(found[s], beyond * chosen.size / FORMS)
+        return found
 
     def mean_squares(self, x: FloatArray) -> list[tuple[SubsystemProblem, str, float]]:
         """Return (subsystem, signal, mean squared error in floors) of every signal."""
@@ -186,7 +206,7 @@ class Weighted:
         for p in self.problems:
             errors = self.errors(x, p)
             for s, name in enumerate(p.signals):
-                chosen = errors[(p.signal == s) & (p.part != UNUSED)]
+                chosen = errors[(p.signal == s) & used(p)]
                 found.append((p, name, float(np.mean(chosen ** 2))))
         return found
 
@@ -195,13 +215,9 @@ class Weighted:
         return sum(math.log(square) for _, _, square in self.mean_squares(x))
 
 
-def settle(weighted: Weighted, x: FloatArray) -> FloatArray:
-    """Return the solution near a start, once weights and errors agree."""
-    for _ in range(ROUNDS):
-        if weighted.retemper(x):
-            break
-        x, _ = weighted.solve(x)
-    return x
+def used(problem: SubsystemProblem) -> BoolArray:
+    """Return which samples count: those of the certify part and of no part do not."""
+    return np.isin(problem.part, (FIT, SELECT))
 
 
 def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
@@ -238,4 +254,8 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
         misfit = weighted.misfit(start)
         if misfit < least - BETTER:
             best, least = start, misfit
-    return settle(weighted, best)
+    for _ in range(ROUNDS):
+        if weighted.retemper(best):
+            break
+        best, _ = weighted.solve(best)
+    return best

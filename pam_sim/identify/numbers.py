@@ -47,13 +47,17 @@ class Number:
         Of a parameter of the rig, or ``EFFECT.PARAMETER``.
     effect, parameter : str
         Where it stands: effect ('' for the rig itself) and parameter.
-    unit, description : str
+    unit : str
     start, lower, upper : float
         SI.
     sd : float
         Standard deviation of the prior, ``inf`` for an unknown one.
     subsystem : str
         Of a number of the measurement alone, such as a latency; '' for one of the rig.
+    description : str
+        For people.
+    shape : bool
+        Of an effect, with a prior for its logarithm; ``sd`` is that of the logarithm.
 
     """
 
@@ -67,6 +71,7 @@ class Number:
     sd: float = math.inf
     subsystem: str = ''
     description: str = ''
+    shape: bool = False
 
     @property
     def unknown(self) -> bool:
@@ -107,12 +112,16 @@ class Number:
         """Return what one unit of the coordinate is at a value, in the number's unit."""
         if self.is_scale:
             return value
+        if self.shape:
+            return self.sd * value
         return math.hypot(value, self.small) if self.is_size else self.step
 
     def value(self, coordinate: float) -> float:
         """Return the value of a coordinate, within the range."""
         if self.is_scale:
             found = self.start * math.exp(min(coordinate, LARGEST_LOGARITHM))
+        elif self.shape:
+            found = self.start * math.exp(min(self.sd * coordinate, LARGEST_LOGARITHM))
         elif self.is_size:
             at = coordinate + math.asinh(self.start / self.small)
             found = self.small * math.sinh(max(min(at, LARGEST_LOGARITHM), 0.0))
@@ -124,6 +133,8 @@ class Number:
         """Return the coordinate of a value."""
         if self.is_scale:
             return math.log(value / self.start)
+        if self.shape:
+            return math.log(value / self.start) / self.sd
         if self.is_size:
             return math.asinh(value / self.small) - math.asinh(self.start / self.small)
         return (value - self.start) / self.step

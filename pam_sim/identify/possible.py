@@ -20,20 +20,33 @@ Where the calibrated model leaves more than noise, the effects of the library ar
 fitted along with the numbers. Each has a prior about zero as wide as its typical size. What they
 could explain widens the intervals. Their sizes are no result: ``pam gap`` names effects, and
 proves them.
+
+The hidden effect has a formulation of its own. Those that matter are therefore fitted in all
+formulations of the library, with their shapes free. The best one stays; how far the numbers
+move between those that explain about as much widens the intervals.
 """
 
 from collections.abc import Sequence
 
+import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.effects.effect import Effect
 from pam_sim.effects.registry import effects
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
+from pam_sim.identify.secant import solve_from
 from pam_sim.rig import Rig
 
 # Their least size, not zero, is the strongest effect.
 NOT_GRADUAL = ('flow_limit', 'supply_droop')
 SEEN_FLOORS2 = 1.5           # mean squared error from which on something is missing
+MATTERS_FLOORS2 = 0.1        # what an effect moves from which on its formulations are tried
+TRIED = 3                    # effects of which they are
+SHAPE_SD = 1.0               # of the logarithm of a shape
+SMALL = 0.3                  # start of a size that the other formulation does not have
+BETTER = 0.02                # of the sum of logarithms of misfits
+AS_GOOD = 0.3                # the same, within which formulations explain about as much
 
 
 def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
@@ -67,4 +80,89 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
                             p.upper, p.default, description=effect.sentence)
             if any(number.acts_in(problem) for problem in problems):
                 found.append(number)
+    return found
+
+
+def in_other_forms(weighted: Weighted, x: FloatArray, count: int
+                   ) -> tuple[Weighted, FloatArray, FloatArray]:
+    """
+    Return (problem, solution, spread of the first numbers) with the effects that matter reformed.
+
+    Parameters
+    ----------
+    weighted : Weighted
+        With possible effects, each in its first formulation and of fixed shape.
+    x : numpy.ndarray
+        Its solution.
+    count : int
+        How many numbers are sought; the spread is in their coordinates.
+
+    """
+    met: list[tuple[float, FloatArray]] = []
+    there = {e.name for e in weighted.rig.effects}
+    slopes = weighted.slopes(x)
+    for name in _that_matter(weighted, x, slopes):
+        base, start, base_slopes = weighted, x, slopes
+        least = base.misfit(x)
+        met.append((least, x[:count]))
+        kept = [k for k, n in enumerate(base.numbers) if n.effect != name]
+        old = {n.parameter: float(c) for n, c in zip(base.numbers, start) if n.effect == name}
+        for form in effects().values():
+            if name not in (form.name, form.variant_of) or (
+                    form.name == name and not any(f.shape for f in form.fitting.free)):
+                continue
+            fresh = _numbers_of(form)
+            if not fresh or base.rig.valve not in form.valves or form.name in there:
+                continue
+            other = Weighted(base.rig, base.problems, [base.numbers[k] for k in kept] + fresh,
+                             base.temper, True)
+            at = np.concatenate([start[kept], [
+                old.get(n.parameter, 0.0 if n.shape else SMALL) for n in fresh]])
+            at = np.clip(at, other.low, other.high)
+            rows = base_slopes.shape[0] - len(base.numbers)
+            guess = np.zeros((rows + at.size, at.size))
+            guess[:rows, :len(kept)] = base_slopes[:rows, kept]
+            guess[:rows, len(kept):] = other.slopes(at, range(len(kept), at.size))[:rows]
+            guess[rows:] = np.diag(other.prior)
+            found, _, at_slopes = solve_from(other, at, guess, again=False)
+            misfit = other.misfit(found)
+            met.append((misfit, found[:count]))
+            if misfit < least - BETTER:
+                least, weighted, x, slopes = misfit, other, found, at_slopes
+    best = min((m for m, _ in met), default=0.0)
+    spread = np.zeros(count)
+    for misfit, values in met:
+        if misfit < best + AS_GOOD:
+            spread = np.maximum(spread, np.abs(values - x[:count]))
+    return weighted, x, spread
+
+
+def _that_matter(weighted: Weighted, x: FloatArray, slopes: FloatArray) -> list[str]:
+    """Return the names of the effects that move a signal most, the strongest first."""
+    moved: dict[str, float] = {}
+    for k, n in enumerate(weighted.numbers):
+        if n.effect and not n.unknown:
+            row = 0
+            for place, p in enumerate(weighted.problems):
+                own = slopes[row:row + p.signal.size, k]
+                row += p.signal.size
+                for s in range(len(p.signals)):
+                    square = weighted.temper[place][s] * float(
+                        np.mean(own[p.signal == s] ** 2)) * float(x[k]) ** 2
+                    moved[n.effect] = max(moved.get(n.effect, 0.0), square)
+    strong = [name for name, square in moved.items() if square > MATTERS_FLOORS2]
+    return sorted(strong, key=lambda name: -moved[name])[:TRIED]
+
+
+def _numbers_of(form: Effect) -> list[Number]:
+    """Return what is fitted of a formulation: sizes about zero, shapes about their typical one."""
+    by_name = {p.name: p for p in form.parameters}
+    found = []
+    for f in form.fitting.free:
+        p = by_name[f.name]
+        typical = p.default if p.default > 0.0 and not f.shape else f.typical
+        found.append(Number(
+            f'{form.name}.{f.name}', form.name, f.name, p.unit,
+            typical if f.shape else max(0.0, f.lower), f.lower, f.upper,
+            SHAPE_SD if f.shape else typical, description=form.sentence, shape=f.shape))
     return found

@@ -20,7 +20,7 @@ ends where that cost is 3.84 above the least one (Raue et al. 2009, Bioinformati
 An end that lies at the end of the range is open: the data do not exclude what is beyond.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -28,12 +28,13 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.verify.uncertainty import NORMAL_95, NUMERICS
 from pam_sim.identify.fit import Weighted
+from pam_sim.identify.numbers import Number
+from pam_sim.identify.secant import solve_from
 
 RISE_95 = 3.841              # 95 % of chi squared with one degree of freedom
 FARTHER = 2.0                # next try, where the cost has not risen enough
 FLAT, FLAT_FARTHER = 0.1, 10.0       # the same, where it has hardly risen
 TRIES = 9
-EVALUATIONS = 8
 BETTER = 0.1                 # of the cost
 CLOSE = 0.15                 # of the wanted rise
 
@@ -59,6 +60,15 @@ class Interval:
     open_low: bool
     open_high: bool
     points: tuple[tuple[float, float], ...]
+
+    def wider(self, number: Number, value: float, doubt: float) -> 'Interval':
+        """Return it with a doubt of its number [coordinates] added in quadrature at both ends."""
+        if doubt <= 0.0:
+            return self
+        at = number.coordinate(value)
+        low, high = (number.coordinate(end) for end in (self.low, self.high))
+        return replace(self, low=number.value(at - math.hypot(at - low, doubt)),
+                       high=number.value(at + math.hypot(high - at, doubt)))
 
 
 def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArray,
@@ -92,7 +102,7 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
         start[place] = x[place] + shift
         solved, cost = weighted.follow(start, held, slopes)
         if cost - least > RISE_95:          # in a bent valley the slopes lead astray
-            solved, cost = weighted.solve(solved, held, EVALUATIONS)
+            solved, cost, _ = solve_from(weighted, solved, slopes, held)
         if cost < lowest[0] - BETTER:
             lowest[:] = [cost, solved]
         points[shift] = cost - least

@@ -67,10 +67,10 @@ class Offer:
 class LoadedMechanics(MechanicsProblem):
     """Muscle and load, with known masses hung on the load in some of the recordings."""
 
-    def __init__(self, rig: Rig, offers: Sequence[Offer]) -> None:
+    def __init__(self, rig: Rig, offers: Sequence[Offer], holds_certify: bool = False) -> None:
         self._added_kg = [one.added_kg for one in offers]
         super().__init__(rig, [with_quiet_pressure(one.recording) for one in offers],
-                         holds_certify=False)
+                         holds_certify=holds_certify)
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
@@ -166,13 +166,14 @@ def _is_held(run: Run, rig: Rig) -> bool:
     return moved < STILL_SHARE * rig.muscle.stroke_m and pressed > MOVING_PA
 
 
-def problems_of(rig: Rig, offers: Sequence[Offer]) -> list[SubsystemProblem]:
-    """Return the subsystems of several recordings, the valve first."""
+def problems_of(rig: Rig, offers: Sequence[Offer], holds_certify: bool = False
+                ) -> list[SubsystemProblem]:
+    """Return the subsystems of several recordings, which may hold the certify part too."""
     found: list[SubsystemProblem] = []
     valve = [one.recording for one in offers if one.valve]
     if valve:
-        found.append(ValveProblem(rig, valve, holds_certify=False))
+        found.append(ValveProblem(rig, valve, holds_certify=holds_certify))
     mechanics = [one for one in offers if one.mechanics]
     if mechanics:
-        found.append(LoadedMechanics(rig, mechanics))
+        found.append(LoadedMechanics(rig, mechanics, holds_certify))
     return found

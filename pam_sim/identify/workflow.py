@@ -25,14 +25,16 @@ from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment
-from pam_sim.identify.fit import fit, NOWHERE, settle, Weighted
+from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.judgement import DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
-from pam_sim.identify.possible import is_incomplete, possible_effects
+from pam_sim.identify.possible import (
+    in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
+from pam_sim.identify.secant import settle, solve_from
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
@@ -42,7 +44,8 @@ RETURNS = 4                  # to the fit, where a profile met a better solution
 
 def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
              added_kg: Sequence[float] = (), seed: int = 0, advise: bool = True,
-             progress: Callable[[float], object] = lambda done: None) -> Identification:
+             progress: Callable[[float], object] = lambda done: None,
+             spare_certify: bool = False) -> Identification:
     """
     Determine the unknown numbers of a rig.
 
@@ -63,6 +66,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         Whether to look for an experiment that determines the rest.
     progress : callable
         Told the share that is done, 0 to 1.
+    spare_certify : bool
+        Whether every fifth block of the recordings stays untouched, for a validation.
 
     Returns
     -------
@@ -86,7 +91,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
                          rig.name)
     offers = [offer_of(run, rig, mass) for run, mass in zip(
         runs, added_kg or [0.0] * len(runs))]
-    problems = problems_of(rig, offers)
+    problems = problems_of(rig, offers, spare_certify)
     acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
     numbers = [*acting, *known_numbers_of(problems, acting)]
     weighted = Weighted(rig, problems, numbers)
@@ -94,18 +99,24 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     x = fit(weighted, seed)
     progress(0.3)
     incomplete = is_incomplete(weighted, x)
+    forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
         possible = possible_effects(rig, problems, numbers)
-        weighted = Weighted(rig, problems, [*numbers, *possible])
+        weighted = Weighted(rig, problems, [*numbers, *possible], incomplete=True)
         x = np.concatenate([x, np.zeros(len(possible))])
         for _ in range(2):          # full weights first, as in the fit
-            x, _ = weighted.solve(x)
+            x, _, _ = solve_from(weighted, x)
+        progress(0.4)
+        weighted.retemper(x)
+        weighted, x, forms = in_other_forms(weighted, x, len(acting))
         x = settle(weighted, x)
     progress(0.6)
     count = len(acting)
     x, covariance, intervals = _profiles(
         weighted, x, count, lambda done: progress(0.6 + 0.3 * done))
-    information = np.linalg.inv(covariance[:count, :count])
+    intervals = [one.wider(n, n.value(float(c)), float(f))
+                 for one, n, c, f in zip(intervals, acting, x, forms)]
+    information = np.linalg.inv(covariance[:count, :count] + np.diag((forms / NORMAL_95) ** 2))
     statuses, combinations = judge(acting, intervals, x[:count], information)
     found = [Found(n, n.value(float(c)), i, s)
              for n, c, i, s in zip(acting, x, intervals, statuses)]
@@ -113,6 +124,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _identified(rig, found), found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(weighted, x)), incomplete)
+    result.remarks += _starting_values(weighted, x, acting)
     result.remarks += [
         f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
         for n in wanted if n not in acting]
@@ -137,11 +149,24 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[
             intervals.append(interval)
             progress((j + 1) / count)
             if better is not None and left:
-                x, _ = weighted.solve(better)
+                x, _, _ = solve_from(weighted, better)
                 break
         else:
             break
     return x, covariance, intervals
+
+
+def _starting_values(weighted: Weighted, x: FloatArray, acting: Sequence[Number]) -> list[str]:
+    """Return a sentence on the numbers whose signals are not explained even with effects."""
+    left = [(p, name, square) for p, name, square in weighted.mean_squares(x)
+            if square > SEEN_FLOORS2]
+    names = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
+    if not names:
+        return []
+    rests = ' and '.join(f'{name} {math.sqrt(square):.1f} noise floors (rms)'
+                         for _, name, square in left)
+    return [f'{", ".join(names)}: a starting value. No effect of the library explains what is '
+            f'left of {rests}, and it may act alike; the interval allows for that']
 
 
 def _what_shows(number: Number) -> str:
