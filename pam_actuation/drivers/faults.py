@@ -123,7 +123,8 @@ FAULT_TABLE = (
           'warning; the pressure rises slowly from atmospheric pressure as the air returns'),
     Fault('supply_low', 'Supply loss',
           'measured supply pressure less than 20 kPa above the command', IGNORE, False,
-          'warning: the muscle gets what there is; ends when the supply returns'),
+          'warning: the muscle keeps what it has and gets what there is; ends when the supply '
+          'returns, then a slow rise from what is there'),
     Fault('supply_stale', 'Supply reading lost',
           'supply pressure was measured and is now older than 0.5 s, or invalid', IGNORE, False,
           'warning: the nominal supply is assumed'),

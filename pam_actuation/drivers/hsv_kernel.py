@@ -121,7 +121,9 @@ def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: f
     wanted = par.gain * (error - slope_pa) + slope_pa
     filling = error > 0.0
     middle = p_pa + 0.5 * wanted
-    middle = min(max(middle, P_ATM_PA), supply_pa)
+    middle = max(middle, P_ATM_PA)
+    if filling:
+        middle = min(middle, supply_pa)
     full = abs(full_rate(state, par, middle, volume_m3, supply_pa, filling))
     if full <= 0.0:
         return 0.0, 0.0
@@ -171,7 +173,9 @@ def _step(state: np.record, par: np.record, p_cmd_pa: float, p_meas_pa: float, s
         supply_pa = par.supply_pa
     observe(state, par, p_meas_pa, supply_pa)
     slope = _command_slope(state, par, p_cmd_pa)
-    target = max(min(p_cmd_pa, supply_pa - par.supply_margin_pa), P_ATM_PA)
+    # Beyond the supply nothing is filled, and what is there stays.
+    highest = max(supply_pa - par.supply_margin_pa, state.model_pa)
+    target = max(min(p_cmd_pa, highest), P_ATM_PA)
     out.target_pa = target
     out.fill_duty = 0.0
     out.vent_duty = 0.0

@@ -143,6 +143,7 @@ class SafetySupervisor:
         self._warnings: dict[str, tuple[str, int]] = {}
         self._fault: Fault | None = ('no_command', '')
         self._standing: Fault | None = None
+        self._reach_pa = math.inf         # of a supply that is too low, or was a moment ago
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
                               lag_s=lag_s, dead_time_s=dead_time_s)
         self._now_ns: int | None = None
@@ -431,7 +432,9 @@ class SafetySupervisor:
             if not self._rise.active:
                 self._rise.begin()
                 target = self._rise.limited(target, 0.0, measured)
-        self._watch_supply(target, now_ns)
+        if self.needs_pressure:
+            self._watch_supply(target, now_ns)
+            target = self._within_supply(target, now_ns)
         return self._following('following the pressure command', now_ns, target)
 
     def _following(self, what: str, now_ns: int, target: float | None = None,
@@ -454,6 +457,16 @@ class SafetySupervisor:
         level = LEVEL_WARN if self._warnings else LEVEL_OK
         message = '; '.join(texts) if texts else what
         return Decision(OK, target, level, message, '', tuple(self._warnings), duty)
+
+    def _within_supply(self, target_pa: float, now_ns: int) -> float:
+        """Return what the supply lets the muscle have; once it is back, that rises slowly."""
+        if self.supply_pa(now_ns) < target_pa:        # False for NaN
+            self._reach_pa = max(self.supply.pressure_pa, self.pressure.pressure_pa)
+        elif self._reach_pa < target_pa:
+            self._reach_pa += self.limits.resume_rate_pa_per_s * self._dt_s
+        else:
+            self._reach_pa = math.inf
+        return min(target_pa, self._reach_pa)
 
     def _watch_supply(self, target_pa: float, now_ns: int) -> None:
         channel = self.supply
