@@ -89,7 +89,7 @@ def test_only_what_cannot_be_told_apart_is_listed_so():
                 effects=['valve_dead_time', 'hysteresis'], parameters=[MASS])
     assert text.startswith('These data cannot tell valve_dead_time and tube_lag apart. Likeliest:')
     likeliest, certain = text.split(' Certain: ')
-    assert 'valve_dead_time: delay_s' in likeliest and 'hysteresis' not in likeliest
+    assert 'valve_dead_time: delay 0.03 s' in likeliest and 'hysteresis' not in likeliest
     assert 'hysteresis: loop' in certain and 'mass_kg = 5.75' in certain
     named[1] = NamedEffect('hysteresis', 'muscle', [], ('hysteresis', 'mass_kg'))
     text = said('ambiguous', {'pressure': PRESSURE}, named,

@@ -22,6 +22,7 @@ from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_actuation.report.sections.gap_witness import coloured_part, witness_part
 from pam_actuation.report.sections.replay import SHOWN
+from pam_sim.gap.report.words import in_words
 
 if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult, SignalGap
@@ -104,7 +105,8 @@ def _effects(result: 'GapResult') -> str:
     rows = []
     for e in result.effects:
         for name, q in e['equivalent'].items():
-            rows.append([e['name'], e['family'], e['subsystem'], f'{e["confidence"]:.2f}', name,
+            rows.append([e['name'], e['family'], e['subsystem'], f'{e["confidence"]:.2f}',
+                         in_words(name),
                          f'{q["value"]:.4g} {q["unit"]}',
                          f'{q["ci95"][0]:.4g} … {q["ci95"][1]:.4g}'])
     body = ('<h3>What is likeliest to be missing</h3>' if result.verdict == 'ambiguous'

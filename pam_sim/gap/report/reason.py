@@ -19,6 +19,7 @@ from typing import Any
 
 from pam_sim.effects.registry import effects
 from pam_sim.gap.data.signals import READABLE
+from pam_sim.gap.report.words import in_words
 from pam_sim.gap.result import Calibrated, GapResult, SignalGap
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.harm import Harm
@@ -84,7 +85,7 @@ def _sentence(name: str) -> str:
 
 
 def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
-    return join([f'{n} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to '
+    return join([f'{in_words(n)} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to '
                  f'{q["ci95"][1]:.3g}' for n, q in equivalent.items()])
 
 

@@ -1,0 +1,48 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Names of reported quantities in words: the keys of gap.json are for programs."""
+
+# Endings that say the unit, longest first; the value stands with its unit beside them.
+UNIT_ENDINGS = ('_m3_per_s_pa', '_kg_per_s', '_pa_per_s', '_n_per_m', '_m3', '_pa', '_m', '_n',
+                '_s')
+CONDITIONS = {'400kpa': '400 kPa', '500kpa': '500 kPa', '10mm': '10 mm',
+              '20mm_per_s': '20 mm/s', '50mm_per_s': '50 mm/s'}
+
+
+def in_words(name: str) -> str:
+    """
+    Return the name of a reported quantity in words.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``equivalent`` in gap.json, such as ``loop_half_width_at_400kpa_n``.
+
+    Returns
+    -------
+    str
+        Such as ``loop half width at 400 kPa``.
+
+    """
+    plain = name
+    if not name.endswith(tuple(CONDITIONS)):
+        plain = next((name.removesuffix(e) for e in UNIT_ENDINGS if name.endswith(e)), name)
+    head, at, condition = plain.partition('_at_')
+    words = head.replace('_', ' ')
+    if not at:
+        return words
+    for key, text in CONDITIONS.items():
+        condition = condition.replace(key, text)
+    return f'{words} at {condition.replace("_", " and ")}'
