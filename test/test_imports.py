@@ -28,6 +28,7 @@ LAYERS = (
      'plant_loop', 'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models', 'view'),
+    ('campaign',),
     ('rigging',),
     ('nodes',),
     ('cli', 'demo', 'warm_up'))

@@ -54,10 +54,9 @@ ROSDEP_KEYS = {
     'plotly': None}
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
-# Only where a cluster is named (pam_actuation/workers says what to
-# install), for a kind of table,
-# for the live page.
-OPTIONAL = {'dask', 'ray', 'h5py', 'tornado'}
+# Only where a cluster is named (pam_actuation/workers says what to install), for kinds of
+# tables, for the live page.
+OPTIONAL = {'dask', 'ray', 'h5py', 'pyarrow', 'tornado'}
 
 
 @pytest.fixture(scope='module')

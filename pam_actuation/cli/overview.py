@@ -46,6 +46,7 @@ GROUPS = {
         'tune': 'tune a controller on a model',
         'identify': 'determine the unknown numbers of a rig',
         'gap': 'find what a model misses, name it and add it',
+        'campaign': 'many recordings: what changed on which rig since which day',
         'characterise': 'make static surfaces from runs under fixed loads',
         'valves': 'compare the valve types on one rig'},
     'See what there is': {

@@ -90,9 +90,21 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
         No recording, a mistake in the model, or a folder that cannot be written.
 
     """
+    check_folder(out_dir)
+    result = gap_of(runs, model, certify, **options)
+    save_gap(result, certify or runs[0], out_dir, of)
+    return result
+
+
+def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' = None,
+           **options: Any) -> 'GapResult':
+    """
+    Find the gap between recordings and a model, and the experiment that would tell rivals apart.
+
+    Arguments and errors as of ``write_gap``; nothing is written.
+    """
     if not runs:
         raise InputError('a gap look needs at least one recording')
-    check_folder(out_dir)
     rig = model_for(runs[0], model)
     result = find_gap(runs, rig, certify, **options)
     if len(result.rivals) > 1:
@@ -102,7 +114,6 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
                 rival[0] for rival in result.rivals} else (),
             may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
-    save_gap(result, certify or runs[0], out_dir, of)
     return result
 
 

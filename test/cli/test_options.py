@@ -24,8 +24,8 @@ import pytest
 # What each verb needs before an option is looked at.
 NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
          'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
-         'valves': ['compare'], 'rules': ['sofc_ppr'], 'import': ['table.csv'],
-         'export': ['bag', '--out', 'table.csv'], 'rig': ['new'],
+         'campaign': ['runs', '--out', 'folder'], 'valves': ['compare'], 'rules': ['sofc_ppr'],
+         'import': ['table.csv'], 'export': ['bag', '--out', 'table.csv'], 'rig': ['new'],
          'param': ['list', 'valve_driver']}
 WRONG_NUMBERS = {
     'number': ('-5', 'nan', 'inf', 'five', '3,5', '', '1e999'),
@@ -55,6 +55,9 @@ NUMBERS = {
     ('characterise', '--dead-volume-m3'): '0 to 1 m^3',
     ('identify', '--added-kg'): '0 to 500 kg', ('identify', '--seed'): '0 to 4294967295',
     ('gap', '--seconds'): '1 s or more', ('gap', '--materiality'): '0.01 to 1000',
+    ('campaign', '--seconds'): '1 s or more', ('campaign', '--materiality'): '0.01 to 1000',
+    ('campaign', '--seed'): '0 to 4294967295',
+    ('campaign', '--jobs'): '1 to 1024, or -1 for one a core',
     ('valves', '--seed'): '0 to 4294967295', ('valves', '--hold'): '2 to 3600 s',
     ('rules', '--top'): '0 or more',
     ('view', '--domain-id'): '0 to 232', ('view', '--port'): '0 to 65535'}

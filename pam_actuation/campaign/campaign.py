@@ -1,0 +1,207 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The campaign itself: what is there is kept, what is missing is worked on, one case a task."""
+
+from collections.abc import Callable, Sequence
+import contextlib
+from dataclasses import asdict, dataclass, replace
+import json
+import os
+from pathlib import Path
+import time
+from typing import Any
+
+from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.store import CASES, kept_folder, key_of, RESULT, Store
+from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
+from pam_actuation.workers import ClusterLost, WorkerLost, Workers
+from pam_sim.errors import InputError
+from pam_sim.files import StrPath, write_text
+
+FAILED = 'failed'
+WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_sim.identify',),
+        'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
+_ATTEMPTS = 4           # to find a cluster again that was lost
+_LOST = {'sizes': [], 'ambiguous': [], 'least': {}, 'bad': True}
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker needs to know of one case."""
+
+    key: str
+    case: Case
+
+
+@dataclass
+class Campaign:
+    """
+    What a campaign found.
+
+    Attributes
+    ----------
+    settings : Settings
+    rows : list of dict
+        One for each case, by rig and time: ``case`` (a Case), ``key``, and what ``work_on``
+        returned, or the verdict ``failed`` with the error as its reason.
+    worked_on : int
+        Cases that were not there before.
+    seconds : float
+        Wall-clock time.
+
+    """
+
+    settings: Settings
+    rows: list[dict[str, Any]]
+    worked_on: int = 0
+    seconds: float = 0.0
+
+    @property
+    def failed(self) -> list[dict[str, Any]]:
+        """Return the rows whose recording could not be worked on."""
+        return [row for row in self.rows if row['verdict'] == FAILED]
+
+    @property
+    def rigs(self) -> list[str]:
+        """Return the names of the rigs."""
+        return sorted({row['case'].rig for row in self.rows})
+
+
+def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: int = -1,
+                 cluster: str | None = None,
+                 progress: Callable[[int], object] = lambda done: None) -> Campaign:
+    """
+    Work on every case that is not there yet; return all.
+
+    Parameters
+    ----------
+    cases : list of Case
+        What ``find_cases`` returned.
+    settings : Settings
+        What is asked of each.
+    out : path
+        Folder of the campaign. Workers of a cluster must see it, and the recordings, under the
+        same paths.
+    jobs : int
+        Processes; -1 for one a core.
+    cluster : str, optional
+        Address of a Dask or Ray cluster, see ``pam_actuation.workers``.
+    progress : callable
+        Told how many cases are there.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    InputError
+        The model cannot be read, the folder cannot be written or is in use, or the cluster
+        cannot be reached.
+    ClusterLost
+        The cluster was lost and did not come back. What is done is kept.
+
+    """
+    started = time.perf_counter()
+    settings, texts = _with_models(cases, settings)
+    Workers(cluster=cluster)        # refuses what is no address, before anything is written
+    store = Store(out)
+    with store.locked():
+        keys = [key_of(case, settings, texts[case.model]) for case in cases]
+        todo = {key: Task(key, replace(case, model=texts[case.model]))
+                for key, case in zip(keys, cases) if store.result(key) is None}
+        lost: dict[str, str] = {}
+        count, known = len(todo), len(set(keys)) - len(todo)
+        progress(known)
+
+        def done(key: str, result: Any) -> None:
+            task = todo.pop(key)
+            if isinstance(result, WorkerLost):
+                lost[key] = f'{task.case.name}: {result}'
+            elif isinstance(result, Exception):
+                raise result
+            else:
+                store.told_time(key, *result)
+            progress(known + count - len(todo))
+
+        if todo:
+            _work(todo, settings, store, jobs, cluster, done)
+        rows = [{'case': case, 'key': key, **(store.result(key) or {
+            'verdict': FAILED, 'reason': lost.get(key, 'not there'), **_LOST})}
+            for key, case in zip(keys, cases)]
+    return Campaign(settings, rows, count - len(lost), time.perf_counter() - started)
+
+
+def _work(todo: dict[str, Task], settings: Settings, store: Store, jobs: int,
+          cluster: str | None, done: Callable[[str, Any], None]) -> None:
+    """Hand out what is to be done; a cluster that comes back goes on with the rest."""
+    for attempt in range(1, _ATTEMPTS + 1):
+        with contextlib.ExitStack() as stack:
+            try:
+                workers = stack.enter_context(Workers(
+                    min(jobs if jobs > 0 else os.cpu_count() or 1, len(todo)), cluster,
+                    processes=True, modules=WARM[settings.work]))
+                for task, result in workers.stream(
+                        work_and_keep, (settings, str(store.cases)), list(todo.values())):
+                    done(task.key, result)
+                return
+            except (ClusterLost, InputError) as error:
+                gone = isinstance(error, ClusterLost)
+                if not gone and attempt == 1 or attempt == _ATTEMPTS:
+                    raise ClusterLost(f'{error}; {len(todo)} cases are left') if gone else error
+        for key in [key for key in todo if store.result(key) is not None]:
+            todo.pop(key)       # done, but not told any more
+
+
+def work_and_keep(given: tuple[Settings, str], task: Task) -> tuple[float, float]:
+    """Work on one case and keep it; return wall-clock and processor time [s]. Run by workers."""
+    settings, cases = given
+    began, used = time.perf_counter(), time.process_time()
+    with kept_folder(Path(cases), task.key) as folder:
+        try:
+            found = work_on(task.case, settings, folder)
+        except InputError as error:
+            found = {'verdict': FAILED, 'reason': ' '.join(str(error).split()), **_LOST}
+        except Exception as error:      # noqa: B902, a failed case is a row and not an end
+            found = {'verdict': FAILED, 'reason': f'{type(error).__name__}: {error}', **_LOST}
+        write_text(folder / RESULT, json.dumps(found, indent=2, allow_nan=False) + '\n')
+    return time.perf_counter() - began, time.process_time() - used
+
+
+def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, dict[str, str]]:
+    """
+    Return the settings, and for each model that cases name what workers are given of it.
+
+    A preset stays a name, since it takes the valve of the recording; a file becomes its text.
+    """
+    from pam_sim import load_rig, preset_names
+    texts: dict[str, str] = {}
+    for name in {case.model for case in cases}:
+        model = name or settings.model
+        if settings.work not in NEED_A_MODEL:
+            texts[name] = ''
+            continue
+        if not model:
+            raise InputError('no model to hold the recordings against', '--model')
+        text = load_rig(model).to_yaml()
+        texts[name] = model if model in preset_names() else text
+    return replace(settings, model=''), texts
+
+
+def plain(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row as plain data; the path of its report as seen from the folder."""
+    data = {**row, **asdict(row['case'])}
+    del data['case'], data['model']
+    return {**data, 'report': f'{CASES}/{row["key"]}'}

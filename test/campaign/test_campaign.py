@@ -1,0 +1,172 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A campaign: worked on once, kept whole or not at all, the same bytes after a kill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+from pam_actuation.campaign.campaign import run_campaign
+from pam_actuation.campaign.cases import Case, find_cases
+from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
+from pam_actuation.campaign.store import kept_folder, key_of, Store, UNFINISHED
+from pam_actuation.campaign.work import Settings
+from pam_actuation.cli.main import main
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+import pytest
+
+MODEL = 'dmsp_5_300_hanging_mass'
+EXPERIMENT = """
+name: short_check
+description: Six seconds
+domain: pressure
+segments:
+  - rest: {duration_s: 0.5}
+  - random_steps: {low_pa: 351325.0, high_pa: 651325.0, min_hold_s: 0.25, max_hold_s: 0.8,
+                   duration_s: 5.5, seed: 3}
+"""
+
+
+@pytest.fixture(scope='module')
+def lab(tmp_path_factory):
+    """Return a folder with one good recording and one that is none."""
+    folder = tmp_path_factory.mktemp('lab')
+    rig = load_rig(f'rig: {MODEL}\neffects:\n- name: coulomb_friction\n  parameters: '
+                   '{force_n: 3.0}\nsensors: {pressure_noise_pa: 300.0, contraction_noise_m: '
+                   '1.0e-5, force_noise_n: 0.1}')
+    simulate_experiment(load_experiment(EXPERIMENT), rig, None,
+                        folder / 'rig_1' / '2026-03-01' / 'check', seed=1)
+    broken = folder / 'rig_2' / '2026-03-01'
+    broken.mkdir(parents=True)
+    (broken / 'check.mcap').write_bytes(b'no bag')
+    return folder
+
+
+def content(folder):
+    """Return {name: bytes} of what a campaign wrote, times aside."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob('*')
+            if path.is_file() and path.name not in ('times.csv', '.lock')}
+
+
+@pytest.fixture(scope='module')
+def done(lab, tmp_path_factory):
+    """Return the folder of a campaign that ran once, and its exit code."""
+    out = tmp_path_factory.mktemp('out')
+    return out, main(['campaign', str(lab), '--model', MODEL, '--out', str(out), '--effects',
+                      'coulomb_friction,leakage', '--jobs', '1', '--json'])
+
+
+def test_a_failed_recording_is_a_row_and_no_end(done):
+    out, code = done
+    assert code == 1
+    good, bad = json.loads((out / 'results.json').read_text())['cases']
+    assert good['verdict'] == 'effects' and bad['verdict'] == 'failed'
+    assert 'check.mcap' in bad['reason']
+    [size] = good['sizes']
+    assert size['name'] == 'coulomb_friction' and size['low'] < 3.0 < size['high']
+    case = out / good['report']
+    assert {path.name for path in case.iterdir()} == {
+        'case.json', 'gap.json', 'model.yaml', 'compare.mcap', 'report.html'}
+    assert json.loads((case / 'gap.json').read_text())['runtime_s'] == 0.0
+    page = (out / 'index.html').read_text()
+    assert f'href="{good["report"]}/report.html"' in page
+    # The recordings that stand out come first.
+    listed = page[page.index('All recordings</h2>'):]
+    assert listed.index('rig_2') < listed.index('rig_1')
+    assert '<script src="../../plotly.js">' in (case / 'report.html').read_text()
+    assert (out / 'plotly.js').stat().st_size > 1e6
+
+
+def test_nothing_is_worked_on_twice(done, lab, capsys):
+    out, _ = done
+    before = content(out)
+    argv = ['campaign', str(lab), '--model', MODEL, '--out', str(out), '--effects',
+            'coulomb_friction,leakage', '--json']
+    assert main(argv) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told['worked_on'] == 0 and told['new'] == [] and len(told['failed']) == 1
+    assert content(out) == before
+    # Nothing is new, so a nightly job has no alert; after a first run it has.
+    assert main([*argv, '--alert']) == 0
+    (out / 'findings.json').unlink()
+    assert main([*argv, '--alert']) == 1
+    assert content(out) == before
+
+
+def test_a_table_has_a_row_for_each_size(done, lab, tmp_path, monkeypatch):
+    out, _ = done
+    pyarrow = pytest.importorskip('pyarrow')
+    import pyarrow.parquet
+    table = pyarrow.parquet.read_table(out / 'results.parquet').to_pylist()
+    assert [(one['rig'], one['name']) for one in table] == [
+        ('rig_1', 'coulomb_friction'), ('rig_2', None)]
+    rows = [{**row, 'case': Case('p', row['rig'], row['day'], row['time'])}
+            for row in json.loads((out / 'results.json').read_text())['cases']]
+    assert [one['value'] for one in table_rows(rows)] == [one['value'] for one in table]
+    monkeypatch.setitem(sys.modules, 'pyarrow', None)
+    path, remark = write_table(rows, tmp_path)
+    assert remark == NO_PARQUET and path.read_text().count('\n') == 3
+
+
+def test_the_key_is_of_recording_model_and_settings(lab, tmp_path):
+    case, other = find_cases(lab)
+    key = key_of(case, Settings('gap'), 'model')
+    assert key == key_of(case, Settings('gap', model='said elsewhere'), 'model')
+    assert len({key, key_of(other, Settings('gap'), 'model'),
+                key_of(case, Settings('gap'), 'another'),
+                key_of(case, Settings('report'), 'model'),
+                key_of(case, Settings('gap', materiality=2.0), 'model')}) == 5
+    assert key_of(Case(str(tmp_path / 'gone'), 'r', 'd', 0.0), Settings('gap'), '') != key
+
+
+def test_what_a_kill_left_half_done_is_removed(tmp_path):
+    code = ('import os, signal, sys\nfrom pathlib import Path\n'
+            'from pam_actuation.campaign.store import kept_folder\n'
+            'with kept_folder(Path(sys.argv[1]), "key") as folder:\n'
+            '    (folder / "case.json").write_text("{}")\n'
+            '    os.kill(os.getpid(), signal.SIGKILL)\n')
+    store = Store(tmp_path)
+    store.cases.mkdir()
+    ended = subprocess.run([sys.executable, '-c', code, str(store.cases)], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    [left] = store.cases.iterdir()
+    assert left.name.startswith(UNFINISHED) and store.result('key') is None
+    with store.locked():
+        assert not list(store.cases.iterdir())
+        with pytest.raises(InputError, match='another campaign'), Store(tmp_path).locked():
+            pass
+        with kept_folder(store.cases, 'key') as folder:
+            (folder / 'case.json').write_text('{"verdict": "no_gap"}')
+        assert store.result('key') == {'verdict': 'no_gap'}
+        with kept_folder(store.cases, 'key') as folder:     # a slower worker, same case
+            (folder / 'case.json').write_text('{"verdict": "no_gap"}')
+    assert [path.name for path in store.cases.iterdir()] == ['key']
+
+
+def test_mistakes_are_told_before_any_work(lab, tmp_path, capsys):
+    for arguments, says in ((['--work', 'gap'], 'no model'),
+                            (['--model', 'dmsp_5_300_hangin_mass'], 'did you mean'),
+                            (['--model', MODEL, '--effects', 'leak'], 'leakage'),
+                            (['--model', MODEL, '--cluster', 'somewhere'], 'no address')):
+        assert main(['campaign', str(lab), '--out', str(tmp_path / 'out'), *arguments]) == 2
+        assert says in capsys.readouterr().err
+    with pytest.raises(InputError, match='no model'):
+        run_campaign(find_cases(lab), Settings('identify'), tmp_path / 'other')
+    assert not os.path.exists(tmp_path / 'other') and not os.path.exists(tmp_path / 'out')

@@ -1,0 +1,110 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What changed over time: each shape is found on its day, and chance is not."""
+
+import math
+
+import numpy as np
+from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.changes import changes_of
+from pam_actuation.campaign.series import IN_95, Series, series_of
+import pytest
+
+DAYS = 25
+
+
+def series(value, sd=0.02, named=True, rig='rig_1', time=None):
+    """Return a series of one quantity, a value a day."""
+    count = len(value)
+    time = np.arange(1.0, count + 1.0) if time is None else time
+    return Series(rig, 'friction', 'effect', 'force_n', 'N', time, [str(t) for t in time],
+                  np.array(value, dtype=float), np.full(count, sd),
+                  np.full(count, named) if isinstance(named, bool) else named,
+                  [f'k{i}' for i in range(count)], 0.0)
+
+
+def noisy(shape, seed=0, sd=0.02):
+    return shape + sd * np.random.default_rng(seed).standard_normal(DAYS)
+
+
+DAY = np.arange(1.0, DAYS + 1.0)
+
+
+@pytest.mark.parametrize('value, shape, day', [
+    (1.0 + 0.2 * (DAY >= 11), 'step', 11), (1.0 + 0.2 * (DAY >= 20), 'step', 20),
+    (1.0 + 0.05 * np.maximum(DAY - 5, 0), 'ramp', 5),
+    (2.0 - 0.05 * np.maximum(DAY - 14, 0), 'ramp', 14), (1.0 + 0.03 * DAY, 'line', 1)])
+def test_a_change_is_found_with_shape_and_day(value, shape, day):
+    for seed in range(5):
+        [found] = changes_of([series(noisy(value, seed))])
+        assert found.shape == shape and found.p < 1e-4
+        assert abs(found.series.time[found.begin] - day) <= 1.0
+        assert found.series.time[found.earliest] <= day <= found.series.time[found.latest] + 1.0
+        assert np.max(np.abs(found.fitted() - value)) < 0.05
+        if shape != 'step':
+            slope = (value[-1] - value[-2])
+            assert abs(found.amount - slope) < 4.0 * found.amount_sd
+
+
+def test_chance_is_no_change():
+    # Intervals so short that every change is told that is significant.
+    several = [series(noisy(np.ones(DAYS), seed), sd=0.005, rig=f'rig_{seed}')
+               for seed in range(100)]
+    assert changes_of(several) == []
+    # Without the correction for their number chance finds some, and no more than it may.
+    assert 3 <= sum(bool(changes_of([one], level=0.5)) for one in several) <= 60
+
+
+def test_one_far_value_is_no_change_and_hides_none():
+    value = noisy(np.ones(DAYS))
+    value[22] = 3.0
+    assert changes_of([series(value)]) == []
+    value = noisy(1.0 + 0.2 * (DAY >= 11), 3)
+    value[22] = 3.0
+    [found] = changes_of([series(value)])
+    assert found.begin == 10 and found.left_out == [22]
+
+
+def test_less_than_a_recording_can_tell_and_few_names_are_no_change():
+    assert changes_of([series(noisy(1.0 + 0.02 * (DAY >= 11), sd=0.001), sd=0.02)]) == []
+    named = DAY >= 24
+    assert changes_of([series(np.where(named, 1.0, 0.0), named=named)]) == []
+
+
+def test_several_recordings_a_day_begin_together():
+    time = np.repeat(np.arange(1.0, 13.0), 2)
+    value = 1.0 + 0.5 * (time >= 6) + 0.02 * np.random.default_rng(1).standard_normal(24)
+    [found] = changes_of([series(value, time=time)])
+    assert found.begin == 10 and time[found.begin] == 6.0
+
+
+def row(day, verdict='effects', sizes=(), ambiguous=(), least=None):
+    """Return a row of a campaign."""
+    return {'case': Case('p', 'rig', str(day), float(day)), 'key': f'k{day}', 'verdict': verdict,
+            'reason': '', 'sizes': list(sizes), 'ambiguous': list(ambiguous),
+            'least': least or {}, 'bad': False}
+
+
+def test_days_without_a_name_count_as_nothing_or_not_at_all():
+    leak = {'name': 'leakage', 'kind': 'effect', 'quantity': 'c', 'value': 5.0, 'low': 4.0,
+            'high': 6.0, 'unit': '-', 'nothing': 0.0}
+    least = {'leakage': {'value': 0.7, 'unit': '-', 'quantity': 'c'}}
+    [found] = series_of([
+        row(1, 'no_gap', least=least), row(2, sizes=[leak]), row(3, 'unknown', least=least),
+        row(4, 'ambiguous', ambiguous=['leakage'], least=least), row(5, 'no_gap')])
+    assert found.time.tolist() == [1.0, 2.0] and found.named.tolist() == [False, True]
+    assert found.value.tolist() == [0.0, 5.0]
+    assert found.sd == pytest.approx([0.7 / IN_95, 1.0 / IN_95])
+    assert not math.isnan(found.nothing)
