@@ -21,14 +21,17 @@ arrived when the loop asks, each with the time it was received.
 """
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from functools import partial
 import time
 from typing import Any
 
 from pam_actuation.nodes import qos
+from pam_actuation.nodes.mismatches import Mismatches
 from pam_actuation.nodes.writers import WriterTake
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -55,7 +58,7 @@ class CountedPublisher:
     def __init__(self, node: Node, message_type: Any, topic: str,
                  profile: QoSProfile | None = None) -> None:
         self._publisher = node.create_publisher(
-            message_type, topic, profile or qos.PUBLISHER,
+            message_type, topic, copy(profile or qos.PUBLISHER),      # overrides change it
             qos_overriding_options=None if topic.startswith('/') else qos.overridable())
         self._node = node
         self.topic = self._publisher.topic_name
@@ -131,10 +134,13 @@ class PolledSubscription:
                  profile: QoSProfile | None = None, raw: bool = False,
                  read: Callable[[bytes], Any] | None = None, writers: bool = False) -> None:
         self._node = node
+        may_override = not topic.startswith('/')
         self._subscription = node.create_subscription(
-            message_type, topic, _unused, profile or qos.CONSUMER,
+            message_type, topic, _unused, copy(profile or qos.CONSUMER),
             callback_group=_NeverExecuted(), raw=raw,
-            qos_overriding_options=None if topic.startswith('/') else qos.overridable())
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            qos_overriding_options=qos.overridable() if may_override else None)
+        self.mismatches = Mismatches(node, self._subscription, may_override)
         self._take: Callable[[], Any] = partial(
             self._subscription.handle.take_message, message_type, raw)
         if writers:
@@ -205,6 +211,7 @@ class PolledSubscription:
 
     def destroy(self) -> None:
         """Remove the subscription from its node."""
+        self.mismatches.destroy()
         self._node.destroy_subscription(self._subscription)
 
 

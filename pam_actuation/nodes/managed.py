@@ -421,8 +421,11 @@ class ManagedNode(LifecycleNode):
         own = self.get_name(), self.get_namespace()
         count = self.get_node_names_and_namespaces().count(own)
         # What was killed before this node began is not on its graph.
-        self.diagnostics.remark = '' if count < 2 else (
-            f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one')
+        remarks = [] if count < 2 else [
+            f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one']
+        remarks += [text for one in self.subscriptions_polled
+                    for text in one.mismatches.sentences()]
+        self.diagnostics.remark = '; '.join(remarks)
         self.diagnostics.send()
 
     def _await_subscriber(self) -> None:

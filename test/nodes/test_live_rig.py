@@ -30,9 +30,11 @@ from lifecycle_msgs.srv import ChangeState, GetState                        # no
 from live_rig import LiveRig, wait_for                                      # noqa: E402
 from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.control.sofc.persistence import load_rules               # noqa: E402
+from pam_actuation.nodes.ros_messages import class_of                      # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue     # noqa: E402
 from rcl_interfaces.srv import DescribeParameters, SetParameters            # noqa: E402
+from rclpy.qos import qos_profile_sensor_data                              # noqa: E402
 from std_srvs.srv import SetBool, Trigger                                   # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -168,6 +170,23 @@ def test_the_rig_is_operated_without_the_command_of_ros(rig, capsys):
          '--wait', '20'],
         env=rig.environment, capture_output=True, text=True)
     assert done.returncode == 0 and '\nlearning: true\n' in done.stdout, done.stderr
+
+
+def test_a_best_effort_sensor_is_named_in_diagnostics_and_on_the_terminal(rig):
+    # A driver of a regulator hears the supply pressure and needs none.
+    publisher = rig.node.create_publisher(
+        class_of('supply_pressure'), 'supply_pressure', qos_profile_sensor_data)
+    line = 'qos_overrides./muscle/supply_pressure.subscription.reliability:=best_effort'
+
+    def named():
+        return [one for one in rig.health['valve_driver'] if line in one.message]
+    wait_for(named, 10.0, 'the sentence')
+    assert named()[0].level == 1
+    assert '/muscle/listener sends /muscle/supply_pressure best effort' in named()[0].message
+    log = rig.processes['valve_driver'].log_file
+    wait_for(lambda: line in log.read_text(), 5.0, 'the line on the terminal')
+    rig.node.destroy_publisher(publisher)
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 0, 5.0, 'the end of the warning')
 
 
 def test_an_impossible_transition_is_refused_and_hurts_nobody(rig):

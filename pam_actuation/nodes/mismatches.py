@@ -1,0 +1,108 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Publishers that a subscription cannot receive: their quality of service does not match its own.
+
+A best-effort publisher never matches a reliable subscription, and DDS says so to nobody who does
+not ask. The middleware counts such publishers. That count is read with the diagnostics; only when
+it has grown are the publishers looked up on the graph, by name.
+"""
+
+import time
+from typing import Any
+
+from rclpy.event_handler import QoSSubscriptionEventType, UnsupportedEventTypeError
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import qos_check_compatible, QoSCompatibility, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+PATIENCE_S = 2.0        # the graph is behind the event, and names of nodes are even later
+NAMELESS = '_NODE_NAME_UNKNOWN_'
+
+
+class Mismatches:
+    """
+    The publishers of a topic that cannot reach one subscription.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Node that subscribes.
+    subscription : rclpy.subscription.Subscription
+        Its subscription.
+    may_override : bool
+        Whether the quality of service of the subscription can be set by parameters.
+
+    """
+
+    def __init__(self, node: Node, subscription: Any, may_override: bool) -> None:
+        self._node = node
+        self._topic = subscription.topic_name
+        self._profile = subscription.qos_profile
+        self._may_override = may_override
+        self._counted = 0
+        self._since_s: float | None = None      # the last event, while it may concern anybody
+        self._event: Any = None
+        try:
+            with subscription.handle:
+                self._event = rclpy_implementation.EventHandle(
+                    subscription.handle,
+                    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS)
+        except UnsupportedEventTypeError:
+            pass                # of another middleware: nothing is told
+
+    def sentences(self) -> list[str]:
+        """Return one sentence for each such publisher there is now, with the line to write."""
+        now_s = time.monotonic()
+        if self._has_new():
+            self._since_s = now_s
+        if self._since_s is None:
+            return []
+        found = [(end, reason)
+                 for end in self._node.get_publishers_info_by_topic(self._topic)
+                 for level, reason in [qos_check_compatible(end.qos_profile, self._profile)]
+                 if level == QoSCompatibility.ERROR]
+        if now_s - self._since_s < PATIENCE_S:
+            found = [one for one in found if one[0].node_name != NAMELESS]
+        elif not found:
+            self._since_s = None
+        return [self._sentence(*one) for one in found]
+
+    def _has_new(self) -> bool:
+        """Tell whether the middleware has counted another such publisher since the last call."""
+        if self._event is None:
+            return False
+        with self._event:
+            status = self._event.take_event()
+        before, self._counted = self._counted, status.total_count if status else self._counted
+        return self._counted > before
+
+    def _sentence(self, end: TopicEndpointInfo, reason: str) -> str:
+        who = 'a program without a node name' if end.node_name == NAMELESS else (
+            f'{end.node_namespace.rstrip("/")}/{end.node_name}')
+        if (end.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT
+                or self._profile.reliability != ReliabilityPolicy.RELIABLE):
+            return f'{who} cannot be received on {self._topic}: {reason.strip(" ;")}'
+        here = (f', or start this node with -p qos_overrides.{self._topic}.subscription.'
+                'reliability:=best_effort' if self._may_override else '')
+        return (f'{who} sends {self._topic} best effort, which is not received here; let it '
+                f'publish reliable{here}')
+
+    def destroy(self) -> None:
+        """Give the event back to the middleware."""
+        if self._event is not None:
+            self._event.destroy_when_not_in_use()
+            self._event = None

@@ -1,0 +1,100 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A publisher that a subscription cannot receive is named, with the line that helps."""
+
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from live_rig import wait_for                                               # noqa: E402, I100
+from pam_actuation.nodes import qos                                         # noqa: E402
+from pam_actuation.nodes.endpoints import PolledSubscription                # noqa: E402
+from pam_actuation.rigging.client import local_context                      # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+import rclpy                                                                # noqa: E402
+from rclpy.node import Node                                                 # noqa: E402
+from rclpy.parameter import Parameter                                       # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy       # noqa: E402
+from sensor_msgs.msg import FluidPressure                                   # noqa: E402
+
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
+
+BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+LINE = 'qos_overrides./muscle/pressure.subscription.reliability'
+
+
+@pytest.fixture(scope='module')
+def nodes():
+    """Return a node that subscribes and one that is a sensor, each a participant of its own."""
+    lock = DomainLock()
+    contexts = [local_context(lock.domain_id) for _ in range(2)]
+    listener = Node('listener', namespace='/muscle', context=contexts[0], parameter_overrides=[
+        Parameter(LINE.replace('/pressure', '/willing'), value='best_effort')])
+    sensor = Node('sensor', namespace='/lab', context=contexts[1])
+    yield listener, sensor
+    for node, context in zip((listener, sensor), contexts):
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+    lock.release()
+
+
+def test_a_best_effort_sensor_is_named_as_long_as_it_is_there(nodes):
+    listener, sensor = nodes
+    subscription = PolledSubscription(listener, FluidPressure, 'pressure')
+    assert subscription.mismatches.sentences() == []
+    sound = sensor.create_publisher(FluidPressure, '/muscle/pressure', qos.PUBLISHER)
+    wait_for(lambda: subscription.publishers == 1, 10.0, 'the reliable publisher')
+    assert subscription.mismatches.sentences() == []
+    deaf = sensor.create_publisher(FluidPressure, '/muscle/pressure', BEST_EFFORT)
+    wait_for(subscription.mismatches.sentences, 10.0, 'the sentence')
+    assert subscription.mismatches.sentences() == [
+        '/lab/sensor sends /muscle/pressure best effort, which is not received here; let it '
+        f'publish reliable, or start this node with -p {LINE}:=best_effort']
+    sensor.destroy_publisher(deaf)
+    wait_for(lambda: not subscription.mismatches.sentences(), 10.0, 'the end of the sentence')
+    deaf = sensor.create_publisher(FluidPressure, '/muscle/pressure', BEST_EFFORT)
+    wait_for(subscription.mismatches.sentences, 10.0, 'the sentence on another one')
+    for publisher in (deaf, sound):
+        sensor.destroy_publisher(publisher)
+    subscription.destroy()
+
+
+def test_the_line_of_the_sentence_helps(nodes):
+    listener, sensor = nodes
+    subscription = PolledSubscription(listener, FluidPressure, 'willing')
+    publisher = sensor.create_publisher(FluidPressure, '/muscle/willing', BEST_EFFORT)
+    wait_for(lambda: subscription.publishers == 1, 10.0, 'the publisher')
+    publisher.publish(FluidPressure(fluid_pressure=2e5))
+    wait_for(lambda: [message.fluid_pressure for message, _ in subscription.take()] == [2e5],
+             10.0, 'the message')
+    time.sleep(0.1)
+    assert subscription.mismatches.sentences() == []
+    subscription.destroy()
+    # It changed this topic alone.
+    assert qos.CONSUMER.reliability == qos.PUBLISHER.reliability == ReliabilityPolicy.RELIABLE
+
+
+def test_another_mismatch_is_told_by_its_reason(nodes):
+    listener, sensor = nodes
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    subscription = PolledSubscription(listener, FluidPressure, 'late', latched)
+    sensor.create_publisher(FluidPressure, '/muscle/late', qos.PUBLISHER)
+    wait_for(subscription.mismatches.sentences, 10.0, 'the sentence')
+    sentence, = subscription.mismatches.sentences()
+    assert sentence.startswith('/lab/sensor cannot be received on /muscle/late: ')
+    assert 'volatile' in sentence.lower()
+    subscription.destroy()
