@@ -25,6 +25,7 @@ import os
 from pathlib import Path
 import shlex
 import tempfile
+import time
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +36,7 @@ from pam_actuation.experiments.separating import next_experiment
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
+from pam_actuation.report.sections.numbers_first import numbers_section
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
@@ -48,6 +50,7 @@ from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
+from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
@@ -56,6 +59,7 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
+NUMBERS_SHARE = 0.3          # of the progress, where numbers are unknown
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
@@ -64,6 +68,8 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
               certify: 'Run | None' = None, of: str = '', **options: Any) -> 'GapResult':
     """
     Find the gap between recordings and a model and write the result folder.
+
+    Numbers of the model that are ``unknown`` are identified first.
 
     Parameters
     ----------
@@ -106,7 +112,17 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     if not runs:
         raise InputError('a gap look needs at least one recording')
     rig = model_for(runs[0], model)
-    result = find_gap(runs, rig, certify, **options)
+    began, told = time.perf_counter(), options.pop('progress', lambda done: None)
+    share = NUMBERS_SHARE if rig.unknown else 0.0
+    rig, found, remarks = numbers_first(runs, rig, certify is None, options.get('seed', 0),
+                                        lambda done: told(share * done))
+    spent = time.perf_counter() - began
+    result = find_gap(runs, rig, certify,
+                      progress=lambda done: told(share + (1.0 - share) * done), **options)
+    result.remarks += remarks
+    if found is not None:
+        result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)
+        result.runtime_s += spent
     if len(result.rivals) > 1:
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise,
@@ -156,7 +172,8 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
-        [gap_section(result, command=next_command(result, 'next_experiment.yaml')),
+        [*numbers_section(result),
+         gap_section(result, command=next_command(result, 'next_experiment.yaml')),
          provenance([('recording', run)])], footer=FOOTER, of=of))
 
 

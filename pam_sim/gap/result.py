@@ -194,6 +194,10 @@ class GapResult:
     subsystems : dict of str -> SubsystemVerdict
         By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
         them is named.
+    numbers_first : dict, optional
+        What was found of unknown numbers before the look: the entry of gap.json.
+    first_lines : list of str
+        The same for a person.
 
     """
 
@@ -220,10 +224,12 @@ class GapResult:
     evidence: list[dict[str, Any]] = field(default_factory=list)
     at_one_speed: bool = False
     subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
+    numbers_first: dict[str, Any] | None = None
+    first_lines: list[str] = field(default_factory=list)
 
     def text(self) -> str:
         """Return the result in lines for a person."""
-        rows = [f'{self.verdict}: {self.reason}']
+        rows = [*self.first_lines, f'{self.verdict}: {self.reason}']
         rows += [f'  {name}: {found.text()}' for name, found in self.subsystems.items()]
         for name, s in self.signals.items():
             factor, unit = READABLE[name]
@@ -246,7 +252,7 @@ class GapResult:
             'unexplained_fraction': self.unexplained_fraction,
             'fingerprint': self.fingerprint, 'minimum_detectable': self.minimum_detectable,
             'runtime_s': self.runtime_s, 'simulations': self.simulations,
-            'reason': self.reason})
+            'reason': self.reason, 'numbers_first': self.numbers_first})
 
 
 def _finite(value: Any) -> Any:

@@ -215,7 +215,8 @@ def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
     assert set(found) == {
         'schema', 'verdict', 'subsystems', 'proposal', 'effects', 'parameters',
         'ambiguity_set', 'next_experiment', 'where', 'signals', 'unexplained_fraction',
-        'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason'}
+        'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason',
+        'numbers_first'}
     assert set(found['subsystems']) == {'valve', 'muscle'}
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {

@@ -1,0 +1,78 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The unknown numbers of a model before the look for what it misses."""
+
+from collections.abc import Callable, Sequence
+
+from pam_sim.errors import InputError
+from pam_sim.gap.data.health import check_health, without_dead
+from pam_sim.identify.result import Identification
+from pam_sim.identify.workflow import identify
+from pam_sim.rig import Rig
+from pam_sim.run import Run
+
+
+def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int = 0,
+                  progress: Callable[[float], object] = lambda done: None
+                  ) -> tuple[Rig, Identification | None, list[str]]:
+    """
+    Return (model, what was identified, remarks): the model with its unknown numbers found.
+
+    What the recordings determine gets its value and how well it is known. What they leave open
+    stays unknown. A wrong load is thus no error of a sensor.
+
+    Parameters
+    ----------
+    runs : list of pam_sim.run.Run
+        Recordings that are searched.
+    rig : pam_sim.Rig
+        The given model.
+    holds_certify : bool
+        Whether the recordings hold the certify part too; it stays untouched.
+    seed : int
+        Of the starts.
+    progress : callable
+        Told the share that is done, 0 to 1.
+
+    """
+    if not rig.unknown or not all(check_health(run, rig.valve).usable for run in runs):
+        return rig, None, []
+    try:
+        found = identify([without_dead(run) for run in runs], rig, seed=seed, progress=progress,
+                         spare_certify=holds_certify)
+    except InputError as error:
+        return rig, None, [f'The unknown numbers ({", ".join(rig.unknown)}) were not identified '
+                           f'first: {error}.']
+    return found.rig, found, []
+
+
+def numbers_block(found: Identification) -> dict[str, object]:
+    """Return the entry ``numbers_first`` of gap.json."""
+    advice = found.next_experiment
+    return {
+        'numbers': [{k: v for k, v in one.to_dict().items() if k in (
+            'name', 'unit', 'status', 'value', 'ci95')} for one in found.found],
+        'together': [c.text() for c in found.combinations],
+        'next_experiment': None if advice is None else advice['why'],
+        'remarks': list(found.remarks)}
+
+
+def numbers_text(found: Identification) -> list[str]:
+    """Return the numbers in lines for a person."""
+    lines = ['unknown numbers first:', *(f'  {one.text()}' for one in found.found)]
+    lines += [f'  known together: {c.text()}' for c in found.combinations]
+    if found.next_experiment is not None:
+        lines.append(f'  pam identify would measure next: {found.next_experiment["why"]}')
+    return lines + [f'  {one}' for one in found.remarks]
