@@ -43,7 +43,6 @@ import time
 from unittest import mock
 
 from gap_memory import Memory, remembered
-from joblib import delayed, Parallel
 import numpy as np
 import results_page
 
@@ -52,6 +51,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT)]
 
 from pam_actuation.bags.load import load_run  # noqa: E402, I100
+from pam_actuation.workers import Workers  # noqa: E402
 from pam_sim import load_rig  # noqa: E402
 from pam_sim.gap import find_gap, workflow  # noqa: E402
 from pam_sim.gap.criteria import CRITERIA, Criteria, GROUPS, table  # noqa: E402
@@ -296,15 +296,24 @@ def check(folders):
                       flush=True)
 
 
-def each(until, function, arguments, jobs):
+def each(until, function, arguments, args):
     """Call function(*a) for all arguments; return whether all were begun in time."""
-    def begun(one):
-        if time.time() >= until:
-            return False
-        function(*one)
-        return True
+    done = True
+    with Workers(args.jobs, args.cluster, processes=True) as workers:
+        for _, result in workers.stream(begun, until, [(function, one) for one in arguments]):
+            if isinstance(result, Exception):
+                raise result
+            done &= result
+    return done
 
-    return all(Parallel(n_jobs=jobs)(delayed(begun)(one) for one in arguments))
+
+def begun(until, task):
+    """Do a task; return False and do nothing after the end of the time."""
+    function, arguments = task
+    if time.time() >= until:
+        return False
+    function(*arguments)
+    return True
 
 
 def command_line():
@@ -315,6 +324,9 @@ def command_line():
     parser.add_argument('--number', type=int, default=60, help='of them, nearest to a decision')
     parser.add_argument('--seed', type=int, default=2026, help='of the cases')
     parser.add_argument('--jobs', type=int, default=2)
+    parser.add_argument('--cluster', metavar='ADDRESS', help='run on a Dask (tcp://) or Ray '
+                        '(ray://) cluster that sees --work; its workers need test/hidden and '
+                        'benchmarks in PYTHONPATH')
     parser.add_argument('--minutes', type=float, default=math.inf)
     parser.add_argument('--check', type=int, default=0, metavar='CASES',
                         help='compare so many of them with and without memory, no more')
@@ -328,7 +340,7 @@ def main():
     results_page.check(args, __file__)
     until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.recorded, args.seed)
-    done = each(until, record, [(c, args.work) for c in cases], args.jobs)
+    done = each(until, record, [(c, args.work) for c in cases], args)
     folders = [args.work / 'cases' / c.name for c in cases]
     logs = {folder: read(folder / 'usual.json')['log'] for folder in folders
             if (folder / 'usual.json').exists()}
@@ -338,7 +350,7 @@ def main():
         check(chosen[:args.check])
         return 0
     for ask in (ask_groups, ask_single):
-        done = done and each(until, ask, [(folder,) for folder in chosen], args.jobs)
+        done = done and each(until, ask, [(folder,) for folder in chosen], args)
     with results_page.printed(args, __file__):
         print(report(logs, chosen))
     return 0 if done else UNFINISHED

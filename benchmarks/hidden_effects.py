@@ -38,7 +38,6 @@ import sys
 import tempfile
 import time
 
-from joblib import delayed, Parallel
 from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -46,6 +45,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
 from asking import pam_gap  # noqa: E402, I100
+from pam_actuation.workers import Workers  # noqa: E402
 from pam_sim.files import write_text  # noqa: E402
 import results_page  # noqa: E402
 from scoring_table import scored, table  # noqa: E402
@@ -72,6 +72,9 @@ def command_line():
     parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
     parser.add_argument('--together', type=int, metavar='N', help='records that are answered at '
                         'the same time (default: --jobs); 1 times a record on all cores')
+    parser.add_argument('--cluster', metavar='ADDRESS', help='run on a Dask (tcp://) or Ray '
+                        '(ray://) cluster that sees --work; its workers need test/hidden and '
+                        'benchmarks in PYTHONPATH')
     parser.add_argument('--kinds', help=f'only these, of {", ".join(truth_cases.SHARES)}')
     parser.add_argument('--rivals', type=int, default=0, metavar='N',
                         help='answer the first N cases by the other methods, too')
@@ -159,17 +162,24 @@ def each(args, what, function, arguments, jobs=None):
 
     Raises OutOfMinutes where some were not begun in time.
     """
-    results = Parallel(n_jobs=jobs or args.together, return_as='generator')(
-        delayed(in_time)(args.until, function, a) for a in arguments)
-    found = list(tqdm(results, total=len(arguments), desc=what, disable=None))
-    done = sum(begun for begun, _ in found)
+    found = {}
+    with Workers(jobs or args.together, args.cluster, processes=True) as workers:
+        for (number, *_), result in tqdm(
+                workers.stream(in_time, args.until, [
+                    (number, function, a) for number, a in enumerate(arguments)]),
+                total=len(arguments), desc=what, disable=None):
+            if isinstance(result, Exception):
+                raise result
+            found[number] = result
+    done = sum(begun for begun, _ in found.values())
     if done < len(found):
         raise OutOfMinutes(f'{what}: {done} of {len(found)} done')
-    return [result for _, result in found]
+    return [found[number][1] for number in range(len(arguments))]
 
 
-def in_time(until, function, arguments):
+def in_time(until, task):
     """Return (True, what the function returns), (False, None) after the end of the time."""
+    _, function, arguments = task
     return (True, function(*arguments)) if time.time() < until else (False, None)
 
 

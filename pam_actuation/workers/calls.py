@@ -59,9 +59,9 @@ def call(function: Callable[[Any, Any], Any], key: str, blob: bytes, item: Any) 
     return function(shared, item)
 
 
-def warm_up(*modules: str) -> None:
+def warm_up(*modules: str, threads: int = 1) -> None:
     """Import modules ahead of the first task, and leave the other cores to other workers."""
-    os.environ.setdefault(THREADS, '1')
+    os.environ.setdefault(THREADS, str(threads))
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     for name in modules:
         importlib.import_module(name)

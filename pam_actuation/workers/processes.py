@@ -59,7 +59,8 @@ class Processes:
 
     def _started(self) -> ProcessPoolExecutor:
         executor = ProcessPoolExecutor(
-            max_workers=1, initializer=_begin, initargs=(os.getpid(), self._modules))
+            max_workers=1, initializer=_begin, initargs=(
+                os.getpid(), self._modules, max((os.cpu_count() or 1) // self.size, 1)))
         self._executors.append(executor)
         return executor
 
@@ -138,7 +139,7 @@ class Processes:
             executor.shutdown(wait=True, kill_workers=True)
 
 
-def _begin(parent: int, modules: tuple[str, ...]) -> None:
+def _begin(parent: int, modules: tuple[str, ...], threads: int) -> None:
     """Prepare a new process."""
     end_with(parent)
-    warm_up(*modules)
+    warm_up(*modules, threads=threads)

@@ -79,13 +79,17 @@ class Record:
                                    'initial_signal': self.initial_signal})
 
 
+# Returns function(shared, item) of every item, in order; as ``pam_actuation.workers.Workers.map``.
+Spread = Callable[[Callable[[Any, Any], Any], Any, list[Any]], list[Any]]
+TASK_RUNS = 8       # runs of a task that leaves this process
 # For all runs the same signals, or a sequence of signals for each.
 AllMeasured = Sequence[Measured] | Sequence[Sequence[Measured]]
 
 
 def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
                    records: Record | list[Record] | tuple[Record, ...], workers: int | None = None,
-                   keep: Sequence[str] | None = None, every: int = 1) -> list[Response]:
+                   keep: Sequence[str] | None = None, every: int = 1,
+                   spread: Spread | None = None) -> list[Response]:
     """
     Simulate many runs.
 
@@ -103,6 +107,9 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         all by default.
     every : int
         Keep the start and each so many steps after it.
+    spread : callable, optional
+        Runs tasks elsewhere, such as ``Workers(cluster='tcp://host:8786').map`` within its
+        block. Rigs travel once, a task is a few runs. The bits stay the same.
 
     Returns
     -------
@@ -123,6 +130,10 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
     if every < 1:
         raise InputError(f'is {every}; at least 1 is needed', 'every')
     places = {name: place for place, name in enumerate(names)}
+    if spread is not None:
+        pairs = _pairs(rigs, records)
+        starts = list(range(0, len(pairs), TASK_RUNS))
+        return [one for some in spread(_some, (pairs, keep, every), starts) for one in some]
 
     def kept(index: int, outputs: FloatArray) -> Response:
         rows = outputs[::every]
@@ -134,6 +145,21 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         return Response(chosen.T, places)
 
     return _run_all(_pairs(rigs, records), kept, workers)
+
+
+def _some(given: 'tuple[list[tuple[Rig, Record]], Sequence[str] | None, int]',
+          start: int) -> list[Response]:
+    """Simulate a few of many runs, the task of ``simulate_batch`` elsewhere."""
+    pairs, keep, every = given
+    few = pairs[start:start + TASK_RUNS]
+    responses = []
+    for number, (rig, record) in enumerate(few, start):
+        try:
+            responses += simulate_batch(rig, record, 1, keep, every)
+        except InputError as error:
+            place = error.where.removeprefix('run 0').removeprefix(': ')
+            raise _of_run(number, InputError(error.problem, place)) from None
+    return responses
 
 
 def sample_batch(rigs: 'Rig | list[Rig]', records: Record | list[Record],

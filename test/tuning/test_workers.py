@@ -26,6 +26,7 @@ from pam_actuation.tuning.tune import tune
 from pam_actuation.workers import WorkerLost, Workers
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.rollout.batch import Record, simulate_batch, TASK_RUNS
 import pytest
 
 BUDGET = 40
@@ -99,9 +100,29 @@ def test_a_lost_process_costs_its_own_task_only(tmp_path):
     with Workers(jobs=2, processes=True) as workers:
         found = dict(workers.stream(divided, tmp_path, range(6)))
         assert workers.map(divided, tmp_path, [1, 2, 4]) == [10.0, 5.0, 2.5]
+        _batch_is_the_same_elsewhere(workers)
     assert isinstance(found.pop(0), ZeroDivisionError)
     assert isinstance(found.pop(5), WorkerLost)
     assert found == {1: 10.0, 2: 5.0, 3: 10 / 3, 4: 2.5}
+
+
+def _batch_is_the_same_elsewhere(workers):
+    """Hold simulations of other processes against those of this one."""
+    rig, signal = load_rig('dmsp_5_300_hanging_mass'), [3.0] * 50
+    rigs = [rig.with_(parameters={'mass_kg': 4.0 + 0.1 * k}) for k in range(TASK_RUNS + 2)]
+    how = {'keep': ('force_n', 'time_s'), 'every': 3}
+    here = simulate_batch(rigs, Record(signal), **how)
+    there = simulate_batch(rigs, Record(signal), spread=workers.map, **how)
+    assert len(here) == len(there) == len(rigs)
+    for one, other in zip(here, there):
+        assert one.outputs.tobytes() == other.outputs.tobytes()
+        assert one.force_n.tobytes() == other.force_n.tobytes()
+    records = [Record(signal)] * TASK_RUNS + [Record([])]
+    with pytest.raises(InputError) as known:
+        simulate_batch(rig, records)
+    with pytest.raises(InputError) as told:
+        simulate_batch(rig, records, spread=workers.map)
+    assert str(told.value) == str(known.value) and f'run {TASK_RUNS}' in str(told.value)
 
 
 def test_points_and_loops_apart_cost_the_same(rig):
