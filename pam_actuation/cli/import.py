@@ -32,6 +32,7 @@ HELP = """Make a bag of a table measured elsewhere: CSV, TSV, Parquet, MAT, HDF5
 
 Without --map the columns are found by name, unit and range; --preview shows how. What the file
 cannot tell is asked for. Several files are one recording: the next part, or other signals."""
+_MOST_LEFT = 12                     # names of columns that are told
 EXAMPLE = 'pam import run7.csv --map pressure="p_bar:bar_gauge" --out runs/run7'
 
 
@@ -81,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
+    from pam_actuation.tables.preview import unread
     from pam_sim import load_rig
     from pam_sim.files import write_text
     rig = load_rig(args.rig) if args.rig else None
@@ -103,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         bar.update(1.0 - bar.n)
     if args.save_mapping:
         write_text(args.save_mapping, found.mapping.to_yaml())
-    _tell(args, recording, found, counts, out)
+    _tell(args, recording, found, counts, out, unread(tables, found))
     return EXIT_FINDING if recording.found else EXIT_DONE
 
 
@@ -163,7 +165,7 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
 
 
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
-          counts: dict[str, int], out: str) -> None:
+          counts: dict[str, int], out: str, left: list[str]) -> None:
     remarks = [one.sentence for one in recording.found]
     lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
     lines += [f'  {text}' for text in recording.told]
@@ -171,9 +173,13 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
         stamps, _ = recording.signals.get(name, ((), ()))
         lines.append(f'  {name}: column "{one.column}" in {one.unit.name} '
                      f'({found.told.get(name, "as stated")}), {len(stamps)} values')
+    if left:
+        lines.append('  not imported: ' + ', '.join(f'"{column}"' for column in left[:_MOST_LEFT])
+                     + (f' and {len(left) - _MOST_LEFT} more' if len(left) > _MOST_LEFT else ''))
     lines += [f'remark: {text}' for text in remarks]
     lines += [f'bag: {out}', f'next: pam report {out}']
     payload: dict[str, Any] = {
         'bag': out, 'duration_s': recording.duration_s, 'messages': counts,
-        'valve': recording.valve, 'remarks': remarks, 'mapping': found.mapping.to_yaml()}
+        'valve': recording.valve, 'remarks': remarks, 'not_imported': left,
+        'mapping': found.mapping.to_yaml()}
     emit(args, payload, '\n'.join(lines))

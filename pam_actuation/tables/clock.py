@@ -14,7 +14,7 @@
 
 """The time of every row, in nanoseconds: from a column, a rate, or the file itself."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import re
 from typing import NamedTuple, TYPE_CHECKING
 
@@ -33,7 +33,10 @@ if TYPE_CHECKING:
 
 SLOWEST_HZ, FASTEST_HZ = 0.1, 50_000.0
 SLOW_HZ = 10.0                              # below: another unit may be meant
+UNLIKELY_HZ = 1.0                           # below: the user has to say the unit
 EPOCH_S = 9e8                               # seconds that can only count from 1970
+GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
+JUMP_S = 10.0                               # longer than this and the rest: the clock was set
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,9 @@ class Clock:
     told : str
         Where the time came from, for the preview.
     remarks : tuple of str
-        What was mended.
+        What was mended, and gaps.
+    jump : str
+        A sentence on a clock that was set within the recording, '' without.
 
     """
 
@@ -58,6 +63,7 @@ class Clock:
     rows: IntArray
     told: str
     remarks: tuple[str, ...] = ()
+    jump: str = ''
 
 
 def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
@@ -93,7 +99,8 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
     """
     if mapping.rate_hz is not None:
         rows = np.arange(len(table), dtype=np.int64)
-        stamps = start_ns + np.round(rows * (1e9 / mapping.rate_hz)).astype(np.int64)
+        numbers = rows if table.numbered is None else table.numbered
+        stamps = start_ns + np.round(numbers * (1e9 / mapping.rate_hz)).astype(np.int64)
         return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second')
     column = time_column(table, mapping)
     if column is None:
@@ -104,7 +111,7 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
         read = _Times(table.stamp_ns, 'times of the messages')
     else:
         read = _from_column(table, column, start_ns)
-    return _in_order(table, read, sort)
+    return _with_gaps(table, _in_order(table, read, sort))
 
 
 class _Times(NamedTuple):
@@ -143,7 +150,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     # Whole numbers of the unit first: their product with a power of ten is exact.
     stamps = start + np.round(numbers * (factor * 1e9)).astype(np.int64)
     return _Times(stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start),
-                  _rate_remark(table, name, unit, stamps))
+                  _rate_remark(table, name, unit, stamps, bool(column.unit)))
 
 
 def _is_date(values: 'pd.Series') -> bool:
@@ -175,10 +182,15 @@ def _unit_of_name(table: Table, name: str) -> str:
 
 def _unit_by_rate(table: Table, name: str, numbers: FloatArray) -> str:
     """Return the one unit in which the rows come at a rate that recorders have."""
+    said = unit_in(name) or table.units.get(name, '')
+    if said and not any(unit_of_text(said, one) for one in FACTORS):
+        raise InputError(f'column "{name}" has the unit {said!r}, which is none of a time; add '
+                         f'--map time="{name}:s" (or ms, us, ns)', table.source)
     steps = np.diff(numbers)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    # A row or two a second are a slow loop in s, and as likely a fast recording in ms.
     fitting = [unit for unit in ('s', 'ms', 'us', 'ns') if step and (
-        20.0 <= 1.0 / (step * FACTORS[TIME][unit]) <= 5000.0)]
+        0.5 if unit == 's' else 20.0) <= 1.0 / (step * FACTORS[TIME][unit]) <= 5000.0]
     if len(fitting) != 1:
         raise InputError(
             f'column "{name}" does not say its unit, and steps of {step:g} fit '
@@ -187,7 +199,7 @@ def _unit_by_rate(table: Table, name: str, numbers: FloatArray) -> str:
     return fitting[0]
 
 
-def _rate_remark(table: Table, name: str, unit: str, stamps: IntArray) -> str:
+def _rate_remark(table: Table, name: str, unit: str, stamps: IntArray, is_stated: bool) -> str:
     """Return a sentence on a rate that few recorders have, '' without; InputError beyond."""
     steps = np.diff(stamps)
     steps = steps[steps > 0]
@@ -200,8 +212,12 @@ def _rate_remark(table: Table, name: str, unit: str, stamps: IntArray) -> str:
                   20.0 <= rate_hz * FACTORS[TIME][unit] / FACTORS[TIME][one] <= 5000.0), '')
     hint = f'; in {other} they would be plausible: --map time="{name}:{other}"' if other else ''
     said = f'column "{name}" in {unit} means {rate_hz:.4g} rows a second'
-    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ and (
+            rate_hz >= UNLIKELY_HZ or is_stated or not other):
         return said + hint
+    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        raise InputError(f'{said}{hint}. If {unit} is right, write --map time="{name}:{unit}"',
+                         table.source)
     raise InputError(f'{said}, allowed are {SLOWEST_HZ:g} to {FASTEST_HZ:g}'
                      f'{hint or "; is this the time?"}', table.source)
 
@@ -212,6 +228,26 @@ def _resolution_ns(times_ns: IntArray) -> int:
         if not (times_ns % step_ns).any():
             return step_ns
     return 0
+
+
+def _with_gaps(table: Table, clock: Clock) -> Clock:
+    """Return the clock with a remark on gaps, or a sentence on a jump."""
+    steps = np.diff(clock.stamp_ns)
+    if len(steps) < 10:
+        return clock
+    gaps = np.flatnonzero(steps > max(1e9 * GAP_S, GAP_STEPS * float(np.median(steps))))
+    if not len(gaps):
+        return clock
+    longest = int(gaps[np.argmax(steps[gaps])])
+    long_s, rest_s = 1e-9 * float(steps[longest]), 1e-9 * float(steps.sum() - steps[longest])
+    place = table.place(int(clock.rows[longest + 1]))
+    if long_s > max(JUMP_S, rest_s):
+        return replace(clock, jump=(
+            f'{place}: the time jumps on by {long_s:g} s, more than all the rest lasts '
+            f'({rest_s:.4g} s); was the clock set? Split the file here, or correct the times'))
+    return replace(clock, remarks=(
+        *clock.remarks, f'gaps in the time: {len(gaps)}, the longest {long_s:.4g} s before '
+        f'{place.partition(":")[2] and "line " + place.rpartition(":")[2] or place}'))
 
 
 def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
@@ -238,8 +274,7 @@ def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
         kept[same] = False
         remarks.append(f'rows that stand twice, taken once: {len(same)}')
         return Clock(stamps[kept], rows[kept], told, tuple(remarks))
-    steps = np.diff(np.unique(stamps))
-    if step_ns and len(steps) and float(np.median(steps)) <= 3.0 * step_ns:
+    if step_ns and _is_coarse(stamps, step_ns):
         remarks.append(
             f'rows that repeat a time: {len(repeated)}. Times are written to {1e-6 * step_ns:g} '
             'ms; rows of one time were spread over that')
@@ -248,6 +283,19 @@ def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
         f'the row has the time of the row before, with other values ({len(repeated)} such rows); '
         'two recordings in one file, or a time that is too coarse? Then give --rate HZ',
         table.place(int(rows[repeated[0]])))
+
+
+def _is_coarse(stamps: IntArray, step_ns: int) -> bool:
+    """Return whether times repeat because they are written to ``step_ns``."""
+    times = np.unique(stamps)
+    steps = np.diff(times)
+    if not len(steps) or float(np.median(steps)) > 3.0 * step_ns:
+        return False
+    # A stamp that was not renewed is followed by a longer step; a rounded one is not.
+    repeated = np.flatnonzero(np.diff(stamps) == 0)
+    after = np.searchsorted(times, stamps[repeated])
+    return float(np.median(steps[np.minimum(after, len(steps) - 1)])) < 1.9 * float(
+        np.median(steps))
 
 
 def _equal_rows(table: Table, one: int, other: int) -> bool:

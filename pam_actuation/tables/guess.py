@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import re
 
 import numpy as np
-from pam_actuation.tables.mapping import ColumnMap, TableMapping
+from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
 from pam_actuation.tables.signals import BY_NAME, Signal, SIGNALS, TIME_WORDS
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
@@ -29,6 +29,7 @@ from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
 
 BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
+FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,11 @@ class Question:
     Parameters
     ----------
     signal, column : str
-        Which is meant.
+        Which is meant; the column is '' where several could be the signal.
     text : str
         The question, in one sentence.
     answers : tuple of str
-        Units among which to choose.
+        Units among which to choose; of several columns ``COLUMN:UNIT``.
 
     """
 
@@ -54,7 +55,8 @@ class Question:
 
     def options(self) -> str:
         """Return the words of the command line that answer it, one of them for each answer."""
-        return ' or '.join(f'--map {self.signal}="{self.column}:{unit}"' for unit in self.answers)
+        column = f'{self.column}:' if self.column else ''
+        return ' or '.join(f'--map {self.signal}="{column}{unit}"' for unit in self.answers)
 
 
 @dataclass
@@ -101,24 +103,44 @@ def guess(tables: Collection[Table], mapping: TableMapping,
 
     """
     found = as_stated(mapping)
-    signals = dict(mapping.signals)
+    seen: dict[str, dict[str, tuple[ColumnMap, str] | Question]] = {}
     for table in tables:
         used = {table.name_of(one.column) for one in mapping.signals.values()}
         used |= {table.name_of(mapping.time.column)} if mapping.time is not None else set()
         for column in table.columns:
             if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
                 continue
-            signal = _signal_of(column)
-            if signal is None or signal.name in signals or any(
-                    question.signal == signal.name for question in found.questions):
+            signal = _signal_of(table.called.get(column, column))
+            if signal is None or signal.name in mapping.signals or column in seen.get(
+                    signal.name, {}):
                 continue
             answer = _of_column(table, column, signal, missing)
-            if isinstance(answer, Question):
-                found.questions.append(answer)
-            elif answer is not None:
-                signals[signal.name], found.told[signal.name] = answer
+            if answer is not None:
+                seen.setdefault(signal.name, {})[column] = answer
+    signals = dict(mapping.signals)
+    for name, candidates in seen.items():
+        chosen = _chosen(name, candidates)
+        if isinstance(chosen, Question):
+            found.questions.append(chosen)
+        else:
+            signals[name], found.told[name] = chosen
     found.mapping = replace(mapping, signals=signals)
     return found
+
+
+def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
+            ) -> tuple[ColumnMap, str] | Question:
+    """Return the one column that is a signal, or the question which of several is."""
+    exported = [one for column, one in candidates.items() if _is_exported(column, BY_NAME[name])]
+    if exported or len(candidates) == 1:
+        return exported[0] if exported else next(iter(candidates.values()))
+    answers = []
+    for column, one in candidates.items():
+        units = one.answers[:2] if isinstance(one, Question) else (one[0].unit.name,)
+        answers += [f'{column}:{unit}' for unit in units]
+    columns = ' and '.join(f'"{column}"' for column in candidates)
+    return Question(name, '', f'columns {columns} could each be the {BY_NAME[name].meaning}: '
+                    'which one?', tuple(answers))
 
 
 def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> Guess:
@@ -136,6 +158,10 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     signals, told = dict(found.mapping.signals), dict(found.told)
     for question in found.questions:
         unit = answer(question.text, question.answers)
+        if unit and not question.column:
+            signals[question.signal] = column_of_text(question.signal, unit, 'the answer')
+            told[question.signal] = 'as answered'
+            continue
         chosen = unit_of_text(unit, BY_NAME[question.signal].quantity) if unit else None
         if chosen is not None:
             signals[question.signal] = ColumnMap(question.column, chosen, where='the answer')
@@ -161,7 +187,7 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if _is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
-    text = table.units.get(column, '') or unit_in(column)
+    text = table.units.get(column, '') or unit_in(table.called.get(column, column))
     unit = unit_of_text(text, signal.quantity) if text else None
     if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
         return None                                     # such as a pressure sensor's volts
@@ -176,7 +202,10 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
                         tuple(_plausible(signal, low, high)))
     if unit.is_complete:
         return ColumnMap(column, unit), f'unit {unit.name} by name'
-    if low * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA:
+    below = finite * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
+    if below.any() and float(below.mean()) < FEW_BELOW:
+        shown += f', below 1 atmosphere in {int(below.sum())} of {len(finite)} rows only'
+    elif below.any():
         chosen = unit_of_text(f'{unit.name}_{GAUGE}', PRESSURE)
         assert chosen is not None
         return ColumnMap(column, chosen), f'gauge, since it falls to {low:.3g} {unit.name}'

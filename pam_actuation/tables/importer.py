@@ -131,6 +131,8 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
         if not held:
             continue
         clock = clock_of(table, mapping, start_ns, sort)
+        if clock.jump and not accept:
+            raise InputError(f'{clock.jump}. (--accept takes them as they are)')
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')
         result.found += [Doubt(f'{Path(table.source).name}: {text}')
                          for text in (*table.remarks, *clock.remarks)]

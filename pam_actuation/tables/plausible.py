@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pam_actuation.bags.plausibility import MAX_CONTRACTION, MAX_VOLTAGE, value_findings
+from pam_actuation.bags.plausibility import MAX_CONTRACTION, value_findings
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, Signal
 from pam_actuation.tables.units import (
@@ -27,6 +27,14 @@ from pam_actuation.tables.words import unit_in
 from pam_sim.annotations import FloatArray
 from pam_sim.units import P_ATM_PA
 
+FAR = 20.0                           # times the range of the others: no value of the rig
+MUCH_PA, LITTLE = 2e5, 0.01         # a free muscle shortens by more of its length
+MUCH_N = 8e3                         # the strongest muscle on sale pulls 6 kN
+SMALL_GAUGE_PA = 20e3                # no muscle moves below
+# Numbers by which programs say that there is none.
+STAND_INS = {-9999.0, -999.0, -99.0, -99999.0, 9999.0, 99999.0, 999999.0, -32768.0, 32767.0,
+             65535.0, 4294967295.0, 2147483647.0, -2147483648.0}
+HUGE = 1e30
 LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2}       # below: another unit is likely
 NEAR_ATMOSPHERE_PA = 5e3
 
@@ -67,17 +75,43 @@ def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
                                'left out'))
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
                   for one in _of_values(signal, mapped[name], finite, length_m)]
-    return found
+    held = _held(values, mapped, length_m)
+    return [*found, held] if held is not None else found
+
+
+def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
+          ) -> Doubt | None:
+    """Return a doubt on a muscle that hardly moves under much pressure, None without."""
+    if not {'pressure', 'contraction'} <= {*values} or not all(
+            np.isfinite(values[name]).any() for name in ('pressure', 'contraction')):
+        return None
+    risen_pa, moved_m = (float(np.nanmax(values[name]) - np.nanmin(values[name]))
+                         for name in ('pressure', 'contraction'))
+    if risen_pa < MUCH_PA or not LEAST_MOVE[LENGTH] <= moved_m < LITTLE * length_m:
+        return None
+    one = mapped['contraction']
+    return Doubt(
+        f'contraction (column "{one.column}" in {one.unit.name}): it moves by '
+        f'{1e3 * moved_m:.3g} mm only while the pressure moves by {1e-3 * risen_pa:.0f} kPa; is '
+        'the unit right, or is the muscle held?')
 
 
 def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
                ) -> list[Doubt]:
+    apart = _apart(mapped, finite)
+    if apart is not None:
+        return [apart]
     low, high = float(finite.min()), float(finite.max())
     wrong = value_findings('', signal.field, finite, lambda: length_m)
     if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
             high - low > 2.0 * MAX_CONTRACTION * length_m):
         return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
                       f'{_fix(signal, mapped, finite, length_m)}', True)]
+    if wrong and signal.quantity == LENGTH:
+        turned = _turned(signal, mapped, finite, length_m)
+        if turned:
+            return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
+                          f'shortens by; {turned}', True)]
     found = [Doubt(one.sentence.partition(': ')[2].rstrip('.')) for one in wrong]
     if low == high:
         return [*found, Doubt(f'the value never changes ({_shown(signal, low)}): is the sensor '
@@ -86,6 +120,13 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     if least is not None and high - low < least:
         found.append(Doubt(f'it moves by {_shown(signal, high - low, difference=True)} only'
                            f'{_fix(signal, mapped, finite, length_m)}'))
+    if signal.quantity == FORCE and max(high, -low) > MUCH_N:
+        found.append(Doubt(f'it reaches {_shown(signal, max(high, -low))}, more than a muscle '
+                           f'pulls{_fix(signal, mapped, finite, length_m)}'))
+    if signal.quantity == PRESSURE and P_ATM_PA < high < P_ATM_PA + SMALL_GAUGE_PA and not (
+            least is not None and high - low < least):
+        found.append(Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
+                           f'{_fix(signal, mapped, finite, length_m)}'))
     if signal.quantity == PRESSURE:
         found += _gauge_or_absolute(mapped, low)
     said = unit_of_text(unit_in(mapped.column), signal.quantity) if unit_in(mapped.column) \
@@ -93,6 +134,46 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     if said is not None and said.factor != mapped.unit.factor and mapped.gain == 1.0:
         found.append(Doubt(f'the name of the column says {said.name}'))
     return found
+
+
+def _raw(mapped: ColumnMap, values: FloatArray) -> FloatArray:
+    """Return SI values as they stand in the column."""
+    return (values - mapped.unit.offset) / mapped.unit.factor / mapped.gain + mapped.zero
+
+
+def _apart(mapped: ColumnMap, finite: FloatArray) -> Doubt | None:
+    """Return a doubt on a number far from all others that stands for none, None without."""
+    for extreme in (float(finite.min()), float(finite.max())):
+        is_it = finite == extreme
+        others = finite[~is_it]
+        if 2 * is_it.sum() > len(finite) or len(others) < 10:
+            continue
+        span = float(others.max() - others.min())
+        if float(np.abs(others - extreme).min()) <= FAR * max(span, 1e-12):
+            continue
+        raw = float(_raw(mapped, np.array([extreme]))[0])
+        near = min(STAND_INS, key=lambda one: abs(one - raw))
+        if abs(raw) > HUGE or abs(near - raw) <= 1e-6 * abs(near):
+            shown = f'{raw:.10g}' if abs(raw) > HUGE else f'{near:.10g}'
+            return Doubt(f'{int(is_it.sum())} values are {shown}, far from all others; if '
+                         f'it stands for a missing value, add --missing {shown}', True)
+    return None
+
+
+def _turned(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float) -> str:
+    """Return how to read a length that is no contraction, '' where most values can be one."""
+    middle = float(np.median(finite))
+    if 0.0 <= middle <= MAX_CONTRACTION * length_m:
+        return ''
+    sign = replace(mapped, gain=-mapped.gain)
+    if not value_findings('', signal.field, -finite, lambda: length_m):
+        return f'if it counts the other way, write {sign.option(signal.name)}'
+    zero = float(_raw(mapped, np.array([finite.max()]))[0])
+    least = float(_raw(mapped, np.array([finite.min()]))[0])
+    ways = [replace(mapped, zero=float(f'{zero:.6g}'), gain=-mapped.gain),
+            replace(mapped, zero=float(f'{least:.6g}'))]
+    return (f'if it is the length of the muscle, write {ways[0].option(signal.name)}, with its '
+            f'length at rest; if only the zero is off, {ways[1].option(signal.name)}')
 
 
 def _gauge_or_absolute(mapped: ColumnMap, low: float) -> list[Doubt]:
@@ -131,5 +212,4 @@ def _shown(signal: Signal, value: float, difference: bool = False) -> str:
             f'{1e-3 * (value - P_ATM_PA):.4g} kPa gauge')
     if signal.quantity == LENGTH:
         return f'{1e3 * value:.4g} mm'
-    return f'{value:.4g} ' + {FORCE: 'N', 'voltage': f'V of {MAX_VOLTAGE:g} V'}.get(
-        signal.quantity, '').strip()
+    return f'{value:.4g} {({FORCE: "N", "voltage": "V"}.get(signal.quantity, ""))}'.strip()

@@ -67,6 +67,12 @@ def question_sentence(found: Guess) -> str:
     return ' '.join(f'{one.text} Add {one.options()}.' for one in found.questions)
 
 
+def unread(tables: Collection[Table], found: Guess) -> list[str]:
+    """Return the columns that are neither the time nor a signal."""
+    return list(dict.fromkeys(name for table in tables for name in table.columns
+                              if name not in _meaning(table, found)))
+
+
 def _meaning(table: Table, found: Guess) -> dict[str, str]:
     """Return column to what it is read as."""
     meant = {}

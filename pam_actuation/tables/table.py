@@ -48,6 +48,12 @@ class Table:
         Time of every row, where the file itself gives one, as a bag does.
     remarks : list of str
         What was odd about the file.
+    numbered : ndarray of int64, optional
+        Number of every row from 0, where rows between were left out.
+    called : dict of str to str
+        What the file calls a column whose name stands twice; its own is its number.
+    decimal : str
+        Decimal sign of numbers that are held as texts.
 
     """
 
@@ -57,6 +63,9 @@ class Table:
     lines: IntArray | None = None
     stamp_ns: IntArray | None = None
     remarks: list[str] = field(default_factory=list)
+    numbered: IntArray | None = None
+    called: dict[str, str] = field(default_factory=dict)
+    decimal: str = '.'
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -102,15 +111,21 @@ class Table:
             texts = column.astype(object)
             empty = column.isna() | texts.map(
                 lambda one: isinstance(one, str) and one.strip() in {'', *missing})
-            values = pd.to_numeric(texts.where(~empty, None), errors='coerce')
+            values = pd.to_numeric(texts.where(~empty, None).map(self._pointed), errors='coerce')
             wrong = np.flatnonzero(values.isna().to_numpy() & ~empty.to_numpy())
             if len(wrong):
                 text = str(texts.iloc[wrong[0]])
                 raise InputError(
                     f'column "{name}" holds {_short(text)}, which is no number; '
-                    f'{_number_fix(text)}', self.place(int(wrong[0])))
+                    f'{_number_fix(text, self.decimal, name)}', self.place(int(wrong[0])))
             column = values
-        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+        numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        lacking = [value for value in map(_number, missing) if value is not None]
+        return np.where(np.isin(numbers, lacking), np.nan, numbers) if lacking else numbers
+
+    def _pointed(self, value: object) -> object:
+        """Return a text with a decimal point; anything else as it is."""
+        return value.replace(self.decimal, '.') if isinstance(value, str) else value
 
 
 def no_column(wanted: str, columns: Collection[str]) -> str:
@@ -121,11 +136,20 @@ def no_column(wanted: str, columns: Collection[str]) -> str:
     return f'there is no column "{wanted}"{hint}; columns are {shown}{more}, or #1 for the first'
 
 
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def _short(text: str) -> str:
     return repr(text if len(text) <= 30 else f'{text[:30]}…')
 
 
-def _number_fix(text: str) -> str:
-    if re.fullmatch(r'\s*[+-]?[\d.]*,\d+\s*', text):
+def _number_fix(text: str, decimal: str, name: str) -> str:
+    if text.strip() == name:
+        return 'a second table begins here: split the file'
+    if decimal == '.' and re.fullmatch(r'\s*[+-]?[\d.]*,\d+\s*', text):
         return 'the file mixes decimal points and commas: write one of them everywhere'
     return f'if it stands for a missing value, add --missing {_short(text.strip())}'

@@ -20,6 +20,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.tables.signals import BY_NAME
 import pytest
 import spoiled
+import spoiled_judge
 
 CASES = spoiled.cases()
 
@@ -66,3 +67,21 @@ def test_two_gigabytes_are_answered_at_once(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(['import', 'log.csv', '--out', 'bag']) == 2
     assert case.remark in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('label, draft', list(spoiled_judge.drafts(
+    len(spoiled_judge.KINDS[::3]), 11, spoiled_judge.KINDS[::3])), ids=lambda one: str(one)[:40])
+def test_spoiled_at_random_none_is_silently_wrong(label, draft, tmp_path):
+    verdict, said = spoiled_judge.judged(draft, tmp_path / 'one')
+    assert verdict in (*spoiled_judge.GOOD, spoiled_judge.SAID), f'{label}: {verdict}: {said}'
+
+
+def test_the_judge_sees_a_wrong_value_and_a_lost_signal(tmp_path):
+    (_, draft), = spoiled_judge.drafts(1, 3, spoiled_judge.KINDS[20:21])
+    assert spoiled_judge.judged(draft, tmp_path / 'right')[0] in spoiled_judge.GOOD
+    draft.truth['pressure'][7] += 1e3
+    verdict, said = spoiled_judge.judged(draft, tmp_path / 'wrong')
+    assert verdict == spoiled_judge.SILENT and 'pressure has 1 wrong value' in said
+    draft.truth['pressure'][7] -= 1e3
+    draft.truth['external_force'] = draft.truth['pressure']
+    assert spoiled_judge.judged(draft, tmp_path / 'lost')[0] == spoiled_judge.SILENT

@@ -17,6 +17,7 @@
 import bz2
 from collections.abc import Callable, Collection
 import gzip
+import io
 import lzma
 import os
 import re
@@ -24,6 +25,8 @@ from typing import Any, TYPE_CHECKING
 import zlib
 
 import numpy as np
+from pam_actuation.tables.formats.damage import (
+    check_quotes, NOT_CLOSED, WatchedText, whole_rows)
 from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES
 from pam_actuation.tables.table import MOST_ROWS, Table
 from pam_sim.errors import InputError
@@ -41,16 +44,15 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     """Return the table of a text file; see ``formats.read_tables``."""
     import pandas as pd
     try:
-        with _OPEN.get(os.path.splitext(path)[1].lower(), open)(path, 'rb') as stream:
+        with _opened(path) as stream:
             head = stream.read(SAMPLE_BYTES)
     except (EOFError, lzma.LZMAError, OSError, zlib.error) as error:
         raise InputError(f'cannot be unpacked: {error}', path) from None
     if not head.strip():
         raise InputError('is empty', path)
     layout = layout_of(head, path)
-    size = os.path.getsize(path)
     is_packed = os.path.splitext(path)[1].lower() in _OPEN
-    rows = size / layout.line_bytes * (_PACKED_FACTOR if is_packed else 1) / every
+    rows = os.path.getsize(path) / layout.line_bytes * (_PACKED_FACTOR if is_packed else 1) / every
     if rows > MOST_ROWS and not is_packed:
         raise InputError(
             f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
@@ -58,15 +60,17 @@ def read(path: str, every: int, wanted: Collection[str] | None,
             path)
     pieces, done = [], 0
     try:
-        with pd.read_csv(
-                path, sep=layout.separator, decimal=layout.decimal, encoding=layout.encoding,
+        with _opened(path) as raw:
+            text = WatchedText(io.TextIOWrapper(raw, layout.encoding, newline=''), path, layout)
+            reader = pd.read_csv(
+                text, sep=layout.separator, decimal=layout.decimal,
                 header=None, names=list(range(len(layout.names))), index_col=False,
                 skiprows=layout.first_line - 1, skipinitialspace=True, low_memory=False,
                 **_exact_numbers(pd.__version__),
-                skip_blank_lines=False, chunksize=_CHUNK_ROWS,
-                on_bad_lines='error') as reader:
+                skip_blank_lines=False, chunksize=_CHUNK_ROWS, on_bad_lines='error')
             for piece in reader:
-                pieces.append(piece.iloc[-done % every::every])
+                # A copy: a slice alone would keep the rows between in memory.
+                pieces.append(piece.iloc[-done % every::every].copy() if every > 1 else piece)
                 done += len(piece)
                 progress(min(done / max(rows * every, 1.0), 1.0))
                 if sum(map(len, pieces)) > MOST_ROWS:
@@ -75,20 +79,34 @@ def read(path: str, every: int, wanted: Collection[str] | None,
                         'with --every 10', path)
     except pd.errors.ParserError as error:
         raise _row_error(str(error), path, layout.first_line, len(layout.names)) from None
+    except pd.errors.EmptyDataError:
+        raise InputError('holds no rows of numbers', path) from None
     except UnicodeError as error:
         raise InputError(
-            f'is no text in {layout.encoding} throughout: {error}; save it as UTF-8', path
-        ) from None
+            f'is no text in {layout.encoding} throughout: {error}; save it as UTF-8',
+            f'{path}, after line {text.line}') from None
+    except (EOFError, lzma.LZMAError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(f'cannot be unpacked: {error}', f'{path}, after line {text.line}'
+                         ) from None
     frame = pd.concat(pieces, ignore_index=True)
     lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
-    remarks = []
-    if every == 1 and not is_packed and len(frame) > 1 and not _ends_with_line(path):
-        frame = frame.iloc[:-1]
+    check_quotes(frame, lines, path)
+    remarks = [layout.remark] if layout.remark else []
+    if every == 1 and len(frame) > 1 and text.last not in '\r\n':
+        frame, lines = frame.iloc[:-1], lines[:-1]
         remarks.append('the last line has no end, so it may be incomplete: it was left out')
-    kept = ~frame.isna().all(axis=1).to_numpy()
-    frame, lines = frame[kept], lines[:len(frame)][kept]
+    with _opened(path) as raw:
+        found = whole_rows(frame, lines, layout, io.TextIOWrapper(
+            raw, layout.encoding, newline=''), path)
+    frame, lines = frame[found.kept], lines[found.kept]
     columns = {name: frame[place] for place, name in enumerate(layout.names)}
-    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines, remarks=remarks)]
+    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines,
+                  remarks=[*remarks, *found.remarks], numbered=found.numbered,
+                  called=layout.called, decimal=layout.decimal)]
+
+
+def _opened(path: str) -> Any:
+    return _OPEN.get(os.path.splitext(path)[1].lower(), open)(path, 'rb')
 
 
 def _exact_numbers(version: str) -> dict[str, Any]:
@@ -97,15 +115,12 @@ def _exact_numbers(version: str) -> dict[str, Any]:
     return {} if (major, minor) >= (3, 1) else {'float_precision': 'round_trip'}
 
 
-def _ends_with_line(path: str) -> bool:
-    with open(path, 'rb') as stream:
-        stream.seek(-1, os.SEEK_END)
-        return stream.read(1) in (b'\n', b'\r', b'\0')
-
-
 def _row_error(text: str, path: str, first_line: int, count: int) -> InputError:
     """Return the error of a row with too many fields, with its line in the file."""
     found = re.search(r'in line (\d+), saw (\d+)', text)
+    opened = re.search(r'EOF inside string starting at row (\d+)', text)
+    if opened:
+        raise InputError(NOT_CLOSED, f'{path}:{int(opened[1]) + first_line}')
     if not found:
         return InputError(f'cannot be read as a table: {text}', path)
     return InputError(

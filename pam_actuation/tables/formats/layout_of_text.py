@@ -16,20 +16,23 @@
 
 from collections import Counter
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import re
 
 from pam_sim.errors import InputError
 
 SAMPLE_BYTES = 256 * 1024
-_BOMS = ((b'\xef\xbb\xbf', 'utf-8-sig'), (b'\xff\xfe', 'utf-16'), (b'\xfe\xff', 'utf-16'))
+_BOMS = ((b'\xff\xfe\0\0', 'utf-32'), (b'\0\0\xfe\xff', 'utf-32'),
+         (b'\xef\xbb\xbf', 'utf-8-sig'), (b'\xff\xfe', 'utf-16'), (b'\xfe\xff', 'utf-16'))
+WIDTH = {'utf-32': 4, 'utf-16': 2, 'utf-16-le': 2, 'utf-16-be': 2}      # bytes of a character
+LINE_END = re.compile(r'\r\n|\r|\n')               # as pandas counts lines; no other break is one
 # Separator as pandas takes it; of equally good ones the first.
 _SEPARATORS = (';', '\t', ',', '|', r'\s+')
 _NUMBER = r'[+-]?(\d+{0}?\d*|{0}\d+)([eEdD][+-]?\d+)?'
 _DATE = re.compile(
     r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}.*)?|\d{1,2}:\d{2}(:[\d.,]+)?')
 _EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-', 'inf', '+inf', '-inf', '#n/a'}
-_COMMENTS = ('#', '%', '//')
+COMMENTS = ('#', '%', '//')
 _LOOKED_AT = 200                     # lines
 
 
@@ -41,7 +44,8 @@ class TextLayout:
     Parameters
     ----------
     encoding, separator, decimal : str
-        As ``pandas.read_csv`` takes them.
+        As ``pandas.read_csv`` takes them; separator and decimal sign are the same where quotes
+        hold the numbers together.
     names : tuple of str
         Of the columns; ``#1``, ``#2``, … where the file has none.
     units : tuple of str
@@ -50,6 +54,10 @@ class TextLayout:
         Line of the first row, counted from 1.
     line_bytes : float
         Usual length of a row.
+    remark : str
+        What was odd about the header.
+    called : dict of str to str
+        What the file calls columns whose name stands twice.
 
     """
 
@@ -60,6 +68,8 @@ class TextLayout:
     units: tuple[str, ...]
     first_line: int
     line_bytes: float
+    remark: str = ''
+    called: dict[str, str] = field(default_factory=dict)
 
 
 def layout_of(head: bytes, source: str) -> TextLayout:
@@ -80,29 +90,42 @@ def layout_of(head: bytes, source: str) -> TextLayout:
 
     """
     encoding = encoding_of(head, source)
-    lines = head.decode(encoding, errors='ignore').splitlines()
-    if len(head) >= SAMPLE_BYTES:
-        lines = lines[:-1]               # the last one ends early
+    lines = LINE_END.split(head.decode(encoding, errors='ignore'))
+    lines = lines[:-1] if len(head) >= SAMPLE_BYTES or not lines[-1] else lines
     said = None
     if lines and re.fullmatch(r'sep=.', lines[0].strip()):
         said = lines[0].strip()[4:]
-    best: tuple[int, int, str, str, int] | None = None
+    best: tuple[tuple[int, int, int], str, str, int] | None = None
     for separator in (said,) if said else _SEPARATORS:
         for decimal in '.,':
-            if decimal == separator:
+            if decimal == separator and not any('"' in line for line in lines[-_LOOKED_AT:]):
                 continue
-            begin, count = _first_row(lines, separator, decimal)
-            if count and (best is None or (len(lines) - begin, count) > best[:2]):
-                best = (len(lines) - begin, count, separator, decimal, begin)
+            begin, count, numbers = _first_row(lines, separator, decimal)
+            rank = len(lines) - begin, count, numbers
+            if count and (best is None or rank > best[0]):
+                best = (rank, separator, decimal, begin)
     if best is None:
         raise InputError(
             'holds no rows of numbers with a separator that is ; , | a tab or spaces', source)
-    _, count, separator, decimal, begin = best
-    names, units = _header(lines[:begin], separator, count, begin, source, decimal)
+    (_, count, _), separator, decimal, begin = best
+    named, units = _header(lines[:begin], separator, count, begin, source, decimal)
+    names = _unique(named or [''] * count)
+    called = {own: name for own, name in zip(names, named) if name and own != name}
+    remark = ''
+    if not named and _counts(split(lines[begin], separator)):
+        remark = f'line {begin + 1} numbers the columns: it was taken for a header'
+        begin += 1
     rows = lines[begin:begin + _LOOKED_AT]
     line_bytes = sum(len(line) + 1 for line in rows) / len(rows)
     return TextLayout(encoding, separator, decimal, names, units, begin + 1,
-                      line_bytes * (2 if encoding == 'utf-16' else 1))
+                      line_bytes * WIDTH.get(encoding, 1), remark, called)
+
+
+def _counts(fields: list[str]) -> bool:
+    """Return whether fields are 0, 1, 2, …, as NumPy and pandas head columns without names."""
+    counted = [one for one in fields if one]
+    return len(counted) > 2 and len(fields) - len(counted) <= 1 and counted == [
+        str(place) for place in range(len(counted))]
 
 
 def encoding_of(head: bytes, source: str) -> str:
@@ -111,6 +134,10 @@ def encoding_of(head: bytes, source: str) -> str:
         if head.startswith(mark):
             return encoding
     if b'\0' in head:
+        for encoding, zeros, others in (('utf-16-le', head[1::2], head[::2]),
+                                        ('utf-16-be', head[::2], head[1::2])):
+            if 10 * zeros.count(0) >= 9 * len(zeros) and not others.count(0):
+                return encoding
         raise InputError('is no text file: it holds zero bytes', source)
     try:
         # The sample may end within a character.
@@ -130,42 +157,44 @@ def split(line: str, separator: str) -> list[str]:
     return [one.strip() for one in line.strip(' \r\n').split(separator)]
 
 
-def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, int]:
-    """Return where the rows begin and their number of fields; (0, 0) where there are none."""
+def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
+    """Return where the rows begin, their number of fields, and how many numbers all hold."""
     number = re.compile(_NUMBER.format(re.escape(decimal)))
+    numbers = 0
 
     def kind(line: str) -> int:
+        nonlocal numbers
         fields = split(line, separator)
         numeric = sum(bool(number.fullmatch(one)) for one in fields)
         dates = sum(bool(_DATE.fullmatch(one)) for one in fields)
         empty = sum(one.lower() in _EMPTY for one in fields)
+        numbers += numeric
         # A text in a row of numbers is a flag, or a value that the import will name.
         return len(fields) if numeric and 2 * (numeric + dates + empty) >= len(fields) else 0
 
     looked_at = [kind(line) for line in lines[:_LOOKED_AT]]
     counts = Counter(count for count in looked_at if count)
     if not counts:
-        return 0, 0
+        return 0, 0, 0
     usual = max(counts, key=lambda count: (counts[count], count))
     if 2 * counts[usual] < sum(1 for line in lines[:_LOOKED_AT] if line.strip()) and (
             counts[usual] < 3):
-        return 0, 0
-    return looked_at.index(usual), usual
+        return 0, 0, 0
+    return looked_at.index(usual), usual, numbers
 
 
 def _header(above: list[str], separator: str, count: int, begin: int, source: str,
-            decimal: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units from the lines above the rows."""
-    numbered = tuple(f'#{place + 1}' for place in range(count))
+            decimal: str) -> tuple[list[str], tuple[str, ...]]:
+    """Return names and units from the lines above the rows; no names without any."""
     rows = []
     for line in above:
         text = line.strip().lstrip('\ufeff')
-        for mark in _COMMENTS:
+        for mark in COMMENTS:
             text = text.removeprefix(mark).strip() if text.startswith(mark) else text
         if text and not re.fullmatch(r'sep=.', text):
             rows.append(split(text, separator))
     if not rows:
-        return numbered, ()
+        return [], ()
     while rows and rows[-1] and not any(rows[-1]):
         rows.pop()
     last = rows[-1] if rows else []
@@ -178,11 +207,11 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
                 f'the line above the numbers names {len(last)} columns, but the rows have '
                 f'{count} (separator {_told(separator)}, decimal sign "{decimal}"); correct '
                 'the header, or write decimal points', f'{source}:{begin}')
-        return numbered, ()
+        return [], ()
     previous = rows[-2] if len(rows) > 1 else []
     if len(previous) == count and all(previous) and _are_units(last):
-        return _unique(previous), tuple(last)
-    return _unique(last), ()
+        return previous, tuple(last)
+    return last, ()
 
 
 def _are_units(fields: list[str]) -> bool:
