@@ -40,6 +40,7 @@ HANDED_ON = {
     'learning': ('true', 'Whether the rules of the controllers may change.'),
     'experiment': ('none', 'Experiment both knees play; none: they wait for references.'),
     'record': ('false', 'Whether to record a bag of each knee: true or false.'),
+    'use_sim_time': ('false', 'Whether the nodes follow /clock, which another program sends.'),
     'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 96; 0: none.'),
 }
 

@@ -86,6 +86,9 @@ def _arguments():
             'realtime_priority', default_value='0',
             description='Real-time priority of the nodes, 1 to 96; 0: none.'),
         DeclareLaunchArgument(
+            'use_sim_time', default_value='false', choices=['true', 'false'],
+            description='Whether the nodes follow /clock, which another program must send.'),
+        DeclareLaunchArgument(
             'namespace', default_value='knee', description='Namespace of the joint.'),
     ]
 
@@ -103,6 +106,8 @@ def _node(executable, *parameters, side='', condition=None):
         package=PACKAGE, executable=executable, name=executable, namespace=namespace,
         output='screen', condition=condition,
         parameters=[{'realtime_priority': ParameterValue(priority, value_type=int),
+                     'use_sim_time': ParameterValue(
+                         LaunchConfiguration('use_sim_time'), value_type=bool),
                      'muscle': _text(LaunchConfiguration(NAME))}, *parameters])
 
 

@@ -90,6 +90,9 @@ def _arguments():
             'realtime_priority', default_value='0',
             description='Real-time priority of the nodes, 1 to 96; 0: none.'),
         DeclareLaunchArgument(
+            'use_sim_time', default_value='false', choices=['true', 'false'],
+            description='Whether the nodes follow the time that the simulated plant makes.'),
+        DeclareLaunchArgument(
             'namespace', default_value='muscle', description='Namespace of the rig.'),
     ]
 
@@ -105,7 +108,8 @@ def _node(executable, *parameters, condition=None):
     priority = LaunchConfiguration('realtime_priority')
     common = {
         'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str),
-        'realtime_priority': ParameterValue(priority, value_type=int)}
+        'realtime_priority': ParameterValue(priority, value_type=int),
+        'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)}
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable,
         namespace=LaunchConfiguration('namespace'), output='screen', condition=condition,
@@ -125,7 +129,7 @@ def generate_launch_description():
         return IfCondition(EqualsSubstitution(LaunchConfiguration(CONTROLLER), name))
 
     recorder = _node(
-        RECORDER, valve,
+        RECORDER, valve, {'await_subscriber': ''},
         {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
          'controller': _text(CONTROLLER_NAME)},

@@ -17,7 +17,9 @@
 import ast
 from pathlib import Path
 
+from pam_actuation.rigging.node_spec import ORDER
 import pytest
+import yaml
 
 LAUNCH = Path(__file__).resolve().parents[1] / 'launch'
 
@@ -43,3 +45,11 @@ def test_the_end_of_any_node_ends_the_launch(name):
     assert started <= names_in(given['ends']) and 'OnProcessExit' in names_in(given['ends'])
     # Every node is one of these, none is made on the way.
     assert sum(makes_nodes(statement) for statement in described.body) == len(started)
+
+
+def test_the_aggregator_has_every_node_in_one_group():
+    file = LAUNCH.parent / 'config' / 'diagnostics' / 'aggregator.yaml'
+    groups = yaml.safe_load(file.read_text(encoding='utf-8'))['analyzers']['ros__parameters']
+    contained = [part for group in groups.values() if isinstance(group, dict)
+                 for part in group['contains']]
+    assert sorted(contained) == sorted(f'/{name}' for name in ORDER)

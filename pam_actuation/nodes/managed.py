@@ -72,6 +72,9 @@ COMMON_PARAMETERS = (
         'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
     node_parameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
     node_parameter(
+        'frame_id', '', 'Name of a frame of tf2, header.frame_id of all messages of the rig that '
+        'this node sends: where the sensor sits. Empty: none.'),
+    node_parameter(
         'lockstep', [''], 'Names of all nodes that go through the simulated time tick by tick '
         'together, this one included; needs use_sim_time. Empty: none.'),
 )
@@ -206,7 +209,8 @@ class ManagedNode(LifecycleNode):
         publisher = CountedPublisher(
             self, class_of(topic), topic, qos.profile(topic_of(topic).service.publisher))
         self.publishers_counted.append(publisher)
-        self._writers[topic] = (publisher, Writer(topic, self.value('muscle')))
+        self._writers[topic] = publisher, Writer(
+            topic, self.value('muscle'), self.value('frame_id'))
 
     def send(self, topic: str, plain: Any) -> None:
         """Publish a plain message."""

@@ -26,6 +26,10 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource  # n
 from launch.utilities import perform_substitutions                          # noqa: E402
 from launch_ros.actions import LifecycleNode                                # noqa: E402
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
+from pam_actuation.namespaces import node_name_of                          # noqa: E402
+from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
+from pam_actuation.nodes.managed import COMMON_PARAMETERS                   # noqa: E402
+from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
 LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
@@ -59,6 +63,7 @@ def described(name, **given):
 def test_a_namespace_means_the_same_in_every_form(namespace):
     nodes = described('rig.launch.py', namespace=namespace)
     assert {name.rpartition('/')[0] for name in nodes} == {'/leg'}
+    assert nodes.pop('/leg/experiment_recorder')['await_subscriber'] == ''
     for name, parameters in nodes.items():      # found in the namespace of the node
         assert parameters['await_subscriber'] == 'experiment_recorder', name
     nodes = described('knee.launch.py', namespace=namespace)
@@ -87,6 +92,56 @@ def test_a_joint_is_recorded_as_a_whole_if_asked_for(namespace):
 def test_a_namespace_that_ros_refuses_is_one_sentence(file):
     with pytest.raises(InputError, match="'le-g' is not allowed"):
         described(file, namespace='le-g')
+
+
+# How a node is brought up and ends, which a launch file and pam up do in ways of their own.
+BRINGING_UP = {'autostart', 'exit_when_finished', 'start_delay_s'}
+CASES = {
+    'a muscle': ('rig.launch.py', {'record': 'false'}, lambda: layouts.rig(
+        experiment='sine_quarter_hz')),
+    'on/off valves, recorded': (
+        'rig.launch.py', {'valve': 'hsv', 'output': 'bag'}, lambda: layouts.rig(
+            valve='hsv', experiment='sine_quarter_hz', record='bag')),
+    'raw signals, no controller': (
+        'rig.launch.py', {'experiment': 'voltage_steps', 'output': 'bag'}, lambda: layouts.rig(
+            experiment='voltage_steps', record='bag')),
+    'a joint': ('knee.launch.py', {'namespace': '/leg'}, lambda: layouts.knee(
+        '/leg', experiment='joint_sine')),
+    'a joint, recorded': (
+        'knee.launch.py', {'valve': 'hsv', 'record': 'true', 'output': 'bag'},
+        lambda: layouts.knee(valve='hsv', experiment='joint_sine', record='bag')),
+    'a joint that waits': (
+        'knee.launch.py', {'experiment': 'none', 'controller': 'none'},
+        lambda: layouts.knee(controller='none'))}
+
+
+def effective(full_name, parameters):
+    """Return all parameters of a node, given or not, apart from how it is brought up."""
+    namespace, _, name = full_name.rpartition('/')
+    known = {one.name: one.default
+             for one in (*COMMON_PARAMETERS, *node_class(name).PARAMETERS)}
+    assert set(parameters) <= {*known, 'use_sim_time'}
+    found = {**known, 'use_sim_time': False, **parameters}
+    awaited = found['await_subscriber']
+    found['await_subscriber'] = awaited and node_name_of(awaited, namespace)
+    return {key: value for key, value in found.items() if key not in BRINGING_UP}
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_a_launch_file_starts_what_pam_up_starts(case):
+    file, arguments, nodes = CASES[case]
+    launched = described(file, **arguments)
+    started = {f'{node.namespace}/{node.name}': node.parameters for node in nodes()}
+    assert {*launched} == {*started}
+    for name, parameters in started.items():
+        # Topics, types and services of a node follow from these.
+        assert effective(name, launched[name]) == effective(name, parameters), name
+
+
+def test_simulated_time_is_that_of_all_nodes():
+    for file in ('rig.launch.py', 'knee.launch.py'):
+        nodes = described(file, use_sim_time='true')
+        assert nodes and all(parameters['use_sim_time'] is True for parameters in nodes.values())
 
 
 @pytest.mark.parametrize('controller, node', [
