@@ -209,10 +209,11 @@ def test_benchmarks_need_no_more_than_their_extra(setup_keywords, manifest):
     page = (ROOT / 'docs' / 'dependencies.md').read_text(encoding='utf-8')
     assert all(f'| {name} |' in page for name in bench)
     own = {path.stem for path in (ROOT / 'benchmarks').glob('*.py')}
-    own |= {path.stem for folder in ('hidden', 'control')
+    own |= {path.stem for folder in ('hidden', 'control', 'view')
             for path in (ROOT / 'test' / folder).glob('*.py')}
     own |= {'pam_sim', 'pam_actuation'}
     allowed = bench | requirement_names(setup_keywords['install_requires'])
+    allowed |= requirement_names(setup_keywords['extras_require']['view'])
     used = {DISTRIBUTIONS.get(name, name) for name in set(imported_modules('benchmarks')) - own}
     # Those that start nodes need ROS as the nodes do.
     assert used - {depend.name for depend in manifest.exec_depends} <= allowed

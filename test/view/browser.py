@@ -43,13 +43,14 @@ def find_chromium():
 class Browser:
     """One page of a headless Chromium; a context manager."""
 
-    def __init__(self, folder, program=None):
+    def __init__(self, folder, before=()):
         self._folder = Path(folder)
         self._loop = asyncio.new_event_loop()
         self._number = 0
         self._process = subprocess.Popen(
-            [program or find_chromium(), *FLAGS[:-1], f'--user-data-dir={folder}', FLAGS[-1]],
+            [*before, find_chromium(), *FLAGS[:-1], f'--user-data-dir={folder}', FLAGS[-1]],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        self.pid = self._process.pid
         try:
             self._socket = self._wait(
                 websocket_connect, self._address(), max_message_size=64 << 20)

@@ -8,7 +8,7 @@ const LEVELS = ['ok', 'warning', 'error', 'silent'];
 const page = {
   socket: null, live: true, wait_ms: 250, number: 0, asked: new Map(), hello: null,
   charts: [], traces: [], time: null, layout: null, cursor: null, held: false, dirty: true,
-  views: '', frames: 0, end_s: null, playing: false, pending: false, drivers: [],
+  views: '', frames: 0, drawn: 0, end_s: null, playing: false, pending: false, drivers: [],
 };
 
 // ---- connection ----
@@ -308,7 +308,7 @@ function draw() {
   requestAnimationFrame(draw);
   if (!page.dirty || !page.time) return;
   page.dirty = false;
-  page.frames++;
+  page.frames++; page.drawn++;
   const styles = getComputedStyle(document.documentElement), known = {};
   const style = (name) => known[name] ??= styles.getPropertyValue(name).trim();
   const time = {...page.time, cursor: page.cursor};
