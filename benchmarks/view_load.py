@@ -21,8 +21,8 @@ Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live, all in on
 turns, so that each has its share of what else the machine does: no viewer, one page in a real
 browser, 20 pages, 20 pages with one that never reads beside them, and a viewer that is killed
 (SIGKILL) and started again. With ``--alone`` viewer and pages have a real-time priority below that
-of every node: they then go as if the machine had nothing else to do. Exit code 1 if driver or controller miss more ticks in a phase with
-the viewer than 0.1 % beyond the worst round without.
+of every node: they then go as if the machine had nothing else to do. Exit code 1 if driver or
+controller miss more ticks in a phase with the viewer than 0.1 % beyond the worst round without.
 """
 
 import argparse
@@ -131,9 +131,9 @@ class Viewer:
 
     def __init__(self, environment, domain_id, before):
         self._process = subprocess.Popen(
-            [*before, sys.executable, '-m', 'pam_actuation.cli.main', 'view', '--json', '--port', '0',
-             '--domain-id', str(domain_id)], env=environment, stdout=subprocess.PIPE, text=True,
-            start_new_session=True)
+            [*before, sys.executable, '-m', 'pam_actuation.cli.main', 'view', '--json',
+             '--port', '0', '--domain-id', str(domain_id)],
+            env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True)
         self.pid = self._process.pid
         self.port = int(json.loads(self._process.stdout.readline())['url'].split(':')[2][:-1])
 
@@ -180,8 +180,9 @@ class Director:
             viewer = Viewer(self._environment, self._rig.domain_id, self._before)
         if phase in (MANY, DEAF):
             pages = subprocess.Popen(
-                [*self._before, sys.executable, __file__, '--pages', str(PAGES), '--port', str(viewer.port),
-                 '--deaf', str(int(phase == DEAF))], stdout=subprocess.PIPE, text=True)
+                [*self._before, sys.executable, __file__, '--pages', str(PAGES),
+                 '--port', str(viewer.port), '--deaf', str(int(phase == DEAF))],
+                stdout=subprocess.PIPE, text=True)
         browser = None
         if phase == BROWSER:
             browser = Browser(self._folder / f'chromium{number}', self._before)

@@ -102,8 +102,8 @@ class ViewClient(WebSocketHandler):
         if not self.is_busy:
             self._send(text, False)
 
-    def tell(self, content: dict[str, Any]) -> None:
-        """Send a text that must arrive."""
+    def tell(self, content: dict[str, Any] | bytes) -> None:
+        """Send a text, or a picture that was asked for, which must arrive."""
         if self.is_busy:
             self._answers += 1
             if self._answers > MOST_ANSWERS:
@@ -111,7 +111,10 @@ class ViewClient(WebSocketHandler):
                 return
         else:
             self._answers = 0
-        self._send(json.dumps(content), False)
+        if isinstance(content, bytes):
+            self._send(content, True)
+        else:
+            self._send(json.dumps(content), False)
 
     def _send(self, message: str | bytes, binary: bool) -> None:
         try:

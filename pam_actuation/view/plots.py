@@ -80,6 +80,7 @@ PLOTS = (
     Plot('force', 'Force', 'N'),
     Plot('force_error', 'Force error', 'N'),
     Plot('torque', 'Torque', 'N m'),
+    Plot('rules', 'Rules, part of the command', 'kPa'),
     Plot('supply', 'Supply pressure, gauge', 'kPa'),
 )
 # What is wanted stands first: it is drawn below what is measured.
@@ -101,6 +102,9 @@ SIGNALS = (
     Signal('force', 'external_force', 'force_n', 'disturbance'),
     Signal('force_error', DERIVED, 'force_error_n', 'error'),
     Signal('torque', 'joint_state', 'torque_n_m', 'torque'),
+    Signal('rules', 'controller_state', 'feedback_rules_pa', 'feedback', _KPA),
+    Signal('rules', 'controller_state', 'feedforward_rules_pa', 'feed-forward', _KPA),
+    Signal('rules', 'controller_state', 'motion_rules_pa', 'motion', _KPA),
     Signal('supply', 'supply_pressure', 'pressure_pa', 'supply', _KPA, -P_ATM_PA),
 )
 DIFFERENCES = (
@@ -108,6 +112,10 @@ DIFFERENCES = (
     Difference('force_error_n', ('reference', 'force_n'), ('force', 'force_n')),
     Difference('angle_error_rad', ('joint_reference', 'angle_rad'), ('joint_state', 'angle_rad')),
 )
+# Where the rules of a controller act, for their surfaces.
+PLACES = {'controller_state': ('error_m', 'change_of_error_m_per_s', 'lead_reference_m',
+                               'lead_reference_m_per_s')}
 # Short name of a topic to the values kept of it.
-KEPT = {topic: tuple(dict.fromkeys(one.value for one in SIGNALS if one.topic == topic))
+KEPT = {topic: (*dict.fromkeys(one.value for one in SIGNALS if one.topic == topic),
+                *PLACES.get(topic, ()))
         for topic in dict.fromkeys(one.topic for one in SIGNALS if one.topic != DERIVED)}

@@ -27,6 +27,7 @@ from pam_actuation.view.client import ViewClient
 from pam_actuation.view.requests import LONGEST, Request, WATCH
 from pam_actuation.view.source import Source
 from pam_actuation.view.stream import Stream, WINDOWS_S
+from pam_actuation.view.surfaces import surfaces
 from pam_sim.errors import InputError
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import PeriodicCallback
@@ -35,7 +36,7 @@ from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandle
 
 PAGE: Final = Path(__file__).with_name('page')
 FIRST_PORT, PORTS = 8750, 20
-FRAME_S, STATE_S = 0.05, 0.25
+FRAME_S, STATE_S, RULES_S = 0.05, 0.25, 1.0
 CLOSE_S: Final = 0.3            # for pages that do not say goodbye
 MOST_CLIENTS: Final = 40
 COOKIE = 'pam_view'
@@ -123,7 +124,7 @@ class ViewServer:
         page = type('Page', (_Page,), {'server': self})
         server = HTTPServer(Application([
             (r'/socket', ViewClient, {'server': self}),
-            (r'/(|page\.css|page\.js|chart\.js|icon\.svg)', page,
+            (r'/(|page\.css|page\.js|chart\.js|surface\.js|icon\.svg)', page,
              {'path': str(PAGE), 'default_filename': 'index.html'}),
         ], default_handler_class=_Nothing, default_handler_args={'server': self},
             websocket_max_message_size=LONGEST, websocket_ping_interval=5.0,
@@ -133,6 +134,7 @@ class ViewServer:
         beats = [PeriodicCallback(self._send_state, STATE_S * 1e3)]
         if self.source.live:
             beats.append(PeriodicCallback(self._send_frames, FRAME_S * 1e3))
+            beats.append(PeriodicCallback(self._send_rules, RULES_S * 1e3))
         for beat in beats:
             beat.start()
         ready.set()
@@ -215,7 +217,8 @@ class ViewServer:
         at_ns = min(max(at_ns, begin_ns), end_ns)
         stream.refresh()
         self._send_layout(client, stream)
-        client.offer(stream.picture(at_ns))
+        client.tell(stream.picture(at_ns))
+        client.tell(self._rules(stream.view, at_ns))
         client.tell(self._state(client, at_ns))
 
     def _send_layout(self, client: ViewClient, stream: Stream) -> None:
@@ -243,6 +246,18 @@ class ViewServer:
                     client.is_behind = True
                 else:
                     client.offer(changes)
+
+    def _send_rules(self) -> None:
+        """Send every page the rules of what it shows."""
+        now_ns = self.source.store.now_ns()
+        for view in {key[0] for key in self._streams}:
+            text = json.dumps(self._rules(view, now_ns))
+            for client in self.clients:
+                if client.stream_key is not None and client.stream_key[0] == view:
+                    client.offer_text(text)
+
+    def _rules(self, view: str, at_ns: int | None) -> dict[str, Any]:
+        return {'type': 'rules', 'surfaces': surfaces(self.source.store, view, at_ns)}
 
     def _send_state(self) -> None:
         if not self.clients or not self.source.live:

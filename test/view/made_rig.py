@@ -46,6 +46,15 @@ def feed(store, begin, count, namespace='/muscle', start_ns=START_NS):
         (('loop.period_mean_ms', '5.0'), ('loop.missed', '0')))])
 
 
+def feed_rules(store, begin, count, namespace='/muscle', gain=2.0, start_ns=START_NS):
+    """Put ticks of a controller into a store: feedback is ``gain`` [MPa/m] times the error."""
+    number = np.arange(begin, begin + count)
+    error_m = 0.002 * np.sin(0.01 * number)
+    store.add(namespace, 'controller_state', start_ns + number * STEP_NS, {
+        'error_m': error_m, 'change_of_error_m_per_s': 0.02 * np.cos(0.01 * number),
+        'feedback_rules_pa': gain * 1e6 * error_m, 'feedforward_rules_pa': 0.0 * error_m}, 0)
+
+
 class MadeRig:
     """A source of pages; ``stopped`` tells what its driver was asked for."""
 

@@ -15,7 +15,7 @@
 """The page in a real browser: connect, emergency stop, a server that dies, phone, bag, dark."""
 
 from browser import Browser, find_chromium
-from made_rig import MadeRig, Running
+from made_rig import feed_rules, MadeRig, Running
 from pam_actuation.view.recording import load
 from pam_actuation.view.server import ViewServer
 from pam_actuation.view.source import BagSource
@@ -112,10 +112,12 @@ def test_it_comes_back_after_the_server_died(browser, rig):
     second.stop()
 
 
-def test_on_a_phone_nothing_is_cut_and_the_stop_button_stays(browser, server):
+def test_on_a_phone_nothing_is_cut_and_the_stop_button_stays(browser, server, rig):
+    feed_rules(rig.store, 0, 4000)
     browser.size(390, 844, phone=True)
     browser.go_to(server.url)
-    browser.wait_for(READY)
+    browser.wait_for(f'{READY} && page.surfaces.length === 1 && page.surfaces[0].drawn !== null')
+    assert 'orange adds, blue takes off' in browser.text('#rules')
     assert browser.run('document.documentElement.scrollWidth') <= 390
     browser.run('window.scrollTo(0, document.body.scrollHeight)')
     top, bottom = browser.run("""(() => { const box = document.querySelector('#stop')
@@ -139,6 +141,7 @@ def test_a_bag_has_a_slider_and_colours_follow_the_system(browser, tmp_path):
     browser.press('#play')
     browser.wait_for('page.time.end_s > 3')
     browser.press('#play')
+    assert browser.run('document.documentElement.scrollWidth') <= 1280
     browser.dark(False)
     assert browser.run('getComputedStyle(document.body).backgroundColor') == 'rgb(246, 247, 248)'
     one.stop()

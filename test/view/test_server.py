@@ -209,7 +209,7 @@ def test_nothing_of_the_page_comes_from_elsewhere(server):
     status, headers, text = fetch(f'http://localhost:{server.port}/')
     assert status == 200 and "default-src 'self'" in headers['Content-Security-Policy']
     assert 'http' not in text.replace('http-equiv', '')
-    for name in ('page.js', 'chart.js', 'page.css', 'icon.svg'):
+    for name in ('page.js', 'chart.js', 'surface.js', 'page.css', 'icon.svg'):
         status, _, text = fetch(f'http://localhost:{server.port}/{name}')
         assert status == 200 and len(text) > 100
         assert 'https://' not in text and '@import' not in text
@@ -263,6 +263,6 @@ def test_bad_calls_end_with_code_2_and_one_sentence(capsys, tmp_path, monkeypatc
         error = capsys.readouterr().err
         assert said in error and error.count('\n') == 1, error
     taken.close()
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    monkeypatch.setattr('pam_actuation.cli.viewed.find_spec', lambda name: None)
     assert main(['view', bag]) == 2
     assert 'pip install "pam_actuation[view]"' in capsys.readouterr().err

@@ -16,11 +16,12 @@
 
 import json
 
-from made_rig import feed, MadeRig, Page, START_NS, STEP_NS
+from made_rig import feed, feed_rules, MadeRig, Page, START_NS, STEP_NS
 import numpy as np
 from pam_actuation.view.recording import load
 from pam_actuation.view.store import Store
 from pam_actuation.view.stream import COLUMNS, decode, Stream
+from pam_actuation.view.surfaces import CELLS, surfaces
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import write_bag
@@ -130,3 +131,30 @@ def test_a_bag_shows_the_same_values_and_what_its_nodes_said_then(tmp_path):
     assert only.namespaces() == ['/left']
     with pytest.raises(InputError, match='no signal of a rig in the namespace /none'):
         load(bag, namespace='/none')
+
+
+def test_the_surface_of_the_rules_shows_the_newest_output_at_each_place():
+    store = Store()
+    feed_rules(store, 0, 5000)
+    feedback, = surfaces(store, '', store.now_ns())     # motion rules are missing: no surface
+    assert feedback['title'] == 'Feedback rules'
+    assert feedback['x'] == {'label': 'error [mm]', 'range': (-2.0, 2.0)}
+    assert feedback['y']['range'] == (-20.0, 20.0)
+
+    def grid(shown):
+        return np.array([np.nan if one is None else one for one in shown['values']]
+                        ).reshape(CELLS, CELLS)
+
+    values = grid(feedback)
+    middles_mm = (np.arange(CELLS) + 0.5) / CELLS * 4.0 - 2.0
+    known = ~np.isnan(values)
+    assert 50 < known.sum() < 200           # a ring, and nothing inside it
+    difference = np.abs(values - 2.0 * middles_mm)[known]
+    assert difference.max() <= 2.0 * 4.0 / CELLS
+    feed_rules(store, 5000, 1000, gain=5.0)
+    learned, = surfaces(store, '/muscle', store.now_ns())
+    assert np.nanmax(grid(learned)) == pytest.approx(10.0, abs=0.1)
+    # A bag at an earlier time knows nothing of what came later.
+    before, = surfaces(store, '', START_NS + 4999 * STEP_NS)
+    assert before['values'] == feedback['values']
+    assert surfaces(store, '/other', store.now_ns()) == surfaces(store, '', None) == []

@@ -9,6 +9,7 @@ const page = {
   socket: null, live: true, wait_ms: 250, number: 0, asked: new Map(), hello: null,
   charts: [], traces: [], time: null, layout: null, cursor: null, held: false, dirty: true,
   views: '', frames: 0, drawn: 0, end_s: null, playing: false, pending: false, drivers: [],
+  surfaces: [], surfaceTitles: '',
 };
 
 // ---- connection ----
@@ -54,7 +55,7 @@ function buttons() {
 }
 
 function heard(content) {
-  ({hello, state, layout, answer, error: (one) => banner('bad', one.message)})[content.type]?.(
+  ({hello, state, layout, answer, rules, error: (one) => banner('bad', one.message)})[content.type]?.(
     content);
 }
 
@@ -191,6 +192,18 @@ function topicRow(topic) {
   return row;
 }
 
+function rules(content) {
+  if (page.held) return;
+  const titles = content.surfaces.map((one) => one.title).join();
+  if (titles !== page.surfaceTitles) {
+    page.surfaceTitles = titles;
+    page.surfaces = content.surfaces.map((one) => new Surface(one.title));
+    $('rules').replaceChildren(...page.surfaces.map((one) => one.element));
+  }
+  page.surfaces.forEach((one, k) => { one.content = content.surfaces[k]; });
+  page.dirty = true;
+}
+
 // ---- emergency stop and reset ----
 
 function ask(action, words) {
@@ -313,6 +326,7 @@ function draw() {
   const style = (name) => known[name] ??= styles.getPropertyValue(name).trim();
   const time = {...page.time, cursor: page.cursor};
   for (const chart of page.charts) chart.draw(time, style);
+  for (const one of page.surfaces) one.draw(style);
 }
 
 setInterval(() => {
