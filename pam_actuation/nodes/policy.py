@@ -18,6 +18,7 @@ The access policy of some nodes, for the security tools of ROS 2 (SROS2, policy 
 Least rights: each node may publish, subscribe and serve what it does with exactly its
 parameters, and nothing else. One enclave per node, named after it; one more for an operator,
 who reads the diagnostics and calls the services the nodes offer, the emergency stop first of all.
+Another one is for the live page (``pam view``): it reads what it draws, and may stop and reset.
 """
 
 from collections.abc import Iterable
@@ -26,6 +27,9 @@ import xml.etree.ElementTree as ElementTree
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
 from pam_actuation.rigging.node_spec import NodeSpec
+from pam_actuation.topics.table import short_name
+from pam_actuation.view.plots import KEPT
+from pam_actuation.view.requests import ACTIONS
 
 PARAMETER_SERVICES = (
     'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
@@ -33,7 +37,7 @@ PARAMETER_SERVICES = (
 LIFECYCLE_SERVICES = (
     'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
     'get_transition_graph')
-OPERATOR = 'operator'
+OPERATOR, PAGE = 'operator', 'pam_view'
 SENT_BY_EVERY_NODE = (*OF_EVERY_NODE, '~/transition_event')
 
 
@@ -52,6 +56,7 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
         ' Made from the code, as docs/guides/security.md says; do not edit. '))
     enclaves = ElementTree.SubElement(root, 'enclaves')
     offered: list[str] = []
+    drawn: dict[str, None] = {}
     nodes = list(nodes)
     with Inspector() as inspector:
         for node in nodes:
@@ -62,6 +67,9 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
             profile = _profile(enclaves, node.namespace, node.name)
             offered += [service.replace('~', f'{node.namespace}/{node.name}')
                         for service in interface.serves]
+            drawn |= dict.fromkeys(
+                name if name.startswith('/') else f'{node.namespace}/{name}'
+                for name in interface.publishes if short_name(name) in KEPT)
             _allow(profile, 'topic', 'publish', (*interface.publishes, *SENT_BY_EVERY_NODE))
             _allow(profile, 'topic', 'subscribe', (
                 *interface.subscribes, '/clock', '/parameter_events'))
@@ -75,6 +83,10 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
     operator = _profile(enclaves, '/', OPERATOR)
     _allow(operator, 'topic', 'subscribe', ('/diagnostics',))
     _allow(operator, 'service', 'request', offered)
+    page = _profile(enclaves, '/', PAGE)
+    _allow(page, 'topic', 'subscribe', ('/diagnostics', *drawn))
+    _allow(page, 'service', 'request', [
+        one for one in offered if short_name(one) in ACTIONS])
     ElementTree.indent(root)
     return ('<?xml version="1.0" encoding="UTF-8"?>\n'
             + ElementTree.tostring(root, encoding='unicode') + '\n')

@@ -29,10 +29,10 @@ from pam_actuation.bags.series import table
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.ros_messages import message_class
+from pam_actuation.rigging.client import context_by_environment
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import ONLOOKER
 from pam_actuation.topics.table import BY_NAME, short_name
-from pam_actuation.transport import prepare_middleware
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.requests import EMERGENCY_STOP
 from pam_actuation.view.source import Answer
@@ -40,10 +40,9 @@ from pam_actuation.view.store import Store
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-NAME: Final = 'pam_view'
+PAGE: Final = 'pam_view'            # beginning of the name of the node, and its enclave
 DIAGNOSTICS: Final = '/diagnostics'
 POLL_S, LOOK_S = 0.02, 1.0          # for messages; for new topics and drivers
 ANSWER_S: Final = 2.0               # a driver answers within a tick; later it is told as silent
@@ -69,12 +68,12 @@ class ViewListener:
         self.title = namespace
         self.store = Store()
         self._namespace = namespace
-        prepare_middleware()
-        context = rclpy.Context()
-        rclpy.init(context=context, domain_id=domain_id, args=[],
-                   signal_handler_options=SignalHandlerOptions.NO)
+        if domain_id is None:
+            domain_id = int(os.environ.get('ROS_DOMAIN_ID') or 0)
+        context = context_by_environment(
+            domain_id, ['--ros-args', '--enclave', f'/{PAGE}'])
         # Several pages may look at one rig.
-        self._node = Node(f'{NAME}_{os.getpid()}', context=context, use_global_arguments=False,
+        self._node = Node(f'{PAGE}_{os.getpid()}', context=context, use_global_arguments=False,
                           enable_rosout=False, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self._node)

@@ -83,8 +83,13 @@ def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
     assert text == policy(nodes), 'make it anew, see docs/guides/security.md'
     publishers, enclaves = {}, ElementTree.fromstring(text.encode()).findall('.//enclave')
     assert [enclave.get('path') for enclave in enclaves] == [
-        *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session', '/operator']
-    called = [service.text for service in enclaves[-1].iterfind('.//service')]
+        *(f'{node.namespace}/{node.name}' for node in nodes), '/rig_session', '/operator',
+        '/pam_view']
+    called = [service.text for service in enclaves[-2].iterfind('.//service')]
+    # The live page may stop and reset, and send nothing.
+    assert {service.text.rsplit('/', 1)[-1] for service in enclaves[-1].iterfind('.//service')
+            } == {'emergency_stop', 'reset'}
+    assert not [*enclaves[-1].iterfind(".//topics[@publish='ALLOW']")]
     for node in nodes:
         if node.name == 'valve_driver':
             assert {f'{node.namespace}/valve_driver/emergency_stop',
