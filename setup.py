@@ -142,7 +142,7 @@ setup(
     package_data={'pam_actuation': ['py.typed', 'view/page/*'], 'pam_sim': [
         'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
         'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'valve/regulators/*.yaml',
-        'gap/*.schema.json']},
+        'gap/*.schema.json', 'identify/*.schema.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),

@@ -15,7 +15,6 @@
 """``pam identify``: the unknown numbers of a rig from recordings."""
 
 import argparse
-import json
 from pathlib import Path
 
 from pam_actuation.cli.common import (
@@ -24,7 +23,6 @@ from pam_actuation.cli.options import number, out_path, Parser, source
 
 HELP = 'Determine the unknown numbers of a rig, and say which the recordings do not determine.'
 EXAMPLE = 'pam identify runs/first --rig my_rig.yaml --unknown mass_kg spring_n_per_m'
-FILES = ('identify.json', 'rig.yaml', 'next_experiment.yaml')
 
 
 def add_arguments(parser: Parser) -> None:
@@ -40,8 +38,8 @@ def add_arguments(parser: Parser) -> None:
                         metavar='KG', help='known mass that hung on the load in addition, one '
                         'for each bag (default: none)')
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
-                        help='folder for rig.yaml with the numbers found, identify.json and '
-                        'next_experiment.yaml')
+                        help='folder for rig.yaml with the numbers found, identify.json, '
+                        'report.html and next_experiment.yaml')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
     add_seed_option(parser, 'seed of the starts of the fit')
     add_overwrite_option(parser)
@@ -50,10 +48,10 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Identify, write what was found, and say what to measure next."""
     from pam_actuation.bags.load import load_run
+    from pam_actuation.report.identify import FILES, save_identification
     from pam_sim import load_rig
-    from pam_sim.files import check_folder, whole_files, write_text
+    from pam_sim.files import check_folder
     from pam_sim.identify import identify
-    from pam_sim.located_yaml import dump_yaml
     if args.out is not None:
         check_folder(args.out, FILES, args.overwrite)
     rig = load_rig(args.rig)
@@ -64,12 +62,7 @@ def run(args: argparse.Namespace) -> int:
                          progress=lambda done: bar.update(done - bar.n))
     lines = [found.text()]
     if args.out is not None:
-        with whole_files(args.out) as folder:
-            write_text(folder / 'identify.json', json.dumps(found.to_dict(), indent=2) + '\n')
-            write_text(folder / 'rig.yaml', found.rig.to_yaml())
-            if found.next_experiment is not None:
-                write_text(folder / 'next_experiment.yaml',
-                           dump_yaml(found.next_experiment['experiment']))
+        save_identification(found, runs, args.out)
         lines.append(f'results: {args.out}')
         if found.next_experiment is not None:
             lines.append(f'next: pam run {Path(args.out) / "next_experiment.yaml"}')

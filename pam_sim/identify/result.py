@@ -59,16 +59,23 @@ class Found:
                 'allowed': [n.lower, n.upper],
                 'profile': [{'value': v, 'rise': r} for v, r in i.points]}
 
-    def text(self) -> str:
-        """Return it as a line."""
+    def shown(self) -> tuple[str, str]:
+        """Return (value, 95 % interval) for people, with units."""
         factor, unit = READABLE.get(self.number.unit, (1.0, self.number.unit))
         unit = '' if unit == '-' else f' {unit}'
         i = self.interval
         low = 'below' if i.open_low else f'{factor * i.low:.4g}'
         high = 'beyond' if i.open_high else f'{factor * i.high:.4g}'
         span = 'anywhere in its range' if i.open_low and i.open_high else (
-            f'95 %: {low} to {high}{unit}')
-        return (f'{self.number.name:24} {self.status:15} {factor * self.value:.4g}{unit} ({span})')
+            f'{low} to {high}{unit}')
+        return f'{factor * self.value:.4g}{unit}', span
+
+    def text(self) -> str:
+        """Return it as a line."""
+        value, span = self.shown()
+        is_open = self.interval.open_low and self.interval.open_high
+        return (f'{self.number.name:24} {self.status:15} {value} '
+                f'({span if is_open else f"95 %: {span}"})')
 
 
 @short_repr
@@ -88,7 +95,7 @@ class Identification:
     signals : dict
         Name -> unit, ``rmse_before`` and ``rmse_after``, SI.
     incomplete : bool
-        Whether more than noise is left: the model misses an effect.
+        Whether the numbers alone leave more than noise, so that effects were fitted along.
     next_experiment : dict or None
         ``why``, ``determines`` (names), ``experiment`` (for ``pam run``) and ``added_kg``.
     remarks : list of str
@@ -133,8 +140,8 @@ class Identification:
             lines.append(f'{name}: {factor * s["rmse_before"]:.3g} {unit} off before, '
                          f'{factor * s["rmse_after"]:.3g} {unit} after (rms)')
         if self.incomplete:
-            lines.append('more than noise is left: the model misses an effect, and the intervals '
-                         'allow for those of the library (next: pam gap)')
+            lines.append('the numbers alone leave more than noise: effects of the library were '
+                         'fitted along, and the intervals allow for them (next: pam gap)')
         lines += [f'remark: {one}' for one in self.remarks]
         if self.next_experiment is not None:
             lines.append(f'what to measure next: {self.next_experiment["why"]}')

@@ -16,10 +16,12 @@
 
 import json
 
+from jsonschema import Draft202012Validator
 from made_records import RIG, spring
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_sim import load_rig
+from pam_sim.identify.schema import identify_schema
 import pytest
 
 EXPERIMENT = """\
@@ -58,6 +60,9 @@ def test_what_is_found_is_written_and_loads(bag, tmp_path, capsys):
     data = json.loads((out / 'identify.json').read_text())
     assert {n['name']: n['status'] for n in data['numbers']} == {
         'mass_kg': 'determined', 'spring_n_per_m': 'determined'}
+    Draft202012Validator(identify_schema()).validate(data)
+    page = (out / 'report.html').read_text()
+    assert '2 of 2 unknown numbers are determined' in page and page.count('class="plot"') == 2
     rig = load_rig(str(out / 'rig.yaml'))
     assert rig.parameters['mass_kg'] == pytest.approx(3.3, rel=0.01)
     assert not (out / 'next_experiment.yaml').exists()
