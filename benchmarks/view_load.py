@@ -33,6 +33,7 @@ import os
 from pathlib import Path
 import signal
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -253,21 +254,20 @@ def measure(args, folder):
     return director.rows
 
 
-def span_of(numbers, form):
-    """Return the lowest and the highest number as text."""
+def middle_of(numbers, form, end=max):
+    """Return the median and the worst number as text."""
     numbers = list(numbers)
     if not numbers:
         return '–'
-    low, high = form.format(min(numbers)), form.format(max(numbers))
-    return low if low == high else f'{low} to {high}'
+    return f'{form.format(statistics.median(numbers))} ({form.format(end(numbers))})'
 
 
 def judge(rows, args):
     """Print the table; return whether the bars are met."""
-    print(f'{args.rounds} rounds of {args.seconds:g} s a phase; lowest and highest of the rounds. '
-          f'Load average at the end: {os.getloadavg()[1]:.1f}.\n')
+    print(f'{args.rounds} rounds of {args.seconds:g} s a phase; the median of the rounds, and the '
+          f'worst in brackets. Load average at the end: {os.getloadavg()[1]:.1f}.\n')
     print('| phase | driver: ticks missed | controller: ticks missed | plant: ticks missed '
-          '| viewer, cores | frames/s, slowest page | browser, cores |')
+          '| viewer, cores | frames/s of the slowest page | browser, cores |')
     print('|---|---|---|---|---|---|---|')
     worst, good = {}, True
     for phase, found in rows.items():
@@ -276,10 +276,11 @@ def judge(rows, args):
         if phase == WITHOUT:
             worst = {name: max(values) for name, values in shares.items()}
         good &= all(max(shares[name]) <= worst[name] + ALLOWED for name in LOOPS[:2])
-        cells = [span_of(shares[name], '{:.3%}') for name in LOOPS]
-        cells.append(span_of((one['cpu'] for one in found if 'cpu' in one), '{:.2f}'))
-        cells.append(span_of((min(one['rates']) for one in found if 'rates' in one), '{:.1f}'))
-        cells.append(span_of((one['page_cpu'] for one in found if 'page_cpu' in one), '{:.2f}'))
+        cells = [middle_of(shares[name], '{:.3%}') for name in LOOPS]
+        cells.append(middle_of((one['cpu'] for one in found if 'cpu' in one), '{:.2f}'))
+        cells.append(middle_of(
+            (min(one['rates']) for one in found if 'rates' in one), '{:.1f}', min))
+        cells.append(middle_of((one['page_cpu'] for one in found if 'page_cpu' in one), '{:.2f}'))
         print(f'| {phase} | {" | ".join(cells)} |')
     killed = sum(one['kills'] for one in rows[KILLED])
     gone = sum(one['deaf_were_let_go'] for one in rows[DEAF])
