@@ -24,6 +24,8 @@ import black_boxes
 import numpy as np
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
+from pam_sim.muscle.registry import laws
+from pam_sim.rig import LawChoice
 from pam_sim.units import P_ATM_PA
 import real_pressure
 from scipy.optimize import least_squares
@@ -41,20 +43,34 @@ FRICTION = {('coulomb_friction', 'force_n'): (4.0, 0.0, 50.0)}
 HYSTERESIS = {('hysteresis', 'force_n'): (10.0, 0.0, 50.0),
               ('hysteresis', 'force_per_pa'): (3e-5, 0.0, 2e-4),
               ('hysteresis', 'width_scale'): (1.5, 0.35, 5.0)}
+PLAY = {('hysteresis_prandtl_ishlinskii', 'half_width_pa'): (3e4, 0.0, 1e5),
+        ('hysteresis_prandtl_ishlinskii', 'half_width_per_pa'): (3e-3, 0.0, 0.3)}
+LAW, SET = 'sarosi', 'dmsp_10'
+# The six numbers of the force law, each within half of its published value.
+MAP_OF_RECORD = {('law', name): (value, *sorted((0.5 * value, 1.5 * value)))
+                 for name, value in laws()[LAW].SETS[SET].values.items()}
 DAMPING = {'damping_n_s_per_m': (100.0, 10.0, 2000.0)}
 MODELS = {'calibrated': LOAD, 'friction and creep': LOAD | FRICTION | CREEP,
           'hysteresis': LOAD | HYSTERESIS,
           'hysteresis and creep': LOAD | HYSTERESIS | CREEP,
           'hysteresis, creep, ends, threshold': MAP | HYSTERESIS | CREEP}
+LOOP_MODELS = MODELS | {
+    'play in pressure, ends, threshold': MAP | PLAY,
+    'play in pressure, force map fitted': {
+        name: one for name, one in LOAD.items() if name != 'force_map_gain'
+    } | PLAY | MAP_OF_RECORD}
 READING = 60                 # samples of the loop between its readings
 LOOP_DELAYS, STEP_DELAYS = range(2), range(4, 15)
 
 
 def with_sizes(rig, values):
-    """Return the rig with parameters by name and effects by (name, parameter)."""
+    """Return the rig with parameters by name, effects and the law by (name, parameter)."""
+    law = {key[1]: float(value) for key, value in values.items() if key[0] == 'law'}
+    if law:
+        rig = rig.with_(law=LawChoice(LAW, SET, law))
     effects = {one.name: dict(one.parameters) for one in rig.effects}
     for key, value in values.items():
-        if not isinstance(key, str):
+        if not isinstance(key, str) and key[0] != 'law':
             effects.setdefault(key[0], {})[key[1]] = float(value)
     return rig.with_(
         parameters={key: float(value) for key, value in values.items() if isinstance(key, str)},
@@ -94,7 +110,7 @@ def loop_table(rig, first, second):
         return [run_from_pressure(changed, one)['contraction'][::READING] for one in recordings]
 
     rows = {'before': [both({})] * 2}
-    for name, ranges in MODELS.items():
+    for name, ranges in LOOP_MODELS.items():
         rows[name] = []
         for k in (0, 1):
             def run(values, k=k):

@@ -13,15 +13,14 @@
 # limitations under the License.
 
 """
-The pressure behind a measured regulator: model, habits of the regulator, and a black box.
+The pressure behind a measured regulator: model, habits of the regulator, and black boxes.
 
 Used by ``real_records.py``. The record holds one step up and one down at 100 Hz. So blocks of
 0.1 s are dealt out in turn to two parts. Each model is fitted on one part and judged on the
 other, then the other way round. All models run freely from the start, on the command alone.
 """
 
-import itertools
-
+import black_boxes
 import numpy as np
 from pam_sim.units import P_ATM_PA
 from scipy.optimize import least_squares
@@ -42,7 +41,7 @@ BOTH_VALVES = {('vent_bleed_fill_creep', name): start for name, start in (
 MODELS = {'calibrated': {}, 'dead times': DEAD_TIMES, 'dead times, limits': DEAD_TIMES | LIMITS,
           'dead times, limits, vent that closes and bleeds': DEAD_TIMES | LIMITS | VENT,
           'dead times, limits, both valves close': DEAD_TIMES | LIMITS | BOTH_VALVES}
-ORDERS, DELAYS = (1, 2, 3), range(16)
+DELAYS = range(4, 15)        # samples, of the black boxes
 
 
 def free_run(rig, volts):
@@ -77,33 +76,9 @@ def fitted(rig, volts, gauge_pa, part, sizes):
     return run(found.x), dict(zip(ranges, found.x * scale))
 
 
-def arx(volts, gauge_pa, part):
-    """Return the free run of the ARX model, with an offset, that runs best on a part."""
-    best, least = None, np.inf
-    for order, inputs, delay in itertools.product(ORDERS, ORDERS, DELAYS):
-        first = max(order, inputs + delay)
-        rows = np.arange(first, volts.size)
-        columns = [gauge_pa[rows - k] for k in range(1, order + 1)]
-        columns += [1e5 * volts[rows - delay - k] for k in range(inputs)]
-        table = np.column_stack([*columns, np.full(rows.size, 1e5)])
-        used = part[rows]
-        weights = np.linalg.lstsq(table[used], gauge_pa[rows][used], rcond=None)[0]
-        free = gauge_pa.copy()
-        free[:first] = 0.0
-        with np.errstate(over='ignore', invalid='ignore'):
-            for i in rows:
-                free[i] = (weights[:order] @ free[i - order:i][::-1] + 1e5 * (
-                    weights[order:-1] @ volts[i - delay - inputs + 1:i - delay + 1][::-1]
-                    + weights[-1]))
-            off = rms((free - gauge_pa)[part])
-        if off < least:
-            best, least = free, off
-    return best
-
-
 def print_table(rig, volts, gauge_pa):
     """
-    Print the rms errors of the pressure, before, calibrated, with effects, and of the ARX model.
+    Print the rms errors of the pressure, before, calibrated, with effects, and of black boxes.
 
     Parameters
     ----------
@@ -119,13 +94,20 @@ def print_table(rig, volts, gauge_pa):
     for name, extra in MODELS.items():
         both = [fitted(rig, volts, gauge_pa, part, extra) for part in (even, ~even)]
         rows[name], sizes[name] = [found for found, _ in both], [s for _, s in both]
-    rows['ARX'] = [arx(volts, gauge_pa, part) for part in (even, ~even)]
+    ahead, labels = {}, []
+    for kind in (black_boxes.arx, black_boxes.narx):
+        name = kind.__name__.upper()
+        both = [kind(volts, gauge_pa, part, DELAYS) for part in (even, ~even)]
+        rows[name] = [one[0] for one in both]
+        ahead[f'{name}, one step ahead, not comparable'] = [one[1] for one in both]
+        labels.append(f'- {name}: {both[0][2]}; {both[1][2]}')
     print('| pressure in free run, rms [kPa] | first part: fitted | second: judged | '
           'second: fitted | first: judged |\n|---|---|---|---|---|')
-    for name, (one, other) in rows.items():
+    for name, (one, other) in (rows | ahead).items():
         cells = [rms((run - gauge_pa)[part]) for run, part in (
             (one, even), (one, ~even), (other, ~even), (other, even))]
         print(f'| {name} | ' + ' | '.join(f'{1e-3 * c:.2f}' for c in cells) + ' |')
+    print('\n' + '\n'.join(labels))
     print('\n| with both valves | first part | second part |\n|---|---|---|')
     one, other = sizes['dead times, limits, both valves close']
     for key in one:

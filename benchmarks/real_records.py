@@ -17,6 +17,7 @@
 
     python benchmarks/real_records.py FOLDER
     python benchmarks/real_records.py FOLDER --pressure --write    # the table of the valve alone
+    python benchmarks/real_records.py FOLDER --contraction --write # contraction and black boxes
 
 FOLDER holds ``steps_100hz.csv`` and ``quasi_static_loop.csv``, transcribed from
 github.com/tbazina/pam_lqi_pid; they are no part of this project. Another muscle than the one of
@@ -42,6 +43,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import real_contraction
 import real_pressure
 import results_page
 
@@ -168,6 +170,8 @@ def command_line():
     parser.add_argument('folder')
     parser.add_argument('--seconds', type=float, default=600.0, help='budget of each look')
     parser.add_argument('--pressure', action='store_true', help='the table of the valve alone')
+    parser.add_argument('--contraction', action='store_true',
+                        help='the tables of contraction and black boxes alone')
     results_page.add_write(parser, 'real_records')
     return parser
 
@@ -175,11 +179,13 @@ def command_line():
 def main():
     """Look at the loop, at the steps, and for what was injected."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__, 'pressure'):
-        show_pressure(args)
-    if not args.pressure:
-        with results_page.printed(args, __file__):
-            show(args)
+    is_all = not (args.pressure or args.contraction)
+    for part, is_asked, tables in (('pressure', args.pressure, show_pressure),
+                                   ('contraction', args.contraction, show_contraction),
+                                   ('', False, show)):
+        if is_all or is_asked:
+            with results_page.printed(args, __file__, part):
+                tables(args)
 
 
 def show_pressure(args):
@@ -190,6 +196,17 @@ def show_pressure(args):
     rig, _ = model_of(loop, zero)
     real_pressure.print_table(rig.with_(effects=[]), np.clip(slope * steps['u_V'], 0.0, 6.0),
                               1e5 * (zero + steps['p_bar']))
+
+
+def show_contraction(args):
+    """Print how well the model and black boxes follow the contraction of loop and steps."""
+    loop = read_table(args.folder, 'quasi_static_loop.csv')
+    steps = read_table(args.folder, 'steps_100hz.csv')
+    zero, slope = calibrated(loop)
+    rig, _ = model_of(loop, zero)
+    real_contraction.loop_table(rig, *(cycle(loop, k, zero, slope, seed=k) for k in (1, 2)))
+    real_contraction.chain_table(rig, np.clip(slope * steps['u_V'], 0.0, 6.0),
+                                 1e5 * (zero + steps['p_bar']), 1e-3 * steps['s_mm'])
 
 
 def show(args):
