@@ -113,12 +113,13 @@ RAY_REQUIRES = [
     'ray[client]>=2.9',
 ]
 
-# Only to compare speeds; nothing in the package imports it.
+# Only to compare with; nothing in the package imports it.
 BENCH_REQUIRES = [
     'mujoco>=3.2',
     'scikit-fuzzy>=0.5',
     'networkx>=3.2',  # scikit-fuzzy needs it and does not bring it
     'pysindy>=2.0',
+    'scikit-learn>=1.4',
 ]
 
 

@@ -15,15 +15,16 @@
 """
 Hold every muscle law against isometric records of a 10 mm hose, and print a Markdown table.
 
-Run ``python benchmarks/isometric_records.py FOLDER``. The records are not part of this project.
-They are of a 10 mm fluidic muscle, 25 cm cut (l0 23.3 cm, 19.3 cm at 620 kPa). It is held at 0,
-25, 50 and 75 % of the largest contraction, inflated and deflated in pulses. They come from
-github.com/Agile-and-Adaptive-Robotics/Muscle_Sensory, files ``contraction_00.csv`` to
+Run ``python benchmarks/isometric_records.py FOLDER [--write]``. The records are not part of this
+project. They are of a 10 mm fluidic muscle, 25 cm cut (l0 23.3 cm, 19.3 cm at 620 kPa). It is
+held at 0, 25, 50 and 75 % of the largest contraction, inflated and deflated in pulses. They come
+from github.com/Agile-and-Adaptive-Robotics/Muscle_Sensory, files ``contraction_00.csv`` to
 ``contraction_75.csv``. Columns are force [N], pressure [kPa gauge], time [s] and phase (1
 inflating, 2 deflating). Within a pulse the pressure in the line leads the force, so only plateaus
-count.
+count. Each length is also left out of the fit in turn, and judged.
 """
 
+import argparse
 from pathlib import Path
 import sys
 
@@ -32,6 +33,7 @@ from pam_sim.errors import InputError
 from pam_sim.muscle.fit import CASES, fit_law, judge
 from pam_sim.muscle.force_maps import ForceMap
 from pam_sim.muscle.registry import laws, make_law
+import results_page
 
 LENGTH_M, SHORTEST_M = 0.233, 0.193
 STILL_KPA = 1.5             # spread of the pressure over a plateau window
@@ -92,10 +94,45 @@ def unfitted(points):
             for name, law in laws().items() for chosen in law.SETS if 'dmsp_10' in chosen}
 
 
-def main(argv):
-    """Print both tables; exit code 2 without records."""
+def some(points, chosen):
+    """Return the ForceMap of some of the points."""
+    return ForceMap(points.name, points.length_m, points.pressure_gauge_pa[chosen],
+                    points.strain[chosen], points.force_n[chosen], points.censored[chosen])
+
+
+def left_out(points):
+    """
+    Return {label: ((rms, worst), …)} [% of the largest force], one pair for each length.
+
+    Each law is fitted to the other lengths. A pair is None where the best fit is refused.
+    """
+    largest, found = float(points.force_n.max()), {}
+    for label, (law, muscle, fixed) in CASES.items():
+        found[label] = []
+        for strain in np.unique(points.strain):
+            left = points.strain == strain
+            try:
+                fit = judge(fit_law(law, some(points, ~left), muscle, fixed).law,
+                            some(points, left))
+            except InputError:
+                found[label].append(None)
+                continue
+            found[label].append((100.0 * fit.rmse_n / largest, 100.0 * fit.max_error_n / largest))
+    return found
+
+
+def command_line():
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('folder', nargs='?', default='.')
+    results_page.add_write(parser, 'real_records')
+    return parser
+
+
+def show(args):
+    """Print the tables; exit code 2 without records."""
     try:
-        points, phase = read_records(*(argv or ['.']))
+        points, phase = read_records(args.folder)
     except InputError as mistake:
         print(f'isometric_records: {mistake}', file=sys.stderr)
         return 2
@@ -110,8 +147,16 @@ def main(argv):
                   f'| {fit.max_error_n:.1f} | {fit.false_force_n:.1f} |')
     for label, refusal in refused.items():
         print(f'\n{label}: the best fit is refused: {refusal}')
+    lengths = [f'{100.0 * one / points.strain.max() * 0.75:.0f} %' for one in np.unique(
+        points.strain)]
+    print('\n| law, rms (worst) at the length that was not fitted, % of the largest force | '
+          + ' | '.join(f'{one} left out' for one in lengths) + ' |')
+    print('|---|' + '---|' * len(lengths))
+    for label, pairs in left_out(points).items():
+        cells = ('refused' if one is None else f'{one[0]:.1f} ({one[1]:.1f})' for one in pairs)
+        print(f'| {label} | ' + ' | '.join(cells) + ' |')
     return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(results_page.run(command_line(), __file__, show))

@@ -26,6 +26,9 @@ PROGRAM = ROOT / 'benchmarks' / 'isometric_records.py'
 RECORDS = ROOT.parent / 'shared' / 'data' / 'isometric_10mm_25cm'
 
 
+sys.path.insert(0, str(PROGRAM.parent))
+
+
 def program():
     """Return the benchmark as a module."""
     spec = importlib.util.spec_from_file_location('isometric_records', PROGRAM)
@@ -46,6 +49,9 @@ def test_fitted_laws_follow_the_records():
     # The laws proportional to pressure have no threshold: they pull where the muscle was slack.
     for label in ('chou_hannaford', 'situm_herceg', 'tondu_lopez, constant k'):
         assert fits[label].rmse_percent > 5.0 and fits[label].false_force_n > 50.0
+    # At a length between those that were fitted, every plateau is within 5 % of the largest force.
+    _, quarter, half, _ = module.left_out(points)['sarosi']
+    assert quarter[1] < 5.0 and half[1] < 5.0
 
 
 def test_without_records_there_is_one_sentence(tmp_path):
