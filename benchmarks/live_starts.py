@@ -20,6 +20,9 @@ processes, so that the phases between plant, controller and driver are drawn ane
 simulations of the same reference, and go on learning. The error is root mean square over the last
 cycles of each sine, divided by that of the same classes with exact timing (median of six seeds of
 sensor noise), without and with the time that messages are on their way.
+With ``--hidden`` the plant is a node of the independent simulator under test/hidden, another rig
+in every start. Rules are taught on the rig of this package then, and the exact timing is that of
+each hidden rig.
 Beside it stand ticks of the loops that came more than half a period late, and the ages of the
 commands at the ticks of the driver.
 """
@@ -31,6 +34,8 @@ import sys
 import tempfile
 
 import command_age
+from hidden_plant_node import program
+from hidden_rig import hidden_rig
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.source import read_bag
@@ -47,6 +52,7 @@ RIG = 'dmsp_5_300_realistic'
 BEGIN_S = 1.5
 SINES = {0.25: (2, 1), 0.5: (4, 2), 1.0: (7, 4)}      # frequency [Hz] to cycles, and last of them
 LESSONS, SEEDS = 4, range(11, 17)
+HIDDEN_SEED = 831
 PERIODS_NS = {'controller_state': 5_000_000, 'valve_signal': 10_000_000, 'pressure': 4_000_000}
 
 
@@ -122,7 +128,9 @@ def started(args, one, rig, rules, folder):
         if not os.path.exists(bag):
             controller = load_controller(f'sofc_{args.valve}', rig, rules_file=rules)
             result = run_experiment(one, rig, controller, args.valve, bag, seed=start,
-                                    domain_id=args.domain_id, realtime=not args.ordinary)
+                                    domain_id=args.domain_id, realtime=not args.ordinary,
+                                    programs=args.hidden and {
+                                        'plant_simulator': program(HIDDEN_SEED + start)})
             if result.failure or result.findings:
                 print(f'start {start}: {result.failure} {result.findings}', file=sys.stderr)
         run = load_run(bag)
@@ -139,17 +147,25 @@ def show(args):
         taught(rig, args.valve, one).rules.save(rules)
         rows = started(args, one, rig, rules, folder)
         way_ns = int(np.median([row['way_ns'] for _, row in rows]))
-        exact, with_way = (exactly(one, rig, rules, folder, way) for way in (0, way_ns))
+        if args.hidden:
+            rigs = [hidden_rig(args.valve, HIDDEN_SEED + start) for start in range(args.starts)]
+            exact, with_way = ([exactly(one, other, rules, folder, way) for other in rigs]
+                               for way in (0, way_ns))
+        else:
+            exact, with_way = ([exactly(one, rig, rules, folder, way)] * args.starts
+                               for way in (0, way_ns))
     print('| sine | exact timing [mm] | with the way of messages | live, median | worst '
           '| median ratio | worst ratio | with the way | worst |\n'
           '|---|---|---|---|---|---|---|---|---|')
     for hz in SINES:
         live = np.array([errors[hz] for errors, _ in rows])
-        middle, worst = float(np.median(live)), float(live.max())
-        print(f'| {hz:g} Hz | {exact[hz]:.3f} | {with_way[hz]:.3f} | {middle:.3f} | {worst:.3f} | '
-              f'{middle / exact[hz]:.2f} | {worst / exact[hz]:.2f} | '
-              f'{middle / with_way[hz]:.2f} | {worst / with_way[hz]:.2f} |')
-    print(f'\n{len(rows)} starts; messages took {way_ns * 1e-6:.2f} ms.\n')
+        same, late = (np.array([errors[hz] for errors in found]) for found in (exact, with_way))
+        print(f'| {hz:g} Hz | {np.median(same):.3f} | {np.median(late):.3f} | '
+              f'{np.median(live):.3f} | {live.max():.3f} | '
+              f'{np.median(live / same):.2f} | {np.max(live / same):.2f} | '
+              f'{np.median(live / late):.2f} | {np.max(live / late):.2f} |')
+    print(f'\n{len(rows)} starts; messages took {way_ns * 1e-6:.2f} ms. Load average at the end: '
+          f'{os.getloadavg()[0]:.1f}.\n')
     print('| of a start | median | worst start |\n|---|---|---|')
     for key, words in (('newest_sd_ms', 'age of the newest command, standard deviation [ms]'),
                        ('acts_sd_ms', 'age of what acts, standard deviation [ms]'),
@@ -170,6 +186,8 @@ def command_line():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--valve', default='hsv', choices=('ppr', 'hsv'))
     parser.add_argument('--starts', type=int, default=20)
+    parser.add_argument('--hidden', action='store_true',
+                        help='before plants of the independent simulator')
     parser.add_argument('--ordinary', action='store_true', help='without real-time priority')
     parser.add_argument('--domain-id', type=int, default=None, help='ROS domain')
     parser.add_argument('--keep', default=None, metavar='DIR',
@@ -181,7 +199,7 @@ def command_line():
 def main():
     """Run and compare."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__, args.valve):
+    with results_page.printed(args, __file__, f'{args.valve}{"_hidden" * args.hidden}'):
         show(args)
 
 

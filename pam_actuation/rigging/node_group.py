@@ -136,7 +136,7 @@ class NodeGroup:
             with held() as interrupted:
                 self.processes[name] = NodeProcess(
                     node.name, node.namespace, node.parameters, environment, log_dir,
-                    parameter_file=node.parameter_file, label=node.label)
+                    parameter_file=node.parameter_file, label=node.label, program=node.program)
             if interrupted():
                 raise KeyboardInterrupt
         # Only now: a process with the threads of the middleware does not fork safely.

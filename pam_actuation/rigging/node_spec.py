@@ -29,7 +29,8 @@ class NodeSpec:
     """
     One node: executable, namespace, parameters, and a file with further ones or ''.
 
-    ``label`` is what sentences call it; '': its name.
+    ``label`` is what sentences call it; '': its name. ``program`` starts a node of somebody else
+    in its place; (): the one of this package.
     """
 
     name: str
@@ -37,3 +38,4 @@ class NodeSpec:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     parameter_file: str = ''
     label: str = ''
+    program: tuple[str, ...] = ()

@@ -14,7 +14,7 @@
 
 """Nodes as processes of the operating system, started and ended by their parent only."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 import ctypes
 from functools import partial
 import os
@@ -96,19 +96,21 @@ class NodeProcess:
         ROS parameter file with further parameters; '' for none.
     label : str
         What sentences call it, such as ``flexor/valve_driver``; '': its name.
+    program : sequence of str
+        Command line of a node of somebody else in its place; what ROS takes is added to it.
 
     """
 
     def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
                  environment: Mapping[str, str], log_dir: str | os.PathLike[str],
                  remap: Mapping[str, str] | None = None, parameter_file: str = '',
-                 label: str = '') -> None:
+                 label: str = '', program: Sequence[str] = ()) -> None:
         self.name = name
         self.label = label or name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
         command = [
-            sys.executable, '-m', f'pam_actuation.nodes.{name}', '--ros-args',
+            *(program or (sys.executable, '-m', f'pam_actuation.nodes.{name}')), '--ros-args',
             '-r', f'__ns:={namespace or "/"}', *parameter_arguments(parameters)]
         if parameter_file:
             command += ['--params-file', parameter_file]

@@ -21,7 +21,7 @@ with the signal that vents, watchdog and plant a little later, the recorder last
 on Ctrl-C and when a node dies. Of a driver that died, the watchdog vents the muscle meanwhile.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
 import json
@@ -113,18 +113,21 @@ class RigSession:
         Namespace of the rig.
     domain_id : int, optional
         ROS domain; default: a free one.
+    programs : mapping, optional
+        As of ``run_experiment``.
 
     """
 
-    def __init__(self, plan: RigPlan, namespace: str = '/muscle', domain_id: int | None = None
-                 ) -> None:
+    def __init__(self, plan: RigPlan, namespace: str = '/muscle', domain_id: int | None = None,
+                 programs: Mapping[str, Sequence[str]] | None = None) -> None:
         self.plan = plan
         self.namespace = namespace_of(namespace)
         nodes = {}
         for place, parameters in plan.parameters.items():
             below, _, name = place.rpartition('/')
             nodes[place] = NodeSpec(
-                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, label=place)
+                name, f'{self.namespace}/{below}'.rstrip('/'), parameters, label=place,
+                program=tuple((programs or {}).get(place, ())))
         self.group = NodeGroup(nodes, plan.folder, domain_id)
         self._cpu: dict[str, float | None] = {}
         self._active_since: float | None = None
@@ -290,7 +293,8 @@ def run_experiment(experiment: 'StrPath | Experiment',
                    out_dir: StrPath | None = None, *, learning: bool = True, seed: int = 0,
                    domain_id: int | None = None, progress: Progress | None = None,
                    with_recorder: bool = True, namespace: str | None = None,
-                   overwrite: bool = False, realtime: bool = True) -> Result:
+                   overwrite: bool = False, realtime: bool = True,
+                   programs: Mapping[str, Sequence[str]] | None = None) -> Result:
     """
     Run one experiment on live nodes and record it.
 
@@ -320,6 +324,9 @@ def run_experiment(experiment: 'StrPath | Experiment',
     realtime : bool
         Ask for real-time scheduling of the nodes; without the right to it (root, or a limit
         set for the user) they run as ordinary processes.
+    programs : mapping, optional
+        Place of a node below the namespace, such as ``plant_simulator``, to the command line of a
+        node of your own that takes its place, with the same name, topics and life cycle.
 
     Returns
     -------
@@ -350,7 +357,8 @@ def run_experiment(experiment: 'StrPath | Experiment',
         namespace=namespace, overwrite=overwrite, realtime=realtime)
     result = Result(bag or '')
     try:
-        with termination_as_interrupt(), RigSession(plan, namespace, domain_id) as session:
+        with termination_as_interrupt(), RigSession(
+                plan, namespace, domain_id, programs) as session:
             run_guarded(session, result, progress)
     finally:
         plan.remove()

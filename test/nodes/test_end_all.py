@@ -56,3 +56,12 @@ def test_a_node_whose_parent_died_while_it_started_ends():
                             preexec_fn=partial(end_with_parent, parent)).returncode
              for parent in (os.getpid(), os.getppid())]
     assert codes == [0, 1]
+
+
+def test_a_node_of_somebody_else_gets_what_ros_takes(tmp_path):
+    show = 'import sys; print(*sys.argv[1:])'
+    node = NodeProcess('plant_simulator', '/muscle', {'seed': 3}, dict(os.environ), tmp_path,
+                       program=(sys.executable, '-c', show, '--ros-args', '-p', 'mine:=7', '--'))
+    assert node._process.wait(20.0) == 0
+    assert node.last_line() == (
+        '--ros-args -p mine:=7 -- --ros-args -r __ns:=/muscle -p seed:=3')
