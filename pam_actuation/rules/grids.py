@@ -183,3 +183,25 @@ def _axis(antecedent: 'Antecedent') -> Axis:
     values, unit = shown(np.asarray(antecedent.knots, dtype=float), antecedent.unit)
     return Axis(antecedent.name, unit, values,
                 tuple(_SHORT.get(word, word) for word in antecedent.words))
+
+
+def counted(found: Sequence[Grid], since: str) -> str:
+    """
+    Return in words how many rules there are, how many never fired, and how many differ.
+
+    Parameters
+    ----------
+    found : sequence of Grid
+        All grids of the rules.
+    since : str
+        What they are compared with, in words.
+
+    """
+    count = sum(grid.values.size for grid in found)
+    never = sum(int(grid.never.sum()) for grid in found)
+    changed = sum(int(np.sum(grid.change != 0.0)) for grid in found)
+    largest = max(float(np.max(np.abs(grid.change))) for grid in found)
+    text = f'{count} rules, {never} never fired, '
+    if not changed:
+        return f'{text}none differs from {since}'
+    return f'{text}{changed} differ from {since} (by up to {largest:.2f} kPa)'

@@ -20,7 +20,8 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.sofc.persistence import identity_parts
 from pam_actuation.control.sofc.words import ranked
-from pam_actuation.rules.grids import check_comparable, grids
+from pam_actuation.rules.grids import check_comparable, counted, grids
+from pam_actuation.rules.model_numbers import numbers_in_words
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,14 +56,7 @@ class View:
 
     def summary(self) -> str:
         """Return in words how many rules there are, fired and changed."""
-        count = sum(grid.values.size for grid in self.grids)
-        never = sum(int(grid.never.sum()) for grid in self.grids)
-        changed = sum(int(np.sum(grid.change != 0.0)) for grid in self.grids)
-        largest = max(float(np.max(np.abs(grid.change))) for grid in self.grids)
-        text = f'{count} rules, {never} never fired, '
-        if not changed:
-            return f'{text}none differs from {self.since}'
-        return f'{text}{changed} differ from {self.since} (by up to {largest:.2f} kPa)'
+        return counted(self.grids, self.since)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``, SI."""
@@ -112,6 +106,8 @@ def view_of(found: 'FoundRules', against: 'FoundRules | None' = None) -> View:
         other = _other_scaling(found.rules.scaling, against.rules.scaling)
         if other:
             remarks.append(f'{found.title} and {against.title} differ in {", ".join(other)}.')
+    if found.rules.covariance.any():
+        remarks.append(numbers_in_words(found.rules))
     return View(found.rules, before, tuple(grids(found.rules, before)),
                 tuple(ranked(found.rules)), since, tuple(remarks))
 

@@ -15,6 +15,7 @@
 """The model within the self-organizing controller: path rules, disturbance, prediction."""
 
 import math
+import re
 
 import numpy as np
 from pam_actuation.bags.load import load_run
@@ -22,8 +23,8 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
-from pam_actuation.control.sofc.persistence import load_rules
-from pam_actuation.control.sofc.rule_text import rules_to_mapping
+from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
+from pam_actuation.control.sofc.rule_text import digest_of, rules_to_mapping
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.sofc.words import sentence
 from pam_actuation.control.static_inverse import inverse_pressure_pa, tabulate_static_inverse
@@ -31,6 +32,7 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.replay.controller import replay_controller
+from pam_actuation.rules.model_numbers import numbers_in_words
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.loop_parts import READINGS
 from pam_actuation.tuning.random_rigs import random_rigs
@@ -198,6 +200,44 @@ def test_a_recording_with_a_model_replays_to_the_bit(tmp_path):
     assert replayed.identical
     assert np.abs(replayed.states['path_rules_pa']).max() > 1e3
     assert np.abs(replayed.states['predicted_feedback_pa']).max() > 1e2
+
+
+def test_numbers_of_the_model_come_back_from_a_file_and_replay_to_the_bit(tmp_path):
+    rig, rules = load_rig('dmsp_5_300_realistic'), tmp_path / 'rules.json'
+    experiment = load_experiment(RANDOM_MOTION.replace('duration_s: 31.0', 'duration_s: 6.0'))
+    loop, first = ClosedLoop(rig, experiment, seed=5), load_controller('sofc_model_ppr', rig)
+    assert 'numbers' not in rules_to_mapping(first.rules) and not numbers_in_words(first.rules)
+    loop.run(first)
+    first.rules.save(rules)
+    again = load_controller('sofc_model_ppr', rig, rules_file=rules)
+    assert np.abs(again.rules.numbers).max() > 1e3
+    assert numbers_in_words(again.rules) == numbers_in_words(first.rules)
+    assert re.search(r'offset [+-]\d+\.\d\d ± \d.*after a path of 0\.095 mm',
+                     numbers_in_words(again.rules))
+    simulate_experiment(experiment, rig, again, tmp_path / 'bag', seed=2)
+    assert replay_controller(load_run(tmp_path / 'bag')).identical
+    again = load_controller('sofc_model_ppr', rig, rules_file=rules)
+    assert np.array_equal(loop.run(again).contraction_m, loop.run(first).contraction_m)
+    first.reset()
+    assert not first.rules.numbers.any() and not first.rules.covariance.any()
+
+
+def test_a_file_without_numbers_leaves_those_and_a_wrong_one_is_refused():
+    controller = load_controller('sofc_model_ppr', load_rig('dmsp_5_300_realistic'))
+    old = controller.rules.copy()
+    controller.rules.numbers[0], controller.rules.covariance[0, 0] = 3e3, 1e4
+    mapping = rules_to_mapping(controller.rules)
+    controller.replace_rules(old)
+    assert controller.rules.numbers[0] == 3e3
+    for changed, said in (
+            ({'covariance': None}, 'numbers and covariance, or neither'),
+            ({'numbers': [1.0]}, r'numbers has shape \[1\]'),
+            ({'numbers': [2e6] + [0.0] * 8}, 'allowed is'),
+            ({'covariance': (np.ones((9, 9)) - np.eye(9)).tolist()}, 'covariance is none')):
+        wrong = {name: value for name, value in {**mapping, **changed}.items()
+                 if value is not None and name != 'sha256'}
+        with pytest.raises(InputError, match=said):
+            rules_from_mapping({**wrong, 'sha256': digest_of(wrong)}, 'rules.json')
 
 
 @pytest.mark.parametrize('off_pa', [60e3, math.nan])

@@ -26,6 +26,7 @@ from pam_actuation.control.sofc.persistence import check_fit
 from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
+from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.settings import (
     OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
@@ -93,6 +94,11 @@ class SelfOrganizingFuzzyController(CompiledController):
             scaling, np.zeros((int(self.settings['motion_position_knots']),
                                int(self.settings['motion_rate_knots']))),
             np.zeros((sets, int(self.settings['reference_knots']) if sets else 0)))
+        if self.settings['model_noise_pa'] > 0.0:
+            # The same memory: what the model finds is in the rules at once, and the reverse.
+            model = fields(self._state, STATE).model
+            self.rules.numbers = model.number_pa
+            self.rules.covariance = model.covariance_pa2.reshape(NUMBERS, NUMBERS)
         if rules is not None:
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)

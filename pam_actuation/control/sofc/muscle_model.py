@@ -37,7 +37,7 @@ import math
 import numpy as np
 from pam_actuation.control.sofc.membership import locate
 from pam_actuation.control.sofc.rule_table import infer_path
-from pam_actuation.control.sofc.rule_text import MOST_SETS
+from pam_actuation.control.sofc.rule_text import MOST_SETS, NUMBERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
@@ -50,8 +50,8 @@ _FADE = 0.99              # per tick, of a disturbance that is not observed any 
 # Numbers of the model that hold everywhere: offset, slope, the sets of the path beyond that of
 # any path, damping, inertia.
 _RATE, _ACCELERATION = 1 + MOST_SETS, 2 + MOST_SETS
-NUMBERS = 3 + MOST_SETS
-_SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5      # their scales
+# What a number of the model is per: contraction, rate, acceleration.
+SCALES = _SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5
 _UNKNOWN_PA = 2e4         # standard deviation of each before the first measurement
 
 MODEL = record(

@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
-from pam_actuation.control.sofc.rule_text import ARRAYS, digest_of, OPTIONAL, SCHEMA
+from pam_actuation.control.sofc.rule_text import (
+    ARRAYS, digest_of, MODEL_NUMBERS, NUMBERS, OPTIONAL, SCHEMA)
 from pam_actuation.control.sofc.settings import PATH_SCALING, SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -38,6 +39,7 @@ from pam_sim.keys import Key, names_of
 from pam_sim.parameters import check_parameters
 
 VALVES = ('ppr', 'hsv')
+MOST_PA = 1e6             # largest number of a model
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
 _SHAPES: dict[str, tuple[int | str, ...]] = {
@@ -55,6 +57,8 @@ FILE_KEYS = (
           f'{_MEANINGS[name.removeprefix(name.partition("_")[0])]}.',
           required=name.partition('_')[0] not in OPTIONAL)
       for name in ARRAYS),
+    Key('numbers', list, 'Numbers of a model of the muscle that hold everywhere, Pa.'),
+    Key('covariance', list, 'How well these are known, Pa^2.'),
     Key('sha256', str, 'Checksum of all the rest.', required=True),
 )
 _KEYS = names_of(FILE_KEYS)
@@ -88,7 +92,7 @@ def rules_from_mapping(mapping: dict[str, Any], where: str,
     if ('path_sets' in scaling) != ('path' in mapping):
         raise InputError('a rule file has path rules and path_sets in its scaling, or neither',
                          where)
-    rules = RuleBase(scaling=scaling, **{
+    rules = RuleBase(scaling=scaling, **_checked_numbers(mapping, where), **{
         name: _checked_array(mapping, name, scaling, where) for name in ARRAYS
         if name in mapping})
     for table in rules.tables():
@@ -189,6 +193,33 @@ def _checked_array(mapping: dict[str, Any], name: str, scaling: dict[str, float]
     if not np.all(np.isfinite(array)):
         raise InputError(f'{name} holds values that are not finite', where)
     return array
+
+
+def _checked_numbers(mapping: dict[str, Any], where: str) -> dict[str, FloatArray]:
+    """Return the numbers of the model of a file and their covariance, {} where it has none."""
+    given = [name for name in MODEL_NUMBERS if name in mapping]
+    if not given:
+        return {}
+    if len(given) < len(MODEL_NUMBERS):
+        raise InputError('a rule file has numbers and covariance, or neither', where)
+    found = {}
+    for name, shape in zip(MODEL_NUMBERS, ((NUMBERS,), (NUMBERS, NUMBERS))):
+        try:
+            found[name] = np.array(mapping[name], dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f'{name} is not a table of numbers', where) from None
+        if found[name].shape != shape or not np.all(np.isfinite(found[name])):
+            raise InputError(
+                f'{name} has shape {list(found[name].shape)} or values that are not finite; it '
+                f'takes finite ones of shape {list(shape)}', where)
+    largest = float(np.max(np.abs(found['numbers'])))
+    if largest > MOST_PA:
+        raise InputError(f'numbers holds {largest:g}, allowed is +-{MOST_PA:g}', where)
+    variance = np.diag(found['covariance'])
+    most = np.sqrt(np.abs(np.outer(variance, variance))) * (1.0 + 1e-6)
+    if np.min(variance) < 0.0 or np.any(np.abs(found['covariance']) > most):
+        raise InputError('covariance is none: an entry is larger than its variances allow', where)
+    return found
 
 
 def _short(value: Any) -> str:

@@ -173,6 +173,9 @@ class RuleBase:
     scaling : dict of str -> float
         What the numbers mean: universes, gains, knots, sample time, rig identity. Rules
         fit only a controller of the same scaling.
+    numbers, covariance : numpy.ndarray
+        (N,) numbers of a model of the muscle [Pa], see ``muscle_model``, and (N, N) how well they
+        are known [Pa^2], all zero: not at all. (0,) and (0, 0) where there is no such model.
 
     """
 
@@ -191,6 +194,8 @@ class RuleBase:
     feedforward_fired: FloatArray = field(default_factory=_not_given)
     motion_fired: FloatArray = field(default_factory=_not_given)
     path_fired: FloatArray = field(default_factory=_not_given)
+    numbers: FloatArray = field(default_factory=_not_given)
+    covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
         for name in self.NAMES:
@@ -275,13 +280,20 @@ class RuleBase:
         """Return an independent copy."""
         return RuleBase(scaling=dict(self.scaling), **{
             name + suffix: getattr(self, name + suffix).copy()
-            for name in self.NAMES for suffix in ('', '_initial', '_fired')})
+            for name in self.NAMES for suffix in ('', '_initial', '_fired')},
+            numbers=self.numbers.copy(), covariance=self.covariance.copy())
 
     def assign(self, other: 'RuleBase') -> None:
-        """Take over the numbers of another rule base of equal shape, in place."""
+        """
+        Take over the numbers of another rule base of equal shape, in place.
+
+        One that knows nothing of a model of the muscle leaves that as it is.
+        """
         for suffix in ('', '_initial', '_fired'):
             for mine, theirs in zip(self.arrays(suffix), other.arrays(suffix)):
                 mine[...] = theirs
+        if self.numbers.size and np.any(other.covariance):
+            self.numbers[...], self.covariance[...] = other.numbers, other.covariance
 
     def reset(self) -> None:
         """Return to the initial rules and forget how often they fired."""

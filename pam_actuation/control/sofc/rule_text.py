@@ -25,6 +25,7 @@ import os
 from typing import Any, Protocol
 
 import numpy as np
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
@@ -34,12 +35,16 @@ OPTIONAL = ('path',)      # tables that may be empty; files then lack them
 SUFFIXES = ('', '_initial', '_fired')
 ARRAYS = tuple(name + suffix for suffix in SUFFIXES for name in NAMES)
 MOST_SETS = 6             # of the path, that of any path included
+NUMBERS = 3 + MOST_SETS   # of a model of the muscle: those of every place and motion
+MODEL_NUMBERS = ('numbers', 'covariance')     # and how well they are known
 
 
 class RuleNumbers(Protocol):
     """What a rule file is made from: ``scaling``, and an array of each of ``ARRAYS``."""
 
     scaling: dict[str, Any]
+    numbers: FloatArray
+    covariance: FloatArray
 
 
 def digest_of(content: dict[str, Any]) -> str:
@@ -57,6 +62,8 @@ def rules_to_mapping(rules: RuleNumbers) -> dict[str, Any]:
         'scaling': dict(rules.scaling)}
     content.update({name: getattr(rules, name).tolist() for name in ARRAYS
                     if getattr(rules, name).size})
+    if np.any(rules.covariance):      # something was found
+        content.update({name: getattr(rules, name).tolist() for name in MODEL_NUMBERS})
     return {**content, 'sha256': digest_of(content)}
 
 
@@ -71,7 +78,8 @@ def save_rules(rules: RuleNumbers, path: str | os.PathLike[str]) -> None:
         in the file before is still there.
 
     """
-    spoiled = [name for name in ARRAYS if not np.all(np.isfinite(getattr(rules, name)))]
+    spoiled = [name for name in (*ARRAYS, *MODEL_NUMBERS)
+               if not np.all(np.isfinite(getattr(rules, name)))]
     if spoiled:
         raise InputError(
             f'rules are not saved: {spoiled[0]} holds values that are not finite', str(path))

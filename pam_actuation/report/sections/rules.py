@@ -20,7 +20,8 @@ import numpy as np
 from pam_actuation.control.sofc.words import ranked
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, text
-from pam_actuation.rules.grids import Grid, grids
+from pam_actuation.rules.grids import counted, Grid, grids
+from pam_actuation.rules.model_numbers import numbers_in_words
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
@@ -48,6 +49,9 @@ def rules(before: 'RuleBase | None', after: 'RuleBase', key: str = 'rules',
         'and change of error, feed-forward rules over the reference, motion rules over '
         'reference and its rate; the difference of contracting and extending is the '
         'hysteresis the controller found.')
+    since = 'the initial rules' if before is None else 'the rules at the start'
+    body += ''.join(paragraph(sentence) for sentence in (
+        f'{counted(found, since)}.', numbers_in_words(after)) if sentence)
     for grid in sorted(found, key=lambda one: len(one.columns.values)):
         body += _figure(grid)
     body += ''.join(paragraph(
