@@ -34,6 +34,8 @@ KNEES = ('left_knee', 'right_knee')
 HANDED_ON = {
     'valve': ('ppr', 'Proportional pressure regulators (ppr) or high-speed valves (hsv).'),
     'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
+    'hardware': ('sim', 'sim, another name in config/hardware, or a parameter file.'),
+    'angle': ('sensors', 'Who publishes the angles of real joints: sensors, or topic: you.'),
     'controller': ('sofc', 'Controllers of both knees: sofc; none: you start your own.'),
     'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),
     'accept_other_rig': ('false', 'Whether to take a controller file made for another rig.'),

@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-A joint: simulated limb with two muscles, driver and watchdog for each, a controller, a reference.
+A joint: limb with two muscles, simulated or real, a driver for each, a controller, a reference.
 
     ros2 launch pam_actuation knee.launch.py valve:=ppr experiment:=joint_sine
     ros2 launch pam_actuation knee.launch.py record:=true output:=runs/knee
+    ros2 launch pam_actuation knee.launch.py hardware:=my_knee.yaml
 
 Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
 Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory.
@@ -34,20 +35,25 @@ from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import AndSubstitution
+from launch.substitutions import EqualsSubstitution
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
+from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
+from pam_actuation.rigging.layouts import BY_SENSORS, BY_TOPIC, SIMULATED
 from pam_sim.joint import load_joint
 
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
 RECORDER = 'experiment_recorder'
-# Noted from the arguments: the joint's name, and what the recorder is, '' for none, and tells.
-NAME, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT = (
-    'joint_name', 'recorder_name', 'recorded_controller', 'recorded_experiment')
+# Noted from the arguments: the joint's name, the file of the hardware, and what the recorder is,
+# '' for none, and tells.
+NAME, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT, RECORDED_SEED = (
+    'joint_name', 'hardware_file', 'recorder_name', 'recorded_controller', 'recorded_experiment',
+    'recorded_seed')
 
 
 def _arguments():
@@ -59,6 +65,12 @@ def _arguments():
         DeclareLaunchArgument(
             'joint', default_value='joint_dmsp_5_300_realistic',
             description='Joint preset, or path of its file.'),
+        DeclareLaunchArgument(
+            'hardware', default_value='sim',
+            description='sim, another name in config/hardware, or a parameter file of your own.'),
+        DeclareLaunchArgument(
+            'angle', default_value=BY_SENSORS, choices=[BY_SENSORS, BY_TOPIC],
+            description='Who publishes the angle of a real joint: hardware_sensors, or you.'),
         DeclareLaunchArgument(
             'controller', default_value='sofc', choices=['sofc', 'none'],
             description='Self-organizing fuzzy controller; none: you start your own.'),
@@ -122,11 +134,21 @@ def generate_launch_description():
         'accept_other_rig': ParameterValue(
             LaunchConfiguration('accept_other_rig'), value_type=bool),
         'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
+    hardware, file = LaunchConfiguration('hardware'), LaunchConfiguration(HARDWARE_FILE)
+    simulated = IfCondition(EqualsSubstitution(hardware, SIMULATED))
+    real = NotEqualsSubstitution(hardware, SIMULATED)
+    awaited = {'await_subscriber': valve['await_subscriber']}
     drivers = [
         _node('valve_driver', valve, {'rig': _text(LaunchConfiguration('joint'), '/', side)},
-              side=side) for side in SIDES]
-    watchdogs = [_node('valve_watchdog', valve, side=side) for side in SIDES]
-    plant = _node('joint_simulator', valve, joint, seed)
+              file, side=side) for side in SIDES]
+    watchdogs = [_node('valve_watchdog', valve, side=side, condition=simulated)
+                 for side in SIDES]
+    sensors = [_node('hardware_sensors', awaited, file, side=side, condition=IfCondition(real))
+               for side in SIDES]
+    angle = _node(
+        'hardware_sensors', awaited, {'place': 'joint'}, file, condition=IfCondition(
+            AndSubstitution(real, EqualsSubstitution(LaunchConfiguration('angle'), BY_SENSORS))))
+    plant = _node('joint_simulator', valve, joint, seed, condition=simulated)
     controller = _node(
         'joint_controller', valve, joint, control, condition=IfCondition(
             NotEqualsSubstitution(LaunchConfiguration('controller'), 'none')))
@@ -137,7 +159,8 @@ def generate_launch_description():
         condition=IfCondition(AndSubstitution(*(
             NotEqualsSubstitution(LaunchConfiguration('experiment'), no) for no in ('', 'none')))))
     recorder = _node(
-        RECORDER, kind, seed,
+        RECORDER, kind,
+        {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'rig': _text(LaunchConfiguration('joint')),
          'output': _text(LaunchConfiguration('output')),
          'experiment': _text(LaunchConfiguration(RECORDED_EXPERIMENT)),
@@ -149,10 +172,12 @@ def generate_launch_description():
             (reference, 'the experiment is over'), (plant, 'the joint ended'),
             (controller, 'the controller ended'), (recorder, 'the recorder ended'),
             *((driver, 'a valve driver ended') for driver in drivers),
+            (angle, 'the angle sensor ended'),
+            *((one, 'the sensors of a muscle ended') for one in sensors),
             *((watchdog, 'a watchdog ended') for watchdog in watchdogs))]
     return LaunchDescription(
-        [*_arguments(), OpaqueFunction(function=_note_names), recorder, plant, *drivers,
-         *watchdogs, controller, reference, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_names), recorder, plant, angle,
+         *sensors, *drivers, *watchdogs, controller, reference, *ends])
 
 
 def _note_names(context):
@@ -162,6 +187,9 @@ def _note_names(context):
 
     namespace = launch_namespace(given('namespace'))
     noted = {'namespace': namespace, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
+             HARDWARE_FILE: hardware_file(given('hardware')),
+             # Real sensors have no seed.
+             RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1',
              RECORDER_NAME: '', RECORDED_CONTROLLER: '', RECORDED_EXPERIMENT: ''}
     if given('record') == 'true':
         above = '' if namespace.startswith('/') else context.launch_configurations.get(

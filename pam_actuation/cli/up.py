@@ -45,7 +45,10 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
-                        help='rig only: sim, another name in config/hardware, or a file')
+                        help='sim, another name in config/hardware, or a file')
+    parser.add_argument('--angle', choices=('sensors', 'topic'), default='sensors',
+                        help='who publishes the angle of a real joint: hardware_sensors, or a '
+                             'program of your own (default: %(default)s)')
     parser.add_argument('--record', type=out_path, default=None, metavar='DIR',
                         help='folder of a bag; of exo, of a bag for each knee')
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
@@ -164,8 +167,10 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
         options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
+    options['hardware'] = args.hardware
+    of_joint = args.what != 'rig' and args.hardware != layouts.SIMULATED
+    if args.angle == layouts.BY_TOPIC and not of_joint:
+        raise InputError('is for a joint on hardware only', '--angle')
     if args.what == 'rig':
-        return layouts.rig(hardware=args.hardware, **options)
-    if args.hardware != 'sim':
-        raise InputError(f'is for a rig only, not for {args.what}', '--hardware')
-    return getattr(layouts, args.what)(**options)
+        return layouts.rig(**options)
+    return getattr(layouts, args.what)(**options, angle=args.angle)

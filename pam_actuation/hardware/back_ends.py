@@ -17,12 +17,13 @@
 from collections.abc import Callable, Mapping
 from typing import Any, TYPE_CHECKING, TypeVar
 
-
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.dummy import DummySensors, DummyValve
 from pam_actuation.hardware.iio_adc import IioAdc
 from pam_actuation.hardware.iio_dac import IioDac
+from pam_actuation.hardware.other_packages import SENSOR_GROUP, VALVE_GROUP, with_others
 from pam_actuation.hardware.pwm_sysfs import PwmPair
+from pam_actuation.hardware.sensor_input import SensorInput
 from pam_actuation.hardware.sim import SimulatedValve
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
@@ -32,13 +33,13 @@ from pam_sim.parameters import Parameter
 if TYPE_CHECKING:
     from pam_actuation.drivers.config import DriverConfig
 
-VALVE_OUTPUTS: dict[str, type[ValveOutput]] = {
+OWN_VALVE_OUTPUTS: dict[str, type[ValveOutput]] = {
     'sim': SimulatedValve, 'dummy': DummyValve, 'iio_dac': IioDac, 'pwm_sysfs': PwmPair}
-SENSOR_INPUTS: dict[str, type[DummySensors] | type[IioAdc]] = {
-    'dummy': DummySensors, 'iio_adc': IioAdc}
+OWN_SENSOR_INPUTS: dict[str, type[SensorInput]] = {'dummy': DummySensors, 'iio_adc': IioAdc}
+VALVE_OUTPUTS = with_others(OWN_VALVE_OUTPUTS, VALVE_GROUP, ValveOutput)
+SENSOR_INPUTS = with_others(OWN_SENSOR_INPUTS, SENSOR_GROUP, SensorInput)
 
-
-BackEnd = type[ValveOutput] | type[DummySensors] | type[IioAdc]
+BackEnd = type[ValveOutput] | type[SensorInput]
 Told = TypeVar('Told')
 
 
@@ -88,9 +89,11 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
     return GuardedOutput(device, safe_efforts, watchdog)
 
 
-def open_sensors(name: str, values: dict[str, Any]) -> DummySensors | IioAdc:
+def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:
     """
     Return the sensors of a back end, a key of ``SENSOR_INPUTS``.
+
+    ``values`` are its parameters by name, and ``place``, where they sit.
 
     Raises
     ------

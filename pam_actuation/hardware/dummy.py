@@ -16,9 +16,8 @@
 
 from typing import Any
 
-
+from pam_actuation.hardware.sensor_input import SensorInput, TOPICS
 from pam_actuation.hardware.valve_output import check_pair, ValveOutput
-from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
 
 
@@ -39,14 +38,14 @@ class DummyValve(ValveOutput):
         self.efforts = None
 
 
-class DummySensors:
-    """A muscle at rest: atmospheric pressure, no contraction, no force."""
+class DummySensors(SensorInput):
+    """A muscle at rest: atmospheric pressure, no contraction, no force; a joint at 0 rad."""
 
-    PARAMETERS: tuple[Parameter, ...] = ()
-    READINGS = {'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
+    READINGS = {'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0, 'joint_state': 0.0}
 
     def __init__(self, values: dict[str, Any]) -> None:
-        self.topics = tuple(self.READINGS)
+        super().__init__(values)
+        self.topics = tuple(topic for topic in TOPICS[self.place] if topic in self.READINGS)
 
     def read(self, topic: str) -> float:
         """Return the reading of a topic at rest, in its SI unit."""

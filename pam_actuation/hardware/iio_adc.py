@@ -12,46 +12,48 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensors on analog inputs of Linux (IIO): volts to pressure, contraction and force."""
+"""Sensors on analog inputs of Linux (IIO): volts to pressure, contraction, force and angle."""
 
 from typing import Any
 
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
+from pam_actuation.hardware.sensor_input import SensorInput, TOPICS
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
 
-# Topic: unit in the names of its parameters, what it is, default at 0 V and per volt.
+# Topic: name and unit in its parameters, what it is, default at 0 V and per volt.
 QUANTITIES = {
-    'pressure': ('pa', 'absolute pressure of the muscle', 101_325.0, 100_000.0),
-    'supply_pressure': ('pa', 'absolute supply pressure', 101_325.0, 100_000.0),
-    'contraction': ('m', 'contraction of the muscle', 0.0, 0.01),
-    'force': ('n', 'tension of the muscle, pull positive', 0.0, 100.0),
+    'pressure': ('pressure', 'pa', 'absolute pressure of the muscle', 101_325.0, 100_000.0),
+    'supply_pressure': ('supply_pressure', 'pa', 'absolute supply pressure', 101_325.0, 100_000.0),
+    'contraction': ('contraction', 'm', 'contraction of the muscle', 0.0, 0.01),
+    'force': ('force', 'n', 'tension of the muscle, pull positive', 0.0, 100.0),
+    'joint_state': ('angle', 'rad', 'angle of the joint, flexion positive', 0.0, 1.0),
 }
 
 
-def _parameters(topic: str, unit: str, what: str, at_0_v: float,
+def _parameters(name: str, unit: str, what: str, at_0_v: float,
                 per_v: float) -> tuple[Parameter, Parameter, Parameter]:
     return (
-        node_parameter(f'{topic}.channel', -1, f'analog input of the {what}; -1: not connected',
+        node_parameter(f'{name}.channel', -1, f'analog input of the {what}; -1: not connected',
                        -1, 255),
-        node_parameter(f'{topic}.{unit}_at_0_v', at_0_v, f'reading at 0 V: {what} [{unit}]',
+        node_parameter(f'{name}.{unit}_at_0_v', at_0_v, f'reading at 0 V: {what} [{unit}]',
                        -1e9, 1e9),
-        node_parameter(f'{topic}.{unit}_per_v', per_v,
+        node_parameter(f'{name}.{unit}_per_v', per_v,
                        f'change of the reading per volt: {what} [{unit}/V]', -1e9, 1e9),
     )
 
 
-class IioAdc:
+class IioAdc(SensorInput):
     """
     Read the connected sensors through a straight calibration line each.
 
-    ``topics`` are those with a channel.
+    ``topics`` are those with a channel: of a muscle its four, of a joint the angle.
 
     Parameters
     ----------
     values : dict
-        Values of ``PARAMETERS`` by name.
+        Values of ``PARAMETERS`` by name; ``place`` is ``muscle`` or ``joint``.
 
     Raises
     ------
@@ -64,26 +66,28 @@ class IioAdc:
         SYSFS_ROOT,
         node_parameter(
             'adc.device', '', 'analog input: its folder, such as iio:device0, or its name'),
-        *(parameter for topic, quantity in QUANTITIES.items()
-          for parameter in _parameters(topic, *quantity)),
+        *(parameter for quantity in QUANTITIES.values()
+          for parameter in _parameters(*quantity)),
     )
 
     def __init__(self, values: dict[str, Any]) -> None:
+        super().__init__(values)
         self._lines = {}
-        for topic, (unit, *_) in QUANTITIES.items():
-            channel = values[f'{topic}.channel']
+        for topic in TOPICS[self.place]:
+            name, unit, *_ = QUANTITIES[topic]
+            channel = values[f'{name}.channel']
             if channel < 0:
                 continue
             voltage = IioVoltage(
                 values['sysfs_root'], values['adc.device'], 'in', channel, 'adc.device')
-            per_v = values[f'{topic}.{unit}_per_v']
+            per_v = values[f'{name}.{unit}_per_v']
             if per_v == 0.0:
                 raise DeviceError('0 is not allowed, the sensor must move the reading',
-                                  f'parameter {topic}.{unit}_per_v')
-            self._lines[topic] = (voltage, values[f'{topic}.{unit}_at_0_v'], per_v)
+                                  f'parameter {name}.{unit}_per_v')
+            self._lines[topic] = (voltage, values[f'{name}.{unit}_at_0_v'], per_v)
         if not self._lines:
             raise DeviceError('no sensor is connected, at least one channel is needed',
-                              'parameter pressure.channel')
+                              f'parameter {QUANTITIES[TOPICS[self.place][0]][0]}.channel')
         self.topics = tuple(self._lines)
         for topic in self.topics:
             self.read(topic)            # one that does not answer is told at the start

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sensors of the real rig on ROS: pressure, contraction and force, stamped when read."""
+"""The sensors of a real rig on ROS, of a muscle or of a joint, stamped when read."""
 
 from collections.abc import Sequence
 import sys
@@ -22,6 +22,7 @@ from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
+from pam_actuation.hardware.sensor_input import MUSCLE, PLACE, TOPICS
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
@@ -35,8 +36,9 @@ class HardwareSensors(ManagedNode):
     """
     Publish the readings of the sensors of a real rig, in place of ``plant_simulator``.
 
-    If a sensor does not answer, nothing is sent. Its subscribers notice the silence, and the
-    driver vents.
+    Of a joint, one runs in the namespace of each muscle, and one with ``place:=joint`` in that of
+    the joint, which publishes its angle. If a sensor does not answer, nothing is sent. Its
+    subscribers notice the silence, and the driver vents.
     """
 
     NAME = 'hardware_sensors'
@@ -44,6 +46,8 @@ class HardwareSensors(ManagedNode):
     PARAMETERS = (
         node_parameter('backend', 'iio_adc', 'What the sensors hang on.',
                        choices=tuple(SENSOR_INPUTS)),
+        node_parameter('place', MUSCLE, 'What is measured: pressures, contraction and force of a '
+                       'muscle, or the angle of a joint.', choices=tuple(TOPICS)),
         node_parameter('publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
         *parameters_of(SENSOR_INPUTS),
     )
@@ -60,7 +64,7 @@ class HardwareSensors(ManagedNode):
         """Open the sensors, create the publishers of those connected."""
         self.sensors = open_sensors(self.value('backend'), {
             parameter.name: self.value(parameter.name)
-            for parameter in parameters_of(SENSOR_INPUTS)})
+            for parameter in parameters_of(SENSOR_INPUTS)} | {PLACE: self.value(PLACE)})
         for topic in self.sensors.topics:
             self.add_publisher(topic)
 

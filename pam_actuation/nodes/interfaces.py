@@ -38,7 +38,7 @@ OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout')
 # Node to the sets of parameters that, beside the defaults, bring other topics or services.
 VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'plant_simulator': ({'valve_type': 'hsv'}, {'use_sim_time': True}),
-    'hardware_sensors': (),
+    'hardware_sensors': ({'place': 'joint'},),
     'valve_driver': ({'accept_valve_command': True},),
     'valve_watchdog': (),
     'sofc_controller': (), 'pid_controller': (),

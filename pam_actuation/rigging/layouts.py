@@ -29,6 +29,8 @@ from pam_actuation.rigging.node_spec import NodeSpec
 from pam_sim.joint.parameters import SIDES
 
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
+SIMULATED = 'sim'           # no hardware
+BY_SENSORS, BY_TOPIC = 'sensors', 'topic'       # who publishes the angle of a real joint
 KNEES = ('left_knee', 'right_knee')
 
 
@@ -73,7 +75,7 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     accept = {'accept_other_rig': True} if accept_other_rig else {}
     nodes = [NodeSpec('sofc_controller', namespace, {
         **described, **accept, 'controller': name})] if name else []
-    if hardware == 'sim':
+    if hardware == SIMULATED:
         nodes += [NodeSpec('plant_simulator', namespace, described),
                   NodeSpec('valve_watchdog', namespace, kind),
                   NodeSpec('valve_driver', namespace, driver)]
@@ -85,7 +87,7 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     if not record:
         return nodes
     return _recorded(nodes, namespace, {
-        **described, **({'seed': 0} if hardware == 'sim' else {}),
+        **described, **({'seed': 0} if hardware == SIMULATED else {}),
         'output': record, 'experiment': experiment, 'controller': name})
 
 
@@ -137,25 +139,36 @@ def played(experiment: str, rig: str, valve: str, controller: str = '',
 
 def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', valve: str = 'ppr',
          controller: str = '', experiment: str = '', seed: int = 0,
-         accept_other_rig: bool = False, record: str = '') -> list[NodeSpec]:
+         accept_other_rig: bool = False, record: str = '', hardware: str = SIMULATED,
+         angle: str = BY_SENSORS) -> list[NodeSpec]:
     """
-    Return the nodes of one simulated joint; its name is the last part of the namespace.
+    Return the nodes of one joint; its name is the last part of the namespace.
 
     ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
-    ``record`` is the folder of the bag; '': no recorder.
+    ``record`` is the folder of the bag; '': no recorder. ``hardware`` is ``sim``, another name in
+    config/hardware, or a parameter file; ``angle`` tells of hardware whether the angle is read by
+    ``hardware_sensors`` ('sensors') or published by a program of your own ('topic').
     """
     namespace = namespace_of(namespace)
     common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
     of_joint = {**common, 'joint': joint}
-    nodes = [NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed})]
+    simulated = hardware == SIMULATED
+    file = '' if simulated else hardware_file(hardware)
+    named = {'muscle': common['muscle']}
+    nodes = []
+    if simulated:
+        nodes.append(NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed}))
+    elif angle == BY_SENSORS:
+        nodes.append(NodeSpec('hardware_sensors', namespace, {**named, 'place': 'joint'}, file))
     if controller != NO_CONTROLLER:
         nodes.append(NodeSpec('joint_controller', namespace, {
             **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
             'controller': controller}))
     for side in SIDES:
         below = f'{namespace}/{side}'
-        nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}),
-                  NodeSpec('valve_watchdog', below, common)]
+        nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}, file),
+                  NodeSpec('valve_watchdog', below, common) if simulated
+                  else NodeSpec('hardware_sensors', below, named, file)]
     nodes += _reference(namespace, experiment, common)
     if not record:
         return nodes
@@ -164,7 +177,8 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         from pam_sim.joint import load_joint
         controller = joint_preset_for(load_joint(joint, valve=valve), valve)
     return _recorded(nodes, namespace, {
-        **common, 'rig': joint, 'seed': seed, 'output': record, 'experiment': experiment,
+        **common, **({'seed': seed} if simulated else {}),
+        'rig': joint, 'output': record, 'experiment': experiment,
         'controller': '' if controller == NO_CONTROLLER else controller})
 
 

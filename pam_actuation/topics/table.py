@@ -160,7 +160,8 @@ TOPICS = (
     Topic('diagnostics', Statuses(), 'health of every node', (EVERY_NODE,), (), place=ROOT),
     Topic('joint_state', Numbers(JOINT_STATE, messages.JointAngle, (
         Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
-          'measured angle, and torque of both tendons', ('joint_simulator',),
+          'measured angle, and torque of both tendons',
+          ('joint_simulator', 'hardware_sensors'),
           ('joint_controller',), place=JOINT),
     Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),

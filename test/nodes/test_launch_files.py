@@ -110,6 +110,12 @@ CASES = {
     'a joint, recorded': (
         'knee.launch.py', {'valve': 'hsv', 'record': 'true', 'output': 'bag'},
         lambda: layouts.knee(valve='hsv', experiment='joint_sine', record='bag')),
+    'a joint on hardware, recorded': (
+        'knee.launch.py', {'hardware': 'dummy', 'record': 'true', 'output': 'bag'},
+        lambda: layouts.knee(hardware='dummy', experiment='joint_sine', record='bag')),
+    'a joint with an angle from elsewhere': (
+        'knee.launch.py', {'hardware': 'dummy', 'angle': 'topic', 'experiment': 'none'},
+        lambda: layouts.knee(hardware='dummy', angle='topic')),
     'a joint that waits': (
         'knee.launch.py', {'experiment': 'none', 'controller': 'none'},
         lambda: layouts.knee(controller='none'))}
