@@ -18,6 +18,7 @@ import ast
 import fnmatch
 from pathlib import Path
 import re
+import subprocess
 import sys
 import sysconfig
 import tomllib  # noqa: I201
@@ -336,3 +337,14 @@ def test_the_architecture_page_names_what_exists():
         folders[depth:] = [name]
     for path in re.findall(r'`((?:pam_sim|pam_actuation)/[\w/.]+)`', text):
         assert (ROOT / path).exists(), path
+
+
+def test_the_workflow_runs_every_step_of_the_script_for_jazzy():
+    jobs = yaml.safe_load((ROOT / '.github' / 'workflows' / 'tests.yml').read_text())['jobs']
+    run = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
+    script = ROOT / '.ci' / 'jazzy'
+    assert subprocess.run(['bash', '-n', str(script)]).returncode == 0
+    usage = subprocess.run([str(script)], capture_output=True, text=True)
+    steps = re.findall(r'^  (\w+) +\S', usage.stdout, re.MULTILINE)
+    assert usage.returncode == 2 and len(steps) == 5
+    assert sorted(run) == sorted(['.ci/run', *(f'.ci/jazzy {step}' for step in steps)])
