@@ -39,7 +39,8 @@ class ReferenceGenerator(ManagedNode):
     NAME = 'reference_generator'
     PARAMETERS = (
         node_parameter(
-            'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file.'),
+            'experiment', 'sine_quarter_hz', 'Experiment by name, or path of its file; a change '
+            'counts when the node is configured again.'),
         node_parameter(
             'valve_type', 'ppr', 'Valve of the rig, for experiments that speak to it.',
             choices=('ppr', 'hsv')),
@@ -52,6 +53,8 @@ class ReferenceGenerator(ManagedNode):
         node_parameter(
             'exit_when_finished', False, 'End the process when the experiment is over.'),
     )
+
+    LIVE = ('experiment',)
 
     loop: Any = None            # a ReferenceLoop, once configured
     begin_ns: int | None = None

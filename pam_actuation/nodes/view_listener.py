@@ -29,12 +29,13 @@ from pam_actuation.bags.series import table
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.ros_messages import message_class
+from pam_actuation.nodes.view_player import experiments, PLAYER, Playing, RECORDER
 from pam_actuation.rigging.client import context_by_environment
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import ONLOOKER
 from pam_actuation.topics.table import BY_NAME, short_name
 from pam_actuation.view.plots import KEPT
-from pam_actuation.view.requests import EMERGENCY_STOP
+from pam_actuation.view.requests import ACTIONS, EMERGENCY_STOP, PLAY, Request
 from pam_actuation.view.source import Answer
 from pam_actuation.view.store import Store
 import rclpy
@@ -81,17 +82,26 @@ class ViewListener:
         self._read = Reader(short_name(DIAGNOSTICS))
         self._add(DIAGNOSTICS)
         self._clients: dict[str, dict[str, Any]] = {}       # driver: action: client
-        self._asked: queue.SimpleQueue[tuple[str, Answer]] = queue.SimpleQueue()
-        self._waiting: list[_Question] = []
+        self._players: list[str] = []
+        self._asked: queue.SimpleQueue[tuple[Request, Answer]] = queue.SimpleQueue()
+        self._waiting: list[_Question | Playing] = []
         self._look_at_s = 0.0
 
     def drivers(self) -> list[str]:
         """Return the full names of the nodes that can be asked to vent."""
         return sorted(self._clients)
 
-    def act(self, action: str, answer: Answer) -> None:
-        """Ask every driver for an action; ``answer`` is called from the thread of ``run_once``."""
-        self._asked.put((action, answer))
+    def players(self) -> list[str]:
+        """Return the full names of the reference generators; not of a rig that is recorded."""
+        return self._players
+
+    def experiments(self) -> list[str]:
+        """Return the names of the experiments that come with the package."""
+        return experiments()
+
+    def act(self, request: Request, answer: Answer) -> None:
+        """Do what a page asks for; ``answer`` is called from the thread of ``run_once``."""
+        self._asked.put((request, answer))
 
     def run_once(self) -> None:
         """Take what has arrived, and wait a little; to be called again and again."""
@@ -102,17 +112,31 @@ class ViewListener:
         for full_name, subscription in self._topics.items():
             self._take(full_name, subscription)
         while not self._asked.empty():
-            self._waiting.append(_Question(self._clients, *self._asked.get()))
+            self._begin(*self._asked.get())
         self._waiting = [one for one in self._waiting if not one.is_over()]
         deadline_s = now_s + POLL_S
         while (left_s := deadline_s - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=left_s)
+
+    def _begin(self, request: Request, answer: Answer) -> None:
+        """Ask those whom a request is for."""
+        if request.do in ACTIONS:
+            self._waiting.append(_Question(self._clients, request.do, answer))
+            return
+        wanted = request.experiment
+        players = [one for one in self._players if one.startswith(f'{request.view}/')]
+        if request.do == PLAY and wanted not in experiments():
+            answer([{'node': one, 'ok': False, 'message': f'no experiment is called {wanted!r}'}
+                    for one in players])
+            return
+        self._waiting.append(Playing(self._node, players, wanted, answer))
 
     def _look(self) -> None:
         """Find topics and drivers that came, forget drivers that went."""
         for name, types in self._node.get_topic_names_and_types():
             if name not in self._topics and self._is_drawn(name, types):
                 self._add(name)
+        self._players = sorted(self._found_players())
         found = set(self._found_drivers())
         for driver in self._clients.keys() - found:
             for client in self._clients.pop(driver).values():
@@ -120,7 +144,7 @@ class ViewListener:
         for driver in found - self._clients.keys():
             self._clients[driver] = {
                 action: self._node.create_client(Trigger, f'{driver}/{action}')
-                for action in (EMERGENCY_STOP, 'reset')}
+                for action in ACTIONS}
 
     def _is_drawn(self, name: str, types: list[str]) -> bool:
         short = short_name(name)
@@ -133,6 +157,15 @@ class ViewListener:
             if action == EMERGENCY_STOP and SERVICE in types and (
                     not self._namespace or node.startswith(f'{self._namespace}/')):
                 yield node
+
+    def _found_players(self) -> Iterator[str]:
+        """Yield reference generators that are not recorded: a bag tells of one experiment."""
+        nodes = self._node.get_node_names_and_namespaces()
+        recorded = [namespace for name, namespace in nodes if name == RECORDER]
+        for name, namespace in nodes:
+            full_name = f'{namespace.rstrip("/")}/{name}'
+            if name == PLAYER and self._is_of(full_name) and namespace not in recorded:
+                yield full_name
 
     def _add(self, full_name: str) -> None:
         self._topics[full_name] = PolledSubscription(

@@ -22,7 +22,9 @@ from pam_actuation.view.stream import WINDOWS_S
 from pam_sim.errors import InputError
 
 WATCH, EMERGENCY_STOP, RESET = 'watch', 'emergency_stop', 'reset'
-ACTIONS = (EMERGENCY_STOP, RESET)
+ACTIONS = (EMERGENCY_STOP, RESET)       # of drivers, by the names of their services
+PLAY, HALT = 'play', 'halt'
+ALL = (WATCH, *ACTIONS, PLAY, HALT)
 LONGEST = 4096          # bytes of a request
 
 
@@ -34,7 +36,7 @@ class Request:
     Parameters
     ----------
     do : str
-        ``WATCH``: show another window; one of ``ACTIONS``.
+        ``WATCH``: show another window; one of ``ACTIONS``; ``PLAY`` or ``HALT`` an experiment.
     number : int
         By which the page finds the answer.
     view : str
@@ -43,6 +45,8 @@ class Request:
         Time across the page [s].
     end_s : float, optional
         Of a bag: end of the window, from the begin of the bag on [s].
+    experiment : str
+        What is to be played.
 
     """
 
@@ -51,6 +55,7 @@ class Request:
     view: str = ''
     window_s: float = 10.0
     end_s: float | None = None
+    experiment: str = ''
 
 
 def parse(text: str | bytes) -> Request:
@@ -70,16 +75,21 @@ def parse(text: str | bytes) -> Request:
     if not isinstance(found, dict):
         raise InputError('is not a JSON object', 'request')
     do = found.get('do')
-    if do not in (WATCH, *ACTIONS):
-        raise InputError(f'do is {do!r}; allowed are {", ".join((WATCH, *ACTIONS))}', 'request')
+    if do not in ALL:
+        raise InputError(f'do is {do!r}; allowed are {", ".join(ALL)}', 'request')
     number = found.get('number', 0)
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**53:
         raise InputError('number is not a whole number from 0 on', 'request')
-    if do != WATCH:
+    if do in ACTIONS:
         return Request(do, number)
-    view, window_s, end_s = found.get('view', ''), found.get('window_s', 10), found.get('end_s')
+    view, experiment = found.get('view', ''), found.get('experiment', '')
     if not isinstance(view, str):
         raise InputError('view is not a text', 'request')
+    if do in (PLAY, HALT):
+        if not isinstance(experiment, str) or (do == PLAY) != bool(experiment):
+            raise InputError('experiment is needed to play, and only there', 'request')
+        return Request(do, number, view, experiment=experiment)
+    window_s, end_s = found.get('window_s', 10), found.get('end_s')
     if window_s not in WINDOWS_S:
         raise InputError(
             f'window_s is {window_s!r}; allowed are {", ".join(map(str, WINDOWS_S))}', 'request')

@@ -173,7 +173,9 @@ class ViewServer:
         self.clients.add(client)
         begin_ns, end_ns = self.source.store.span_ns()
         client.tell({'type': 'hello', 'live': self.source.live, 'title': self.source.title,
-                     'windows_s': WINDOWS_S, 'length_s': (end_ns - begin_ns) * 1e-9,
+                     'windows_s': WINDOWS_S,
+                     'experiments': self.source.experiments(),
+                     'length_s': (end_ns - begin_ns) * 1e-9,
                      'begin_s': begin_ns * 1e-9})
         client.tell(self._state(client))
 
@@ -207,7 +209,7 @@ class ViewServer:
                 'type': 'answer', 'number': request.number, 'do': request.do,
                 'results': results})
 
-        self.source.act(request.do, answer)
+        self.source.act(request, answer)
 
     def _show(self, client: ViewClient, stream: Stream) -> None:
         """Send the part of a bag that a page asked for."""
@@ -271,6 +273,7 @@ class ViewServer:
         now_ns = store.now_ns() if at_ns is None else at_ns
         return {'type': 'state', 'now_s': None if now_ns is None else now_ns * 1e-9,
                 'namespaces': store.namespaces(), 'drivers': self.source.drivers(),
+                'players': self.source.players(),
                 'pages': len(self.clients), **store.state(now_ns)}
 
 

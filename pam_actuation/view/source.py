@@ -19,6 +19,7 @@ from typing import Any, Protocol, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pam_actuation.view.recording import Recording
+    from pam_actuation.view.requests import Request
     from pam_actuation.view.store import Store
 
 Answer = Callable[[list[dict[str, Any]]], None]     # takes node, ok and message of each node
@@ -37,11 +38,17 @@ class Source(Protocol):
     def drivers(self) -> list[str]:
         """Return the full names of the nodes that can be asked to vent."""
 
-    def act(self, action: str, answer: Answer) -> None:
-        """
-        Ask every driver for an action of ``requests.ACTIONS``; return at once.
+    def players(self) -> list[str]:
+        """Return the full names of the nodes that can be asked to play another experiment."""
 
-        ``answer`` is called later, from any thread, with what each driver said.
+    def experiments(self) -> list[str]:
+        """Return the names of what they can play."""
+
+    def act(self, request: 'Request', answer: Answer) -> None:
+        """
+        Ask every driver, or the players of a view, for what is requested; return at once.
+
+        ``answer`` is called later, from any thread, with what each node said.
         """
 
 
@@ -58,6 +65,14 @@ class BagSource:
         """Return an empty list."""
         return []
 
-    def act(self, action: str, answer: Answer) -> None:
+    def players(self) -> list[str]:
+        """Return an empty list."""
+        return []
+
+    def experiments(self) -> list[str]:
+        """Return an empty list."""
+        return []
+
+    def act(self, request: 'Request', answer: Answer) -> None:
         """Answer that there is nobody."""
         answer([])

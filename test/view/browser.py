@@ -43,8 +43,8 @@ def find_chromium():
 class Browser:
     """One page of a headless Chromium; a context manager."""
 
-    def __init__(self, folder, before=()):
-        self._folder = Path(folder)
+    def __init__(self, folder, before=(), answer_s=ANSWER_S):
+        self._folder, self._answer_s = Path(folder), answer_s
         self._loop = asyncio.new_event_loop()
         self._number = 0
         self._process = subprocess.Popen(
@@ -81,7 +81,7 @@ class Browser:
     def _wait(self, call, *arguments, **named):
         """Return what an asynchronous call returns."""
         async def limited():
-            return await asyncio.wait_for(call(*arguments, **named), ANSWER_S)
+            return await asyncio.wait_for(call(*arguments, **named), self._answer_s)
         return self._loop.run_until_complete(limited())
 
     async def _write(self, text):
@@ -101,7 +101,8 @@ class Browser:
     def go_to(self, url):
         """Go to an address and wait until the page is loaded."""
         self.do('Page.navigate', url=url)
-        self.wait_for('location.protocol !== "about:" && document.readyState === "complete"')
+        self.wait_for('location.protocol !== "about:" && document.readyState === "complete"',
+                      self._answer_s)
 
     def run(self, script):
         """Return the value of a JavaScript expression."""

@@ -26,7 +26,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 START_NS, STEP_NS = 1_790_000_000_000_000_000, 1_000_000
-DRIVER = '/muscle/valve_driver'
+DRIVER, PLAYER = '/muscle/valve_driver', '/muscle/reference_generator'
 
 
 def feed(store, begin, count, namespace='/muscle', start_ns=START_NS):
@@ -70,9 +70,18 @@ class MadeRig:
     def drivers(self):
         return [DRIVER]
 
-    def act(self, action, answer):
-        self.asked.append(action)
+    def players(self):
+        return [PLAYER]
+
+    def experiments(self):
+        return ['short_sine', 'staircase']
+
+    def act(self, request, answer):
+        self.asked.append(request.do)
         ok = not self.silent
+        if request.do in ('play', 'halt'):
+            answer([{'node': PLAYER, 'ok': ok, 'message': f'plays {request.experiment}'}])
+            return
         answer([{'node': DRIVER, 'ok': ok, 'message': 'vents' if ok else 'no answer'}])
 
     def go_on(self, rows=20):

@@ -95,6 +95,21 @@ def test_emergency_stop_by_one_press_and_reset_by_two(browser, server, rig):
     assert 'NOT confirmed' in browser.text('#banner')
 
 
+def test_an_experiment_is_started_by_two_presses_and_ended_by_one(browser, server, rig):
+    browser.go_to(server.url)
+    browser.wait_for(f'{READY} && page.players.length === 1')
+    browser.run("document.querySelector('#experiment').value = 'staircase'")
+    browser.press('#begin')
+    assert rig.asked == [] and browser.text('#begin') == 'Press again to start'
+    browser.press('#begin')
+    browser.wait_for("document.querySelector('#banner').className === 'good'")
+    assert browser.text('#banner') == (
+        'Start of staircase confirmed. /muscle/reference_generator: plays staircase')
+    browser.press('#halt')
+    browser.wait_for("document.querySelector('#banner').innerText.startsWith('End of')")
+    assert rig.asked == ['play', 'halt']
+
+
 def test_it_comes_back_after_the_server_died(browser, rig):
     first = ViewServer(rig, port=0)
     first.start()

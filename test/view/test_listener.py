@@ -30,6 +30,7 @@ from pam_actuation.rigging.client import local_context  # noqa: E402
 from pam_actuation.rigging.domain import DomainLock  # noqa: E402
 from pam_actuation.rigging.view_process import page_beside  # noqa: E402
 from pam_actuation.topics.codec import encode  # noqa: E402
+from pam_actuation.view.requests import Request  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
@@ -102,13 +103,13 @@ def test_signals_states_and_the_emergency_stop_of_a_driver(domain, driver):
         known, = store.state(store.now_ns())['nodes']
         assert (known['level'], known['message']) == (2, 'vents: no command')
         answers = []
-        listener.act('emergency_stop', answers.append)
+        listener.act(Request('emergency_stop'), answers.append)
         until(listener, executor, lambda: answers, send)
         assert calls == ['emergency_stop'] and answers[0] == [
             {'node': '/muscle/valve_driver', 'ok': True, 'message': 'emergency_stop done'}]
         # A driver that hangs: its executor does not run.
         answers.clear()
-        listener.act('reset', answers.append)
+        listener.act(Request('reset'), answers.append)
         begin_s = time.monotonic()
         while not answers:
             listener.run_once()

@@ -114,6 +114,8 @@ def test_emergency_stop_and_reset_reach_the_driver_and_are_answered(server, rig)
     ('{', 'not JSON'), ('[]', 'not a JSON object'), ('{"do": "format"}', "do is 'format'"),
     ('{"do": "watch", "window_s": 3}', 'window_s is 3'),
     ('{"do": "watch", "view": 3}', 'view is not a text'),
+    ('{"do": "play"}', 'experiment is needed'), ('{"do": "play", "view": 1}', 'view is not'),
+    ('{"do": "halt", "experiment": "x"}', 'only there'),
     ('{"do": "watch", "end_s": 1e400}', 'end_s is inf'),
     ('{"do": "reset", "number": -1}', 'number is not')])
 def test_other_requests_are_refused_in_one_sentence(request_text, why):

@@ -2,13 +2,13 @@
 'use strict';
 
 const $ = (id) => document.getElementById(id);
-const SURE_MS = 4000, ANSWER_MS = 4000, MOST_WAIT_MS = 2000;
+const SURE_MS = 4000, ANSWER_MS = 4000, PLAY_MS = 20000, MOST_WAIT_MS = 2000;
 const LEVELS = ['ok', 'warning', 'error', 'silent'];
 
 const page = {
   socket: null, live: true, wait_ms: 250, number: 0, asked: new Map(), hello: null,
   charts: [], traces: [], time: null, layout: null, cursor: null, held: false, dirty: true,
-  views: '', frames: 0, drawn: 0, end_s: null, playing: false, pending: false, drivers: [],
+  views: '', frames: 0, drawn: 0, end_s: null, playing: false, pending: false, drivers: [], players: [],
   surfaces: [], surfaceTitles: '',
 };
 
@@ -50,6 +50,8 @@ function buttons() {
   const open = page.socket.readyState === WebSocket.OPEN;
   $('stop').hidden = $('reset').hidden = !page.live;
   $('stop').disabled = $('reset').disabled = !open || !page.drivers.length;
+  $('play_row').hidden = !page.players.length;
+  $('begin').disabled = $('halt').disabled = !open;
   $('stop').title = open && !page.drivers.length ? 'No valve driver is running.'
     : 'Every valve driver vents its muscle and stays so until reset.';
 }
@@ -67,6 +69,7 @@ function hello(content) {
     for (const value of content.windows_s) $('window').append(new Option(`${value} s`, value));
     $('window').value = remembered('window', page.live ? '10' : longWindow(content));
   }
+  $('experiment').replaceChildren(...content.experiments.map((one) => new Option(one, one)));
   $('player').hidden = page.live; $('hold').hidden = !page.live;
   if (!page.live) {
     $('slider').max = content.length_s.toFixed(2);
@@ -144,6 +147,7 @@ function picture(data) {
 
 function state(content) {
   page.drivers = content.drivers;
+  page.players = content.players;
   buttons();
   const views = content.namespaces.filter((one) => !content.namespaces.some(
     (other) => other !== one && one.startsWith(`${other}/`)));
@@ -206,22 +210,24 @@ function rules(content) {
 
 // ---- emergency stop and reset ----
 
-function ask(action, words) {
-  const number = ++page.number;
-  if (!send({do: action, number})) {
+function ask(action, words, more = {}) {
+  const number = ++page.number, asked = more.view === undefined ? page.drivers : page.players;
+  if (!send({do: action, number, ...more})) {
     banner('bad', `${words} was NOT sent: no connection.`);
     return;
   }
-  banner('', `${words}: asking ${page.drivers.join(', ')} …`);
-  const one = {words, timer: setTimeout(
-    () => unanswered(number, one, 'nothing came back'), ANSWER_MS)};
+  banner('', `${words}: asking ${asked.join(', ')} …`);
+  const one = {words, of_driver: more.view === undefined};
+  one.timer = setTimeout(() => unanswered(number, one, 'nothing came back'),
+    one.of_driver ? ANSWER_MS : PLAY_MS);
   page.asked.set(number, one);
 }
 
 function unanswered(number, one, why) {
   clearTimeout(one.timer);
   page.asked.delete(number);
-  banner('bad', `${one.words} is NOT confirmed: ${why}. Use the switch of the air supply.`);
+  banner('bad', `${one.words} is NOT confirmed: ${why}.`
+    + (one.of_driver ? ' Use the switch of the air supply.' : ''));
 }
 
 function answer(content) {
@@ -232,7 +238,7 @@ function answer(content) {
   const results = content.results, good = results.length && results.every((each) => each.ok);
   const texts = results.map((each) => `${each.node}: ${each.message}`);
   banner(good ? 'good' : 'bad', good ? `${one.words} confirmed. ${texts.join('; ')}`
-    : `${one.words} is NOT confirmed by all: ${texts.join('; ') || 'no valve driver is running'}.`);
+    : `${one.words} is NOT confirmed by all: ${texts.join('; ') || 'nobody was there'}.`);
 }
 
 function banner(kind, text) {
@@ -242,16 +248,24 @@ function banner(kind, text) {
 }
 
 $('stop').onclick = () => ask('emergency_stop', 'Emergency stop');
-$('reset').onclick = () => {
-  const button = $('reset'), sure = button.classList.toggle('sure');
-  clearTimeout(button.timer);
-  button.textContent = sure ? 'Press again to reset' : 'Reset';
-  if (sure) {
-    button.timer = setTimeout(() => {
-      button.classList.remove('sure'); button.textContent = 'Reset';
-    }, SURE_MS);
-  } else ask('reset', 'Reset');
-};
+// What moves a muscle or lets pressure in asks for a second press.
+function twice(id, words, action) {
+  const button = $(id), first = button.textContent;
+  button.onclick = () => {
+    const sure = button.classList.toggle('sure');
+    clearTimeout(button.timer);
+    button.textContent = sure ? words : first;
+    if (sure) {
+      button.timer = setTimeout(() => {
+        button.classList.remove('sure'); button.textContent = first;
+      }, SURE_MS);
+    } else action();
+  };
+}
+twice('reset', 'Press again to reset', () => ask('reset', 'Reset'));
+twice('begin', 'Press again to start', () => ask('play', `Start of ${$('experiment').value}`, {
+  view: $('view').value, experiment: $('experiment').value}));
+$('halt').onclick = () => ask('halt', 'End of the experiment', {view: $('view').value});
 
 // ---- settings ----
 
