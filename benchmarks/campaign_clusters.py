@@ -140,9 +140,9 @@ def dask_scheduler(port):
 
 @contextlib.contextmanager
 def dask_worker(address):
-    """Give the process of a worker, which a nanny starts again when it ends."""
+    """Give the process of a worker that nobody starts again."""
     with tempfile.TemporaryDirectory() as folder, program(
-            'distributed.cli.dask_worker', address, '--nthreads', '1', '--no-dashboard',
+            'distributed.cli.dask_worker', address, '--nthreads', '1', '--no-dashboard', '--no-nanny',
             '--local-directory', folder) as process:
         yield process
 
@@ -211,7 +211,7 @@ def lost_worker(args, reference):
         first, _ = (stack.enter_context(dask_worker(address)) for _ in range(2))
         process = started(args, out, address)
         _until(out, 2, process)
-        os.killpg(first.pid, signal.SIGKILL)        # with its nanny: it does not come back
+        os.killpg(first.pid, signal.SIGKILL)        # it does not come back
         code = process.wait(LONGEST_S)
     same = content(out) == reference
     print('\n### Losses\n\n| lost, of a Dask cluster of two | ends with | bytes |\n|---|---|---|\n'
