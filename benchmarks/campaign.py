@@ -60,8 +60,8 @@ NEAR_DAYS = 1.0
 EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 
 
-def main():
-    """Run one part; return the exit code."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
     parser.add_argument('part', choices=('page', 'kills', 'clusters', 'tune'))
     parser.add_argument('--work', type=Path, default=Path('lab'),
@@ -74,7 +74,12 @@ def main():
     parser.add_argument('--seed', type=int, default=1, help='of the moments of kills')
     parser.add_argument('--rounds', type=int, default=15, help='of tune (default: 15)')
     results_page.add_write(parser, 'campaign')
-    args = parser.parse_args()
+    return parser
+
+
+def main():
+    """Run one part; return the exit code."""
+    args = command_line().parse_args()
     with results_page.printed(args, __file__, args.part):
         if args.part == 'kills':
             return campaign_kills.show(args)
@@ -149,9 +154,9 @@ def tune(args):
                 if number:      # the first round compiles
                     spent[name].append((time.perf_counter() - wall, time.process_time() - cpu))
             equal &= found['before'] == found['now']
-    print(f'{args.rounds} generations of 24 points on {len(loops)} loops, {args.jobs} threads, '
-          'both ways in turn in one process: before, a task was a point for all kinds of '
-          'workers; now the code asks first how many there are.\n')
+    print(f'{args.rounds} generations of 24 points on {len(loops)} loops, {args.jobs} threads. '
+          'Both ways ran in turn in one process. Before, a task was always a point. Now the code '
+          'asks first how many workers there are.\n')
     print('| | wall clock a generation, median [s] | processor time, median [s] |\n|---|---|---|')
     for name, measured in spent.items():
         wall, cpu = (statistics.median(column) for column in zip(*measured))

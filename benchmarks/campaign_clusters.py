@@ -142,8 +142,8 @@ def dask_scheduler(port):
 def dask_worker(address):
     """Give the process of a worker that nobody starts again."""
     with tempfile.TemporaryDirectory() as folder, program(
-            'distributed.cli.dask_worker', address, '--nthreads', '1', '--no-dashboard', '--no-nanny',
-            '--local-directory', folder) as process:
+            'distributed.cli.dask_worker', address, '--nthreads', '1', '--no-dashboard',
+            '--no-nanny', '--local-directory', folder) as process:
         yield process
 
 

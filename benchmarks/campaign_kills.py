@@ -72,9 +72,9 @@ def show(args):
     for number in range(args.kills):
         left = begun(killed)
         process = started(args, killed)
-        # As long as it takes to load, and then any moment of two cases.
+        # As long as it takes to load, and then any moment of some cases.
         _until_it_works(killed, process, left)
-        time.sleep(moments.uniform(0.0, 2.5 * WAIT_S))
+        time.sleep(moments.uniform(0.0, 8.0 * WAIT_S))
         if number % 2:
             os.killpg(process.pid, signal.SIGKILL)      # as when the power fails
         else:
