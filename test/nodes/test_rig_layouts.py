@@ -97,7 +97,8 @@ def test_every_node_has_its_place_in_the_order():
 
 
 @pytest.mark.parametrize('arguments, words', [
-    (['knee', '--hardware', 'dummy'], '--hardware'),
+    (['knee', '--angle', 'topic'], '--angle'),
+    (['knee', '--hardware', 'nothing'], 'nothing'),
     (['rig', '--hardware', 'nothing'], 'nothing'),
     (['rig', '--experiment', 'nowhere'], 'nowhere'),
     (['rig', '--experiment', 'voltage_steps', '--valve', 'hsv'], 'voltage')])
