@@ -114,14 +114,19 @@ def show(args: argparse.Namespace) -> None:
               f'{missing["best_effort"][0]} |', flush=True)
 
 
+def command_line():
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--seconds', type=float, default=6.0, help='of each run, beside the stop')
+    results_page.add_write(parser, 'best_effort')
+    return parser
+
+
 def main() -> int:
     """Listen, or run the benchmark."""
     if sys.argv[1:2] == ['--listen']:
         return listen(int(sys.argv[2]), float(sys.argv[3]))
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--seconds', type=float, default=6.0, help='of each run, beside the stop')
-    results_page.add_write(parser, 'best_effort')
-    return results_page.run(parser, __file__, show)
+    return results_page.run(command_line(), __file__, show)
 
 
 if __name__ == '__main__':
