@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(f'valve drivers run in the ROS domains {domains}: name one of them',
                              '--domain-id')
         answers = trigger_all([one for one in opened if one.domain_id == domains[0]], 'reset',
-                              args.wait)
+                              args.wait, quiet_s=0.0)
     done = all(one.done for one in answers)
     emit(args, {'schema': 1, 'all_reset': done, 'domain_id': domains[0],
                 'drivers': [{'node': one.node, 'done': bool(one.done), 'message': one.message}

@@ -111,7 +111,7 @@ class Operator(RigClient):
 
 
 def watch(operators: Iterable[Operator], found: Callable[[], Hashable], wait_s: float,
-          quiet_s: float = QUIET_S) -> None:
+          quiet_s: float | None = None) -> None:
     """
     Listen until nothing new is found.
 
@@ -123,11 +123,11 @@ def watch(operators: Iterable[Operator], found: Callable[[], Hashable], wait_s: 
         Returns what was found by now; empty or false: nothing.
     wait_s : float
         How long to wait for something to be found [s].
-    quiet_s : float
-        Return as soon as what was found stayed the same for so long [s].
+    quiet_s : float, optional
+        Return as soon as what was found stayed the same for so long [s]; default: ``QUIET_S``.
 
     """
-    operators = list(operators)
+    operators, quiet_s = list(operators), QUIET_S if quiet_s is None else quiet_s
     changed_s = begin_s = time.monotonic()
     last: Hashable = None
     while True:
@@ -142,7 +142,8 @@ def watch(operators: Iterable[Operator], found: Callable[[], Hashable], wait_s: 
 
 
 def trigger_all(operators: Iterable[Operator], service: str, wait_s: float,
-                tell: Callable[[Answer], object] = lambda answer: None) -> list[Answer]:
+                tell: Callable[[Answer], object] = lambda answer: None,
+                quiet_s: float | None = None) -> list[Answer]:
     """
     Call a service ``~/service`` (Trigger) of every node that offers it, each at once when found.
 
@@ -156,6 +157,8 @@ def trigger_all(operators: Iterable[Operator], service: str, wait_s: float,
         How long to look for the first one [s].
     tell : callable
         Is given each answer when it comes.
+    quiet_s : float, optional
+        As of ``watch``.
 
     Returns
     -------
@@ -177,7 +180,7 @@ def trigger_all(operators: Iterable[Operator], service: str, wait_s: float,
                 tell(one.answer)
         return frozenset((key, one.over) for key, one in calls.items())
 
-    watch(operators, found, wait_s)
+    watch(operators, found, wait_s, quiet_s)
     while not all(one.over for one in calls.values()):
         watch(operators, found, 0.0)
     return [one.answer for _, one in sorted(calls.items())]
