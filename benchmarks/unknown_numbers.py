@@ -27,6 +27,9 @@ tolerance.
 With --undetermined N as many cases follow that cannot determine a number. Examples are a load that
 never lifts, a valve without command and a load cell that was not recorded. There the answer
 must say so and name an experiment; the experiment is run on the hidden rig and answered as well.
+
+With --gap N the first N cases are given to `pam gap`, with the same numbers unknown. It must name
+neither an effect that is not hidden nor an error of a sensor.
 """
 
 import argparse
@@ -42,10 +45,13 @@ import numpy as np  # noqa: E402
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / 'test' / 'hidden'), str(ROOT), str(ROOT / 'benchmarks')]
 
-from pam_sim import load_rig  # noqa: E402, I100
+from pam_actuation.report.gap import gap_of  # noqa: E402, I100
+from pam_sim import load_rig  # noqa: E402
+from pam_sim.effects.registry import effects  # noqa: E402
 from pam_sim.gap.data.signals import FIELD, UNIT  # noqa: E402
 from pam_sim.identify import identify  # noqa: E402
 from pam_sim.run import Run, Series  # noqa: E402
+from pam_sim.tolerance import UNKNOWN  # noqa: E402
 import results_page  # noqa: E402
 import truth_commands  # noqa: E402
 import truth_effects  # noqa: E402
@@ -107,13 +113,18 @@ def record(numbers, experiment, rng, sensors=None, topics=('pressure', 'contract
     return Run(series, {}, '/muscle', 'hidden rig')
 
 
+def case_run(seed, place, numbers, sensors):
+    """Return the recording of a case; every second pair of cases has a load cell."""
+    rng = np.random.default_rng([seed, place, 1])
+    topics = ('pressure', 'contraction', 'valve_signal', *(('force',) if place % 4 < 2 else ()))
+    return record(numbers, truth_commands.protocol('steps', int(rng.integers(2**31))), rng,
+                  sensors, topics)
+
+
 def covered(seed, place):
     """Return one row per unknown number of a case: what it is, and whether its interval holds."""
     true, numbers, sensors, effect = draw(seed, place)
-    rng = np.random.default_rng([seed, place, 1])
-    topics = ('pressure', 'contraction', 'valve_signal', *(('force',) if place % 4 < 2 else ()))
-    run = record(numbers, truth_commands.protocol('steps', int(rng.integers(2**31))), rng,
-                 sensors, topics)
+    run = case_run(seed, place, numbers, sensors)
     began = time.process_time()
     found = identify(run, load_rig(NOMINAL), list(true), advise=False)
     spent = time.process_time() - began
@@ -122,10 +133,25 @@ def covered(seed, place):
         i, value = one.interval, true[one.number.name]
         holds = (i.open_low or i.low <= value) and (i.open_high or value <= i.high)
         rows.append({'case': place, 'number': one.number.name, 'effect': effect or 'none',
-                     'force': 'force' in topics, 'true': value, 'value': one.value,
+                     'force': 'force' in run, 'true': value, 'value': one.value,
                      'low': i.low, 'high': i.high, 'status': one.status, 'holds': bool(holds),
                      'seconds': spent})
     return rows
+
+
+def named(seed, place):
+    """Return what `pam gap` names in a case with unknown numbers."""
+    true, numbers, sensors, effect = draw(seed, place)
+    run = case_run(seed, place, numbers, sensors)
+    rig = load_rig(NOMINAL).with_(tolerance=dict.fromkeys(true, UNKNOWN))
+    began = time.process_time()
+    found = gap_of([run], rig, seconds=600.0)
+    likely = {*(one['name'] for one in found.effects), *found.ambiguity_set} & set(effects())
+    return {'case': place, 'unknown': ', '.join(true), 'effect': effect or 'none',
+            'verdict': found.verdict, 'names': ', '.join(sorted(likely)) or '–',
+            'wrong': bool(likely) and effect not in likely,
+            'sensor': any(effects()[name].subsystem == 'sensor' for name in likely),
+            'seconds': time.process_time() - began}
 
 
 def left_open(seed, place):
@@ -197,6 +223,8 @@ def command_line():
     parser.add_argument('--number', type=int, default=60, help='cases (default: 60)')
     parser.add_argument('--undetermined', type=int, default=40, metavar='N',
                         help='cases that determine nothing (default: 40)')
+    parser.add_argument('--gap', type=int, default=0, metavar='N',
+                        help='cases that `pam gap` answers (default: 0; a minute each)')
     parser.add_argument('--seed', type=int, default=2026)
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='begin no case after N minutes; the tables say how many there were')
@@ -214,6 +242,9 @@ def main():
     if args.undetermined:
         with results_page.printed(args, __file__, 'undetermined'):
             show_open(args, until)
+    if args.gap:
+        with results_page.printed(args, __file__, 'gap'):
+            show_named(args, until)
 
 
 def show_covered(args, until):
@@ -242,6 +273,22 @@ def show_open(args, until):
     print(table(rows, ('case', 'number', 'topics', 'said', 'advised', 'then')) + '\n')
     for word in ('said', 'advised', 'then'):
         print(f'- {word}: {sum(bool(r[word]) for r in rows)} of {len(rows)}')
+
+
+def show_named(args, until):
+    """Print what `pam gap` names where numbers are unknown."""
+    rows = []
+    for place in range(args.gap):
+        if time.time() > until:
+            break
+        rows.append(named(args.seed, place))
+        print(f'gap {place}: {rows[-1]}', file=sys.stderr, flush=True)
+    said = [{**r, 'wrong': 'YES' if r['wrong'] else 'no', 'sensor': 'YES' if r['sensor'] else 'no'}
+            for r in rows]
+    print(table(said, ('case', 'unknown', 'effect', 'verdict', 'names', 'wrong', 'sensor',
+                       'seconds')) + '\n')
+    print(f'- wrong names: {sum(r["wrong"] for r in rows)} of {len(rows)}')
+    print(f'- errors of a sensor named: {sum(r["sensor"] for r in rows)} of {len(rows)}')
 
 
 if __name__ == '__main__':
