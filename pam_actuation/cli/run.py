@@ -44,6 +44,8 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
+    from pam_actuation.rigging.node_template import prepare_template
+    prepare_template()
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
     from pam_sim.rig_text import rig_title

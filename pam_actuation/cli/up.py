@@ -70,6 +70,9 @@ def run(args: argparse.Namespace) -> int:
 
     Once all are active Ctrl-C is the ordinary end, exit code 0; before, it is an interruption.
     """
+    if args.policy is None:
+        from pam_actuation.rigging.node_template import prepare_template
+        prepare_template()
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.interrupts import undisturbed
     from pam_actuation.rigging.plan import RECORDER

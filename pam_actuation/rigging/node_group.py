@@ -30,6 +30,7 @@ from typing import Self, TYPE_CHECKING
 from pam_actuation.interrupts import held, undisturbed
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
+from pam_actuation.rigging.node_template import template_for
 from pam_actuation.rigging.plan import DRIVER, RECORDER
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
@@ -129,6 +130,9 @@ class NodeGroup:
         folder = self._folder or Path(tempfile.mkdtemp(prefix='pam_nodes_'))
         self._folder = folder
         environment = node_environment(self.domain_id, folder)
+        template = template_for([node.name for node in self._nodes.values()], environment)
+        if template is not None:
+            template.wait_until_ready()
         for name, node in self._nodes.items():
             log_dir = folder / node.namespace.strip('/')
             log_dir.mkdir(parents=True, exist_ok=True)
@@ -136,7 +140,8 @@ class NodeGroup:
             with held() as interrupted:
                 self.processes[name] = NodeProcess(
                     node.name, node.namespace, node.parameters, environment, log_dir,
-                    parameter_file=node.parameter_file, label=node.label, program=node.program)
+                    parameter_file=node.parameter_file, label=node.label, program=node.program,
+                    template=template)
             if interrupted():
                 raise KeyboardInterrupt
         # Only now: a process with the threads of the middleware does not fork safely.

@@ -23,13 +23,16 @@ import signal
 import subprocess
 import sys
 import time
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.transport import prepare_middleware
 
+if TYPE_CHECKING:
+    from pam_actuation.rigging.node_template import ForkedNode, NodeTemplate
+
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
-PR_SET_PDEATHSIG = 1
+PR_SET_PDEATHSIG, PR_SET_NAME = 1, 15
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 
@@ -98,31 +101,42 @@ class NodeProcess:
         What sentences call it, such as ``flexor/valve_driver``; '': its name.
     program : sequence of str
         Command line of a node of somebody else in its place; what ROS takes is added to it.
+    template : NodeTemplate, optional
+        From it the node is forked; without it, or if it is lost, it starts by itself.
 
     """
 
     def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
                  environment: Mapping[str, str], log_dir: str | os.PathLike[str],
                  remap: Mapping[str, str] | None = None, parameter_file: str = '',
-                 label: str = '', program: Sequence[str] = ()) -> None:
+                 label: str = '', program: Sequence[str] = (),
+                 template: 'NodeTemplate | None' = None) -> None:
         self.name = name
         self.label = label or name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
-        command = [
-            *(program or (sys.executable, '-m', f'pam_actuation.nodes.{name}')), '--ros-args',
-            '-r', f'__ns:={namespace or "/"}', *parameter_arguments(parameters)]
+        arguments = [
+            '--ros-args', '-r', f'__ns:={namespace or "/"}', *parameter_arguments(parameters)]
         if parameter_file:
-            command += ['--params-file', parameter_file]
+            arguments += ['--params-file', parameter_file]
         if environment.get('ROS_SECURITY_ENABLE') == 'true':
-            command += ['--enclave', self.full_name]
+            arguments += ['--enclave', self.full_name]
         for topic, other in dict(remap or {}).items():
-            command += ['-r', f'{topic}:={other}']
-        with open(self.log_file, 'wb') as log:
-            self._process = subprocess.Popen(
-                command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True, preexec_fn=partial(end_with_parent, os.getpid()))
+            arguments += ['-r', f'{topic}:={other}']
+        self._process = self._start(arguments, environment, program, template)
         self.pid = self._process.pid
+
+    def _start(self, arguments: list[str], environment: Mapping[str, str],
+               program: Sequence[str], template: 'NodeTemplate | None'
+               ) -> 'subprocess.Popen[bytes] | ForkedNode':
+        with open(self.log_file, 'wb') as log:
+            forked = None if template is None or program else template.start(
+                [self.name, *arguments], environment, self.log_file)
+            return forked or subprocess.Popen(
+                [*(program or (sys.executable, '-m', f'pam_actuation.nodes.{self.name}')),
+                 *arguments],
+                env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                start_new_session=True, preexec_fn=partial(end_with_parent, os.getpid()))
 
     @property
     def exit_code(self) -> int | None:
@@ -201,3 +215,9 @@ def end_with_parent(parent_pid: int) -> None:
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent_pid:
             os._exit(1)
+
+
+def name_process(name: str) -> None:
+    """Give this process a name, as ``top`` and ``pgrep`` show it (15 characters of it)."""
+    if LIBC is not None:
+        LIBC.prctl(PR_SET_NAME, name.encode()[:15], 0, 0, 0)
