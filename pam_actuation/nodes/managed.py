@@ -43,6 +43,7 @@ from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.simulated_time import FollowedTime, leave_clock_to_node, PlantTime
 from pam_actuation.nodes.timing import LoopTiming
+from pam_actuation.nodes.transitions import refuse_impossible_transitions
 from pam_actuation.topics.codec import Reader, Writer
 from pam_actuation.topics.quality import Quality
 from pam_actuation.topics.table import topic_of
@@ -113,7 +114,7 @@ class ManagedNode(LifecycleNode):
         self.subscriptions_polled: list[PolledSubscription] = []
         self.loops = LoopSet()
         super().__init__(self.NAME, **kwargs)
-        self._refuse_impossible_transitions()
+        refuse_impossible_transitions(self)
         declare(self, (*COMMON_PARAMETERS, *self.PARAMETERS), self.LIVE)
         self.awaited = self.value('await_subscriber') and node_name_of(
             self.value('await_subscriber'), self.get_namespace().rstrip('/'),
@@ -343,6 +344,8 @@ class ManagedNode(LifecycleNode):
         alive until the process ends. There Fast DDS takes its tables down under the threads
         that still receive, which now and then ended a process by a segmentation fault.
         """
+        for subscription in self.subscriptions_polled:
+            subscription.mismatches.destroy()       # holds the participant as well
         super().destroy_node()      # type: ignore[no-untyped-call]  # rclpy has no annotations
         del self._state_machine
 
@@ -481,23 +484,3 @@ class ManagedNode(LifecycleNode):
         for subscription in self.subscriptions_polled:
             subscription.destroy()
         self.publishers_counted, self.subscriptions_polled, self._writers = [], [], {}
-
-    def _refuse_impossible_transitions(self) -> None:
-        """
-        Answer a transition that the present state does not know with success = false.
-
-        rclpy 7.1 lets the error of the state machine through to the executor, so that one
-        wrong ``ros2 lifecycle set`` would end the node and with it the loop.
-        """
-        service = self._service_change_state
-        original = service.callback
-
-        def change_state(request: Any, response: Any) -> Any:
-            try:
-                return original(request, response)
-            except Exception as error:
-                self.get_logger().warning(f'refused a transition: {error}')
-                response.success = False
-                return response
-
-        service.callback = change_state

@@ -167,7 +167,7 @@ def prepare(names: Sequence[str]) -> None:
     gc.freeze()         # a collection in a node would copy all that is shared
 
 
-def main() -> int:
+def become_nodes() -> int:
     """Serve; return the exit code, in a fork that of its node."""
     number, *names = sys.argv[1:]
     channel = socket.socket(fileno=int(number))
@@ -182,4 +182,4 @@ def main() -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(become_nodes())
