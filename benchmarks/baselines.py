@@ -16,14 +16,16 @@
 The baseline controllers, each tuned by the same search with the same budget as any other.
 
 Run ``python benchmarks/baselines.py`` for the table of their errors: sines of +-10 mm about
-14 mm, last of 20 cycles, noise on. ``--tune`` searches the settings anew, from the defaults
-of each controller, and writes the presets of ``config/controllers``. ``--tune random`` does so for
-motions that never repeat and are not announced; their presets end with ``_random``.
+14 mm, last of 20 cycles, noise on, and how long a tick takes. ``--tune`` searches the settings
+anew, from the defaults of each controller, and writes the presets of ``config/controllers``.
+``--tune random`` does so for motions that never repeat and are not announced; their presets have
+``_random`` in their names.
 """
 
 import argparse
 from dataclasses import dataclass
 import math
+import time
 
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
@@ -36,20 +38,24 @@ from pam_sim.located_yaml import dump_yaml
 import results_page
 
 RIG = 'dmsp_5_300_realistic'
-KINDS = {'pid_plain': 'PID', 'pid': 'PID + inverse, preview', 'lqi': 'LQI'}
+KINDS = {'pid_plain': 'PID', 'pid': 'PID + inverse, preview', 'lqi': 'LQI',
+         'mpc': 'MPC', 'ilc': 'ILC + PID + inverse'}
 # What a search begins with, beside the defaults.
-STARTS = {'pid_plain': {}, 'pid': {'use_static_inverse': 1, 'lead_s': 0.1}, 'lqi': {}}
+STARTS = {'pid_plain': {}, 'pid': {'use_static_inverse': 1, 'lead_s': 0.1}, 'lqi': {},
+          'mpc': {}, 'ilc': {}}
 WORDS = {
     'pid_plain': 'PID with anti-windup and without static inverse: knows nothing of the muscle.',
     'pid': 'PID with anti-windup on top of the static inverse with preview.',
-    'lqi': 'LQI on a linear model that is identified on the rig when this is loaded.'}
+    'lqi': 'LQI on a linear model that is identified on the rig when this is loaded.',
+    'mpc': 'Model predictive control on a model that is identified on the rig when loaded.',
+    'ilc': 'Iterative learning control on top of a PID with static inverse: for what repeats.'}
 SOURCE = """#
 # Only what differs from the defaults; every setting with its unit and range is listed in
 # pam_actuation/control/{module}.py. Found by `python benchmarks/baselines.py --tune{option}`: rig
 # {rig}, {valve}, {experiments},
 # {rollouts} rollouts from the defaults, seed {seed}; held-out cost {before:.3f} -> {after:.3f} mm.
-# Gains suit the dry friction of that rig: without any, on PPR, pid and lqi swing up.
-"""
+{suits}"""
+SUITS = '# Gains suit the dry friction of that rig: without any, on PPR, pid and lqi swing up.\n'
 FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
 ROLLOUTS, SEED = 3000, 1
 CYCLES = 20
@@ -72,6 +78,8 @@ PURPOSES = {
 
 def preset(kind, valve, ending=''):
     """Return the name of the preset of a kind of baseline for a valve."""
+    if kind in ('mpc', 'ilc'):
+        return f'{kind}{ending}_{valve}'
     return f'{kind}{ending}' + ('' if valve == 'ppr' else f'_{valve}')
 
 
@@ -93,25 +101,40 @@ segments:
 """)
 
 
+def tick_us(controller):
+    """Return how long a tick takes when it is called from Python [us], a sine being tracked."""
+    ticks = 1000
+    wanted = [0.014 + 0.010 * math.sin(2.0 * math.pi * k / 200.0) for k in range(ticks + 40)]
+    for k in range(ticks):
+        if k == ticks // 2:           # the ILC has found the cycle
+            began = time.perf_counter()
+        controller.step(wanted[k], wanted[k], 0.0, wanted[k + 25], 0.0, pressure_pa=4e5)
+    return 1e6 * (time.perf_counter() - began) / (ticks - ticks // 2)
+
+
 def show_errors(valves):
     """Print the error of the last cycle [mm] per frequency."""
-    print('| controller | valve | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ) + ' |')
-    print('|---|---|' + '---|' * len(FREQUENCIES_HZ))
+    print('| controller | valve | ' + ' | '.join(f'{f:g} Hz' for f in FREQUENCIES_HZ)
+          + ' | a tick [us] |')
+    print('|---|---|' + '---|' * (len(FREQUENCIES_HZ) + 1))
     for valve in valves:
         rig = load_rig(RIG, valve=valve)
         loops = [ClosedLoop(rig, sine(frequency), seed=3) for frequency in FREQUENCIES_HZ]
         for name, build in baselines():
             errors = [1e3 * loop.run(build(rig)).cycle_rmse_m()[-1] for loop in loops]
             print(f'| {name} | {valve.upper()} | '
-                  + ' | '.join(f'{error:.3f}' for error in errors) + ' |', flush=True)
+                  + ' | '.join(f'{error:.3f}' for error in errors)
+                  + f' | {tick_us(build(rig)):.0f} |', flush=True)
 
 
-def tune_presets(valve, jobs, purpose):
-    """Search the settings of every baseline for a ``Purpose`` and write the presets."""
+def tune_presets(valve, jobs, purpose, kinds):
+    """Search the settings of some baselines for a ``Purpose`` and write the presets."""
     rig = load_rig(RIG, valve=valve)
     experiments = [load_experiment(name) for name in purpose.searched]
     check = [*(load_experiment(name) for name in purpose.check), *experiments]
-    for kind in KINDS:
+    for kind in kinds:
+        if kind == 'ilc' and purpose.preview_s == 0.0:
+            continue            # what does not repeat teaches it nothing
         start = load_controller(dump_yaml({
             'controller': kind.split('_')[0], 'settings': STARTS[kind]}), rig)
         result = tune(rig, start, experiments, budget=ROLLOUTS, seed=SEED, jobs=jobs,
@@ -122,7 +145,7 @@ def tune_presets(valve, jobs, purpose):
             option=' random' if purpose.ending else '', module=start.kind, rig=RIG,
             valve=valve, experiments=', '.join(purpose.searched),
             rollouts=result.rollouts, seed=SEED, before=result.held_out_before,
-            after=result.held_out_after)
+            after=result.held_out_after, suits=SUITS if start.kind in ('pid', 'lqi') else '')
         path = config_dir() / 'controllers' / f'{preset(kind, valve, purpose.ending)}.yaml'
         write_text(path, head + dump_yaml({
             'controller': start.kind, 'settings': settings}))
@@ -135,6 +158,7 @@ def command_line():
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--tune', nargs='?', const='sines', choices=PURPOSES,
                         help='search the presets anew, for sines or for random motions')
+    parser.add_argument('--kind', default=','.join(KINDS), help='with --tune: only these')
     parser.add_argument('--jobs', type=int, default=-1, help='threads; -1 = one a core')
     results_page.add_write(parser, 'baselines')
     return parser
@@ -146,7 +170,7 @@ def main():
     valves = args.valve.split(',')
     if args.tune:
         for valve in valves:
-            tune_presets(valve, args.jobs, PURPOSES[args.tune])
+            tune_presets(valve, args.jobs, PURPOSES[args.tune], args.kind.split(','))
         return
     with results_page.printed(args, __file__):
         show_errors(valves)

@@ -78,6 +78,8 @@ CONTROLLERS = (
     Controller('SOFC', lambda rig: load_controller(f'sofc_{rig.valve}', rig), learns=True),
     Controller('SOFC with model', lambda rig: load_controller(f'sofc_model_{rig.valve}', rig),
                learns=True),
+    Controller('ILC, tuned', lambda rig: load_controller(f'ilc_{rig.valve}', rig)),
+    Controller('MPC, tuned', lambda rig: load_controller(f'mpc_{rig.valve}', rig)),
     Controller('LQI, tuned', preset('lqi')),
     Controller('PID + inverse, tuned', preset('pid')),
     Controller('PID, tuned', preset('pid_plain')),

@@ -42,9 +42,10 @@ import results_page
 
 RIG = 'dmsp_5_300_realistic'
 CONTROLLERS = {
-    'ppr': ('sofc_model_ppr', 'sofc_ppr', 'lqi_random', 'pid_random', 'pid_plain_random', 'lqi'),
-    'hsv': ('sofc_model_hsv', 'sofc_hsv', 'lqi_random_hsv', 'pid_random_hsv',
-            'pid_plain_random_hsv', 'lqi_hsv')}
+    'ppr': ('sofc_model_ppr', 'sofc_ppr', 'mpc_random_ppr', 'lqi_random', 'pid_random',
+            'pid_plain_random', 'mpc_ppr', 'ilc_ppr', 'lqi'),
+    'hsv': ('sofc_model_hsv', 'sofc_hsv', 'mpc_random_hsv', 'lqi_random_hsv', 'pid_random_hsv',
+            'pid_plain_random_hsv', 'mpc_hsv', 'ilc_hsv', 'lqi_hsv')}
 SEEDS = range(501, 506)
 RIGS, RIG_SEED = 30, 700
 HIDDEN_RIGS, HIDDEN_SEED = 5, 811

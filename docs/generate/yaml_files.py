@@ -18,9 +18,11 @@ from collections.abc import Iterable
 
 from generate.command_line import BAR, plain
 from pam_actuation.control import config, made_for
+from pam_actuation.control.ilc import SETTINGS as ILC_SETTINGS
 from pam_actuation.control.lqi import SETTINGS as LQI_SETTINGS
 from pam_actuation.control.lqi_files import MODEL_KEYS
 from pam_actuation.control.modes import force, force_surface, joint as joint_mode
+from pam_actuation.control.mpc import SETTINGS as MPC_SETTINGS
 from pam_actuation.control.pid import SETTINGS as PID_SETTINGS
 from pam_actuation.control.sofc.persistence import FILE_KEYS
 from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
@@ -141,7 +143,8 @@ def controller_page():
     for kind, own in config.OWN_KEYS.items():
         parts += [f'Only of `controller: {kind}`:', keys(own)]
     for kind, settings in (('sofc', SOFC_SETTINGS), ('pid', PID_SETTINGS),
-                           ('lqi', LQI_SETTINGS)):
+                           ('lqi', LQI_SETTINGS), ('ilc', ILC_SETTINGS),
+                           ('mpc', MPC_SETTINGS)):
         parts += [f'## `settings` of {kind}', parameters(settings)]
     for name, block in (
             ('force', force.KEYS), ('joint', joint_mode.KEYS), ('made_for', made_for.KEYS),

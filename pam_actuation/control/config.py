@@ -17,7 +17,7 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
 
 ::
 
-    controller: sofc              # or pid, lqi
+    controller: sofc              # or pid, lqi, ilc, mpc
     settings:                     # only what differs from the defaults
       lead_s: 0.1
       index_form: linear          # or table
@@ -37,11 +37,13 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.controller_text import INDEX_FORMS
+from pam_actuation.control.ilc import IlcController
 from pam_actuation.control.lqi_files import KEYS as LQI_KEYS, lqi_from_tree
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.force import ForceController
 from pam_actuation.control.modes.joint import JointController
+from pam_actuation.control.mpc_files import KEYS as MPC_KEYS, mpc_from_tree
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
 
 Controller = CompiledController | ForceController | JointController
 
-_KINDS = ('sofc', 'pid', 'lqi')
+_KINDS = ('sofc', 'pid', 'lqi', 'ilc', 'mpc')
 KEYS = (
     Key('controller', str, 'Which control law.', required=True, choices=_KINDS),
     Key('rig', str, 'Name and valve of the rig that its rules belong to.',
@@ -79,7 +81,9 @@ OWN_KEYS = {
              Key('initial_rules', dict, 'Content of a rule file, as a recording keeps it.',
                  otherwise='blank rules')),
     'pid': (_INVERSE,),
-    'lqi': LQI_KEYS}
+    'ilc': (_INVERSE,),
+    'lqi': LQI_KEYS,
+    'mpc': (_INVERSE, *MPC_KEYS)}
 INVERSE_KEYS = (
     Key('lower_m', float, 'Contraction of the first pressure.', required=True, unit='m',
         lower=-0.1, upper=0.3),
@@ -173,13 +177,19 @@ def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controll
         settings['index_form'] = float(INDEX_FORMS.index(form))
     mode = read_mode(tree, rig)
     identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
+    if kind in ('lqi', 'mpc') and isinstance(rig, JointRig):
+        raise InputError(f'{rig.name} is a joint, which has no {kind} controller', tree.where())
     if kind == 'lqi':
-        if isinstance(rig, JointRig):
-            raise InputError(f'{rig.name} is a joint, which has no lqi controller', tree.where())
+        assert not isinstance(rig, JointRig)
         return lqi_from_tree(tree, rig, settings, identity, where)
     inverse = _static_inverse(tree, rig, mode)
     if mode is not None:
         identity = mode.identity(identity)
+    if kind == 'ilc':
+        return IlcController(inverse, settings, identity, where)
+    if kind == 'mpc':
+        assert not isinstance(rig, JointRig)
+        return mpc_from_tree(tree, rig, inverse, settings, identity, where)
     if kind == 'pid':
         pid = PidController(inverse, settings, identity, where)
         return pid if mode is None else mode.wrap(pid)

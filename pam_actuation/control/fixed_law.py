@@ -16,7 +16,7 @@
 What controllers without rules have in common.
 
 A law that learns nothing is a record of settings, an array of what it knows of the
-muscle, a state, and ``step(parameters, knowledge, state, inputs, outputs)``.
+muscle, a state, and ``step(parameters, *knowledge, state, inputs, outputs)``.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ class FixedLawController(CompiledController):
     Parameters
     ----------
     step : callable
-        Compiled: ``step(parameters, knowledge, state, inputs, outputs)`` -> command [Pa].
+        Compiled: ``step(parameters, *knowledge, state, inputs, outputs)`` -> command [Pa].
     settings : dict
         Checked settings, one for each field of ``parameters``.
     knowledge : numpy.ndarray
@@ -45,17 +45,19 @@ class FixedLawController(CompiledController):
         Records of the step function.
     rig_name : str
         Identity of the rig, for the record.
+    *more : numpy.ndarray
+        What else it knows, behind the first.
 
     """
 
     def __init__(self, step: Callable[..., float], settings: dict[str, float],
                  knowledge: FloatArray, parameters: 'np.dtype[np.record]',
-                 state: 'np.dtype[np.record]', rig_name: str = '') -> None:
+                 state: 'np.dtype[np.record]', rig_name: str = '', *more: FloatArray) -> None:
         super().__init__(settings, state, rig_name)
         self.parameters = values_of(parameters, settings)
         self._step = step
         self._arguments = (
-            self.parameters, knowledge, self._state, self._inputs, self._outputs)
+            self.parameters, knowledge, *more, self._state, self._inputs, self._outputs)
         self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
         self.pause()
 

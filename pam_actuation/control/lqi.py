@@ -260,10 +260,6 @@ class LqiController(FixedLawController):
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model and gains; an LQI controller has no static inverse."""
-        model = self.model
         return {
-            'model': {
-                'rate_hz': model.rate_hz, 'delay_ticks': model.delay_ticks,
-                'denominator': list(model.denominator), 'numerator': list(model.numerator),
-                'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa},
+            'model': self.model.to_dict(),
             'gains': self.gains[used_numbers(self.gains)].tolist()}

@@ -58,10 +58,10 @@ _LISTS = (
         required=True, unit='-', lower=-1e3, upper=1e3),
     Key('numerator', list, 'Coefficients of the past pressures, as many.', required=True,
         unit='m/Pa', lower=-1.0, upper=1.0))
-_GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
-             otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
+GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
+            otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
 KEYS = (Key('model', dict, 'Linear model of the muscle that the gains rest on.',
-            otherwise='identified on the rig'), _GAINS)
+            otherwise='identified on the rig'), GAINS)
 MODEL_KEYS = (_DELAY, *_NUMBERS, *_LISTS)
 
 
@@ -78,7 +78,7 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
 
     """
     if 'model' in tree:
-        model = _model(tree.require('model', dict))
+        model = read_model(tree.require('model', dict))
     elif rig is None:
         raise InputError('without a rig the controller text must bring its `model`', tree.where())
     else:
@@ -88,14 +88,14 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
     if 'gains' in tree:
         used = used_numbers(controller.gains)
         kept = controller.gains.copy()
-        controller.gains[used] = _floats(tree, _GAINS, int(used.sum()))
+        controller.gains[used] = read_floats(tree, GAINS, int(used.sum()))
         before, now = fields(kept, MODEL), fields(controller.gains, MODEL)
         if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
             raise tree.error('`gains` are of a model of another order or delay', 'gains')
     return controller
 
 
-def _model(table: Located) -> LinearModel:
+def read_model(table: Located) -> LinearModel:
     """Return the model of a file."""
     table.check_keys(names_of(MODEL_KEYS))
     values = {key.name: key.read(table) for key in (*_NUMBERS, _DELAY)}
@@ -104,7 +104,7 @@ def _model(table: Located) -> LinearModel:
         raise table.error(f'`denominator` has {order} numbers; allowed 1 to {MAX_ORDER}',
                           'denominator')
     for key in _LISTS:
-        values[key.name] = tuple(_floats(table, key, order))
+        values[key.name] = tuple(read_floats(table, key, order))
     model = LinearModel(**values)
     if np.max(np.abs(np.roots(np.r_[1.0, model.denominator]))) >= 1.0:
         raise table.error('`denominator` is of an unstable model', 'denominator')
@@ -113,7 +113,7 @@ def _model(table: Located) -> LinearModel:
     return model
 
 
-def _floats(tree: Located, key: Key, count: int) -> list[float]:
+def read_floats(tree: Located, key: Key, count: int) -> list[float]:
     """Return a list of exactly ``count`` numbers within bounds."""
     table = tree.require(key.name, list)
     if len(table) != count:

@@ -139,18 +139,18 @@ def pack(model: LinearModel, settings: Mapping[str, float]) -> FloatArray:
         'order': len(b), 'delay_ticks': model.delay_ticks,
         'contraction_m': model.contraction_m, 'pressure_pa': model.pressure_pa,
         'pa_per_m': 1.0 / per_pa, 'integral_gain_pa_per_m_s': integral * si,
-        'denominator': _padded(model.denominator, MAX_ORDER),
-        'numerator_m_per_pa': _padded(model.numerator, MAX_ORDER),
-        'observer_gain': _padded(observer, MAX_ORDER), 'rest': _padded(rest, MAX_ORDER),
-        'state_gain_pa_per_m': _padded(state * si, MAX_ORDER),
-        'delay_gain': _padded(delay, MAX_DELAY_TICKS)})
+        'denominator': padded(model.denominator, MAX_ORDER),
+        'numerator_m_per_pa': padded(model.numerator, MAX_ORDER),
+        'observer_gain': padded(observer, MAX_ORDER), 'rest': padded(rest, MAX_ORDER),
+        'state_gain_pa_per_m': padded(state * si, MAX_ORDER),
+        'delay_gain': padded(delay, MAX_DELAY_TICKS)})
 
 
-def _padded(values: ArrayLike, size: int) -> FloatArray:
+def padded(values: ArrayLike, size: int) -> FloatArray:
     """Return values with zeros behind them."""
-    padded = np.zeros(size)
-    padded[:np.size(values)] = values
-    return padded
+    row = np.zeros(size)
+    row[:np.size(values)] = values
+    return row
 
 
 def used_numbers(gains: FloatArray) -> BoolArray:

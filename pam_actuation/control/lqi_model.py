@@ -94,6 +94,12 @@ class LinearModel:
         """Contraction per pressure at rest."""
         return sum(self.numerator) / (1.0 + sum(self.denominator))
 
+    def to_dict(self) -> dict[str, object]:
+        """Return the model as plain data of a controller file."""
+        return {'rate_hz': self.rate_hz, 'delay_ticks': self.delay_ticks,
+                'denominator': list(self.denominator), 'numerator': list(self.numerator),
+                'contraction_m': self.contraction_m, 'pressure_pa': self.pressure_pa}
+
     def simulate(self, command_pa: FloatArray) -> FloatArray:
         """Return the contraction [m] for commands [absolute Pa], from rest at the first one."""
         from scipy.signal import lfilter

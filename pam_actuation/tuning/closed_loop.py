@@ -236,10 +236,11 @@ class ClosedLoop(MuscleLoop):
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
-        from pam_actuation.tuning import rollouts       # brings the compiler with it
+        from pam_actuation.tuning import baseline_rollouts, rollouts    # bring the compiler
         controller.pause()
         log = np.empty(self.ticks * size_of(rollouts.LOG))
-        rollout = getattr(rollouts, f'{controller.kind}_rollout')
+        name = f'{controller.kind}_rollout'
+        rollout = getattr(rollouts if hasattr(rollouts, name) else baseline_rollouts, name)
         rollout(
             self._fresh_plant(), self.hsv, self._driver.fresh(),
             self._timing, self._reference.rows(controller.lead_s),

@@ -19,8 +19,10 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.ilc import IlcController
 from pam_actuation.control.lqi import LqiController
 from pam_actuation.control.modes.joint import JointController
+from pam_actuation.control.mpc import MpcController
 from pam_actuation.control.pid import PidController
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.settings import SCALING
@@ -132,8 +134,11 @@ def rebuild(controller: Law, settings: dict[str, float],
 def _rebuilt(controller: Law, merged: dict[str, float], rules: 'RuleBase | None') -> Any:
     if isinstance(controller, JointController):
         return controller.with_law(_rebuilt(controller.law, merged, rules))
-    if isinstance(controller, PidController):
-        return PidController(controller.static_inverse, merged, controller.rig_name)
+    if isinstance(controller, (PidController, IlcController)):
+        return type(controller)(controller.static_inverse, merged, controller.rig_name)
+    if isinstance(controller, MpcController):
+        return MpcController(
+            controller.model, controller.static_inverse, merged, controller.rig_name)
     if isinstance(controller, LqiController):
         return LqiController(controller.model, merged, controller.rig_name)
     if rules is None and all(merged[name] == controller.settings[name] for name in SCALING):

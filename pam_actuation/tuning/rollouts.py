@@ -49,8 +49,8 @@ LOG = record(
 
 
 @compiled
-def _sense(tick: int, plant_out: np.record, noise: np.record, quantum: np.record,
-           wanted: np.record, learn: FloatArray, inp: np.record, log: np.record) -> None:
+def sense(tick: int, plant_out: np.record, noise: np.record, quantum: np.record,
+          wanted: np.record, learn: FloatArray, inp: np.record, log: np.record) -> None:
     """Fill the inputs of the controller and the measured part of the log."""
     inp.contraction_m = read(
         plant_out.contraction_m + noise.contraction_m, quantum.contraction_m)
@@ -70,9 +70,9 @@ def _sense(tick: int, plant_out: np.record, noise: np.record, quantum: np.record
 
 
 @compiled
-def _actuate(tick: int, command_pa: float, measured_pa: float, hsv: bool, driver: Driver,
-             driver_every: int, steps: int, latency_steps: int, disturbances: Rows,
-             plant: Plant, log: np.record) -> None:
+def actuate(tick: int, command_pa: float, measured_pa: float, hsv: bool, driver: Driver,
+            driver_every: int, steps: int, latency_steps: int, disturbances: Rows,
+            plant: Plant, log: np.record) -> None:
     """Run the driver law where it is due and the physics of one controller period."""
     plant_state, plant_par, plant_inp, plant_out = plant
     acting = part(plant_inp, 0, layout.INPUT)
@@ -136,10 +136,10 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
+            sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = sofc_step(*controller)
-            _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
-                     latency_steps, disturbances, plant, log_rows[tick])
+            actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                    latency_steps, disturbances, plant, log_rows[tick])
 
     @entry_point
     def pid_rollout(
@@ -157,10 +157,10 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
+            sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = pid_step(*controller)
-            _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
-                     latency_steps, disturbances, plant, log_rows[tick])
+            actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                    latency_steps, disturbances, plant, log_rows[tick])
 
     @entry_point
     def lqi_rollout(
@@ -178,13 +178,13 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         disturbances = disturbance.view(DISTURBANCE)
         inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
         for tick in range(log_rows.shape[0]):
-            _sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
+            sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
             command_pa = lqi_step(*controller)
-            _actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
-                     latency_steps, disturbances, plant, log_rows[tick])
+            actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
+                    latency_steps, disturbances, plant, log_rows[tick])
 
     return sofc_rollout, pid_rollout, lqi_rollout
 
 
 sofc_rollout, pid_rollout, lqi_rollout = _entries(source_key(
-    _sense, _actuate, sofc_step, pid_step, lqi_step))
+    sense, actuate, sofc_step, pid_step, lqi_step))

@@ -75,12 +75,24 @@ PID_AXES = (
     Axis('change_filter_s', 0.001, 0.06),
 )
 PID_INVERSE_AXES = PID_AXES + (Axis('lead_s', 0.0, 0.2, log=False),)
+ILC_AXES = PID_INVERSE_AXES + (
+    Axis('learning_pa_per_m', 1e5, 3e7),
+    Axis('learning_lead_s', 0.0, 0.25, log=False),
+    Axis('learning_filter_s', 0.005, 0.15),
+)
 LQI_AXES = (
     Axis('lead_s', 0.0, 0.2, log=False),
     Axis('reference_feedforward', 0.0, 1.0, log=False),
     Axis('integral_weight', 1e-2, 1e5),
     Axis('command_weight', 1e-5, 10.0),
     Axis('disturbance_pa', 1.0, 1e5),
+)
+MPC_AXES = (
+    Axis('lead_s', 0.0, 0.2, log=False),
+    Axis('command_weight', 1e-5, 10.0),
+    Axis('change_weight', 1e-6, 10.0),
+    Axis('disturbance_pa', 1.0, 1e5),
+    Axis('noise_m', 1e-6, 1e-3),
 )
 
 
@@ -92,6 +104,8 @@ def default_axes(controller: 'Law') -> tuple[Axis, ...]:
     """
     if controller.kind == 'lqi':
         return LQI_AXES
+    if controller.kind in ('ilc', 'mpc'):
+        return ILC_AXES if controller.kind == 'ilc' else MPC_AXES
     if controller.kind == 'pid':
         return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
     from pam_actuation.control.sofc.settings import SCALING

@@ -24,8 +24,8 @@ from pam_sim.units import P_ATM_PA
 import pytest
 
 MS = 1_000_000
-CONTROLLERS = {'ppr': ('sofc_ppr', 'pid', 'pid_plain', 'lqi'),
-               'hsv': ('sofc_hsv', 'pid_hsv', 'pid_plain_hsv', 'lqi_hsv')}
+CONTROLLERS = {'ppr': ('sofc_ppr', 'pid', 'pid_plain', 'lqi', 'ilc_ppr', 'mpc_ppr'),
+               'hsv': ('sofc_hsv', 'pid_hsv', 'pid_plain_hsv', 'lqi_hsv', 'ilc_hsv', 'mpc_hsv')}
 EVERY = [(valve, name) for valve, names in CONTROLLERS.items() for name in names]
 
 

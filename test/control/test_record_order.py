@@ -15,7 +15,7 @@
 """Numbers of the compiled laws belong to their names, wherever they lie in memory."""
 
 import numpy as np
-from pam_actuation.control import lqi, pid
+from pam_actuation.control import ilc, lqi, mpc, pid
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.inputs import INPUT, write_inputs
 from pam_actuation.control.settings import parameter_record, setting
@@ -27,7 +27,9 @@ import pytest
 
 LAWS = {'sofc': (settings.SETTINGS, settings.PARAMETERS, records.OUTPUT, step.sofc_step),
         'pid': (pid.SETTINGS, pid.PARAMETERS, pid.OUTPUT, pid.pid_step),
-        'lqi': (lqi.SETTINGS, lqi.PARAMETERS, lqi.OUTPUT, lqi.lqi_step)}
+        'lqi': (lqi.SETTINGS, lqi.PARAMETERS, lqi.OUTPUT, lqi.lqi_step),
+        'ilc': (ilc.SETTINGS, ilc.PARAMETERS, ilc.OUTPUT, ilc.ilc_step),
+        'mpc': (mpc.SETTINGS, mpc.PARAMETERS, mpc.OUTPUT, mpc.mpc_step)}
 OUTPUTS = {
     'pid': (
         'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
@@ -37,6 +39,14 @@ OUTPUTS = {
         'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'feedforward_pa',
         'state_feedback_pa', 'integral_pa', 'unlimited_command_pa', 'saturated_low',
         'saturated_high', 'slew_limited', 'start_offset_m'),
+    'ilc': (
+        'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
+        'integral_pa', 'derivative_pa', 'learned_pa', 'cycle_s', 'unlimited_command_pa',
+        'saturated_low', 'saturated_high', 'slew_limited', 'start_offset_m'),
+    'mpc': (
+        'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'disturbance_pa',
+        'bounded', 'unlimited_command_pa', 'saturated_low', 'saturated_high', 'slew_limited',
+        'start_offset_m'),
     'sofc': (
         'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa',
         'dynamic_feedforward_pa', 'feedback_rules_pa', 'feedforward_rules_pa', 'motion_rules_pa',

@@ -89,7 +89,7 @@ BLOCKS = [
     ('joint', joint, f'parameters: {{{WRONG}: 1}}\n'),
     ('controller', controller, SOFC + f'{WRONG}: 1\n'),
     *(('controller', controller, f'controller: {kind}\nsettings: {{{WRONG}: 1}}\n')
-      for kind in ('sofc', 'pid', 'lqi')),
+      for kind in ('sofc', 'pid', 'lqi', 'ilc', 'mpc')),
     ('controller', controller, f'controller: sofc\nmade_for: {{{WRONG}: 1}}\n'),
     ('controller', controller, SOFC + f'static_inverse: {{{WRONG}: 1}}\n'),
     ('controller', controller, f'controller: lqi\nmodel: {{{WRONG}: 1}}\n'),

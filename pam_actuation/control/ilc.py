@@ -1,0 +1,308 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Iterative learning control on top of a PID with static inverse: a baseline for what repeats.
+
+The pressure learned for a moment of a cycle is that of the same moment one cycle ago, plus the
+error a little later then, behind a filter without phase (P-type with lead and Q-filter, Bristow,
+Tharayil and Alleyne 2006)::
+
+    u[k] = Q (u + gamma e[+ lead])[k - cycle]
+
+The length of a cycle is found from the reference: two that are alike to 0.1 mm, between two of its
+minima, no longer than half of what is remembered. Where the reference leaves its cycle, what was
+learned fades, and a PID is left. It suits one cycle and knows nothing of the muscle.
+"""
+
+from collections.abc import Callable, Mapping
+import math
+
+import numpy as np
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.inputs import INPUT
+from pam_actuation.control.law_parts import (
+    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
+from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.parameters import check_parameters
+from pam_sim.records import part, record, values_of
+from pam_sim.units import P_ATM_PA
+
+SETTINGS = (
+    setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
+    setting('lead_s', 's', 0.1, 0.0, 0.5, 'preview of the static inverse'),
+    setting('proportional_pa_per_m', 'Pa/m', 2e6, 0.0, 5e7, 'proportional gain'),
+    setting('integral_pa_per_m_s', 'Pa/(m s)', 2.5e7, 0.0, 1e9, 'integral gain'),
+    setting('derivative_pa_s_per_m', 'Pa s/m', 1.5e5, 0.0, 5e6, 'derivative gain'),
+    setting('learning_pa_per_m', 'Pa/m', 4e6, 0.0, 1e8,
+            'pressure learned in a cycle per error of the cycle before'),
+    setting('learning_lead_s', 's', 0.12, 0.0, 0.4,
+            'how much later than its cause an error is taken'),
+    setting('learning_filter_s', 's', 0.04, 0.0, 0.3,
+            'half width of the triangular mean that what is learned passes in each cycle'),
+    setting('learning_limit_pa', 'Pa', 2e5, 0.0, 6e5, 'bound of what is learned'),
+    setting('anti_windup_time_s', 's', 0.2, 0.01, 10.0, 'back-calculation time constant'),
+    setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
+    setting('min_pressure_gauge_pa', 'Pa', 0.0, 0.0, 6e5, 'lowest command'),
+    setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
+    setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
+    setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+)
+PARAMETERS = parameter_record(SETTINGS)
+MEMORY_SIZE = 5000                          # remembered
+_MINIMA_SIZE = 16                          # of the reference, remembered
+_SHORTEST_S = 0.2                     # of a cycle
+_ALIKE_M = 1e-4
+STATE = record(
+    'started',                        # 1 after the first tick
+    'offset_m',                       # of the reference, from the bumpless start
+    'contraction_m',                  # measured before
+    'change_m_per_s',                 # of the error, filtered
+    'integral_pa',
+    'command_pa',                     # of the tick before
+    'ticks',                          # since the start
+    'error_m',                        # of the tick before
+    'learned_pa',                     # of the tick before
+    'cycle_ticks',                    # 0 = the reference does not repeat
+    'way_m',                          # of the reference in the tick before
+    'falls',                          # 1 = it moved downwards last
+    'minima',                         # found since the start
+    ('minimum_tick', _MINIMA_SIZE),
+)
+# The names on topic ``controller_state``.
+OUTPUT = record(
+    'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
+    'integral_pa', 'derivative_pa', 'learned_pa', 'cycle_s', 'unlimited_command_pa',
+    'saturated_low', 'saturated_high', 'slew_limited', 'start_offset_m')
+_LEARNS, _OFF, _NO_CYCLE = 'learning', 'learning is off', 'the reference does not repeat'
+
+
+@compiled
+def _start(par: np.record, st: np.record, inp: np.record) -> None:
+    """Begin so that the reference starts where the muscle is and the command where it is."""
+    st.started = 1.0
+    st.offset_m = inp.reference_m - inp.contraction_m
+    st.command_pa = first_command_pa(
+        inp.pressure_pa, P_ATM_PA + par.min_pressure_gauge_pa,
+        P_ATM_PA + par.max_pressure_gauge_pa)
+
+
+@compiled
+def _at(row: FloatArray, tick: float) -> float:
+    """Return a remembered value at a time in ticks, linear in between."""
+    whole = int(math.floor(tick))
+    share = tick - whole
+    return (1.0 - share) * row[whole % MEMORY_SIZE] + share * row[(whole + 1) % MEMORY_SIZE]
+
+
+@compiled
+def _alike(references: FloatArray, tick: int, cycle: float) -> bool:
+    """Tell whether the last cycle of the reference is that before it."""
+    if 2.0 * cycle + 2.0 > min(tick, MEMORY_SIZE - 2):
+        return False
+    for ago in range(int(cycle) + 1):
+        now = tick - ago
+        if abs(references[now % MEMORY_SIZE] - _at(references, now - cycle)) > _ALIKE_M:
+            return False
+    return True
+
+
+@compiled
+def _find_cycle(par: np.record, references: FloatArray, st: np.record) -> None:
+    """Look for a cycle where the reference begins to rise, and drop one that it left."""
+    tick = int(st.ticks)
+    cycle: float = st.cycle_ticks
+    if tick < 1:
+        return
+    now = references[tick % MEMORY_SIZE]
+    if cycle > 0.0 and abs(now - _at(references, tick - cycle)) > _ALIKE_M:
+        st.cycle_ticks = 0.0
+    former: float = st.way_m
+    way = now - references[(tick - 1) % MEMORY_SIZE]
+    st.way_m = way
+    if way < 0.0:
+        st.falls = 1.0
+    if not way > 0.0 or st.falls < 0.5:
+        return
+    st.falls = 0.0
+    # The minimum of a smooth reference lies between two ticks, a rise after a hold begins at one.
+    at = tick - 0.5 - way / (way - former) if former < 0.0 else float(tick)
+    count = int(st.minima)
+    for j in range(1, min(count, _MINIMA_SIZE) + 1):
+        length = at - st.minimum_tick[(count - j) % _MINIMA_SIZE]
+        if length >= _SHORTEST_S * par.rate_hz and _alike(references, tick, length):
+            if abs(st.cycle_ticks - length) > 0.5:
+                st.cycle_ticks = length
+            break
+    st.minimum_tick[count % _MINIMA_SIZE] = at
+    st.minima = count + 1.0
+
+
+@compiled
+def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.record,
+                learns: bool) -> float:
+    """Return the pressure that former cycles taught for this tick."""
+    tick = int(st.ticks)
+    cycle: float = st.cycle_ticks
+    if not cycle > 0.0:
+        return st.learned_pa * (par.start_time_s / (par.start_time_s + 1.0 / par.rate_hz))
+    gain = par.learning_pa_per_m if learns else 0.0
+    ahead = min(par.learning_lead_s * par.rate_hz, cycle - 2.0)
+    half = int(min(par.learning_filter_s * par.rate_hz, cycle - 2.0 - ahead))
+    total = 0.0
+    for w in range(-half, half + 1):
+        then = tick - cycle + w
+        value = _at(taught, then) + gain * _at(errors, then + ahead)
+        total += (half + 1 - abs(w)) * value
+    total /= (half + 1) * (half + 1)
+    return min(max(total, -par.learning_limit_pa), par.learning_limit_pa)
+
+
+@compiled
+def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record,
+          inp: np.record, out: np.record) -> float:
+    """Run one tick; see ``ilc_step``."""
+    period = 1.0 / par.rate_hz
+    if st.started < 0.5:
+        _start(par, st, inp)
+    x = inp.contraction_m
+    change = filtered_change(
+        st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s,
+        x - st.contraction_m, inp.elapsed_s, period, st.ticks > 0.0)
+    st.change_m_per_s = change
+    st.contraction_m = x
+    held_back = inp.held_back
+    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
+                         par.start_time_s, period)
+    st.offset_m = faded_offset(offset, par.start_time_s, period)
+    error = inp.reference_m - offset - x
+    st.error_m = error
+    place = int(st.ticks) % MEMORY_SIZE
+    references, errors, taught = memory[0], memory[1], memory[2]
+    references[place] = inp.reference_m
+    errors[place] = error if held_back == 0.0 else 0.0
+    _find_cycle(par, references, st)
+    learned = _learned_pa(par, errors, taught, st, inp.learning > 0.5)
+    taught[place] = learned
+    st.learned_pa = learned
+    st.ticks += 1.0
+    base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
+    proportional = par.proportional_pa_per_m * error
+    derivative = par.derivative_pa_s_per_m * change
+    integral = st.integral_pa
+    wanted = base + proportional + integral + derivative + learned
+    lowest = P_ATM_PA + par.min_pressure_gauge_pa
+    highest = P_ATM_PA + par.max_pressure_gauge_pa
+    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
+    st.command_pa = command
+    st.integral_pa = integral + period * integral_growth(
+        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s, held_back)
+    out.command_pa = command
+    out.error_m = error
+    out.change_of_error_m_per_s = change
+    out.inverse_pa = base
+    out.proportional_pa = proportional
+    out.integral_pa = integral
+    out.derivative_pa = derivative
+    out.learned_pa = learned
+    out.cycle_s = st.cycle_ticks * period
+    out.unlimited_command_pa = wanted
+    out.saturated_low = 1.0 if wanted < lowest else 0.0
+    out.saturated_high = 1.0 if wanted > highest else 0.0
+    out.slew_limited = 1.0 if command != inside else 0.0
+    out.start_offset_m = offset
+    return command
+
+
+@compiled
+def _step(par: FloatArray, inverse: FloatArray, memory: FloatArray, st: FloatArray,
+          inp: FloatArray, out: FloatArray) -> float:
+    """Run one tick on arrays; see ``ilc_step``."""
+    return _tick(part(par, 0, PARAMETERS), inverse, memory, part(st, 0, STATE),
+                 part(inp, 0, INPUT), part(out, 0, OUTPUT))
+
+
+def _entry(key: int) -> Compiled[..., float]:
+    """Return the step function as one unit of compiled code, stored under ``key``."""
+    @entry_point
+    def ilc_step(par: FloatArray, inverse: FloatArray, memory: FloatArray, st: FloatArray,
+                 inp: FloatArray, out: FloatArray) -> float:
+        """
+        Run one tick; return the pressure command [absolute Pa].
+
+        ``par``, ``st``, ``inp`` and ``out`` are arrays of ``PARAMETERS``, ``STATE``,
+        ``inputs.INPUT`` and ``OUTPUT``; ``memory`` has rows of ``MEMORY_SIZE`` for reference,
+        error and what was learned. All but ``par``, ``inp`` and the static inverse are written.
+        """
+        if key < 0:       # never; makes the key part of what is stored
+            return P_ATM_PA
+        return _step(par, inverse, memory, st, inp, out)
+
+    return ilc_step
+
+
+ilc_step = _entry(source_key(_step))
+
+
+class IlcController(CompiledController):
+    """
+    Iterative learning control in the interface of all controllers.
+
+    Parameters
+    ----------
+    static_inverse : numpy.ndarray
+        Table of ``static_inverse.tabulate_static_inverse``.
+    settings : mapping, optional
+        What differs from the defaults of ``SETTINGS``.
+    rig_name : str
+        Identity of the rig, for the record.
+    where : callable, optional
+        Place of a setting for errors.
+
+    Raises
+    ------
+    InputError
+        A setting is unknown or out of range.
+
+    """
+
+    kind = 'ilc'
+    state_names = OUTPUT.names or ()
+
+    def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
+                 rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
+        super().__init__(
+            check_parameters(SETTINGS, settings or {}, 'setting', where or ''), STATE, rig_name)
+        self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
+        self.parameters = values_of(PARAMETERS, self.settings)
+        self._memory = np.zeros((3, MEMORY_SIZE))
+        self._step = ilc_step
+        self._arguments = (self.parameters, self.static_inverse, self._memory, self._state,
+                           self._inputs, self._outputs)
+        self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
+        self.pause()
+
+    def learning_reason(self) -> str:
+        """Return in words whether the last tick learned, or why not."""
+        if self.freeze_learning:
+            return _OFF
+        return _LEARNS if self._outputs[self.state_names.index('cycle_s')] > 0.0 else _NO_CYCLE
+
+    def pause(self) -> None:
+        """Forget the motion, and with it what was learned for its cycle."""
+        super().pause()
+        self._memory[:] = 0.0
