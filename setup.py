@@ -120,6 +120,7 @@ BENCH_REQUIRES = [
     'networkx>=3.2',  # scikit-fuzzy needs it and does not bring it
     'pysindy>=2.0',
     'scikit-learn>=1.4',
+    'cloudpickle>=2.0',
 ]
 
 

@@ -42,7 +42,7 @@ EXECUTABLES = (
 
 # Import name -> name in setup.py, where they differ.
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
-                 'skfuzzy': 'scikit-fuzzy'}
+                 'skfuzzy': 'scikit-fuzzy', 'sklearn': 'scikit-learn'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/guides/installation.md).
 ROSDEP_KEYS = {
     'argcomplete': 'python3-argcomplete',
@@ -210,7 +210,7 @@ def test_benchmarks_need_no_more_than_their_extra(setup_keywords, manifest):
     page = (ROOT / 'docs' / 'dependencies.md').read_text(encoding='utf-8')
     assert all(f'| {name} |' in page for name in bench)
     own = {path.stem for path in (ROOT / 'benchmarks').glob('*.py')}
-    own |= {path.stem for folder in ('hidden', 'control', 'view')
+    own |= {path.stem for folder in ('hidden', 'control', 'tables', 'view')
             for path in (ROOT / 'test' / folder).glob('*.py')}
     own |= {'pam_sim', 'pam_actuation'}
     allowed = bench | requirement_names(setup_keywords['install_requires'])
