@@ -103,7 +103,8 @@ def shown(text):
     """Return a sentence as a cell of the table."""
     flat = ' '.join(text.removeprefix('pam import: ').split()).replace('|', '¦')
     flat = flat if len(flat) <= MOST_SHOWN else f'{flat[:MOST_SHOWN]}…'
-    return flat.replace('<', '&lt;').replace('`', "'").replace('*', r'\*')
+    code = flat.replace('`', "'")
+    return f'`{code}`' if code else ''
 
 
 def write_long(path, size):
@@ -161,7 +162,7 @@ def show_long(gigabytes):
                     stream.write(bytes(4096))
                 shutil.rmtree(Path(folder) / 'bag')
             code, seconds, peak, said = imported(folder, *options)
-            label = (' '.join(options) or 'as it is') + (
+            label = (f'`{" ".join(options)}`' if options else 'as it is') + (
                 ', 4096 zero bytes at 95 %' if is_damaged else '')
             print(f'| {label} | {code} | {seconds:.0f} | {peak:.0f} | {shown(said)} |', flush=True)
             if options and not is_damaged:
