@@ -16,20 +16,21 @@
 from interruptions import cases, run
 import pytest
 
-VERB_ROUNDS, NODE_ROUNDS = 6, 3
+# More of them: python test/fuzz/interruptions.py --help
+VERB_ROUNDS, NODE_ROUNDS = 4, 2
 
 
 def test_verbs_end_with_one_line_whenever_they_are_interrupted():
-    outcomes, bad = run(range(3), VERB_ROUNDS)
+    outcomes, bad = run(range(2), VERB_ROUNDS)
     assert bad == []
-    assert outcomes['interrupted'] > 20
+    assert outcomes['interrupted'] > 13
 
 
 @pytest.mark.slow
 def test_verbs_at_work_end_with_one_line_as_well():
-    outcomes, bad = run(range(3, VERB_ROUNDS), VERB_ROUNDS)
+    outcomes, bad = run(range(2, VERB_ROUNDS), VERB_ROUNDS)
     assert bad == []
-    assert outcomes['interrupted'] > 15
+    assert outcomes['interrupted'] > 10
 
 
 @pytest.mark.ros
@@ -46,7 +47,7 @@ def test_nodes_and_those_who_start_them_end_in_order_whenever_they_are_interrupt
 def test_nodes_at_work_and_those_who_started_them_end_in_order_as_well():
     outcomes, bad = run(range(1, NODE_ROUNDS), NODE_ROUNDS, live=True, jobs=3)
     assert bad == []
-    assert outcomes['interrupted'] > 20
+    assert outcomes['interrupted'] > 10
 
 
 def test_the_same_seed_gives_the_same_interruptions_and_all_of_them_differ():
