@@ -151,7 +151,7 @@ def _become(request: dict[str, Any]) -> None:
     os.dup2(log, 1)
     os.dup2(log, 2)
     os.close(log)
-    name_process(request['words'][0])
+    name_process(*request['words'])
 
 
 def prepare(names: Sequence[str]) -> None:
@@ -169,7 +169,7 @@ def prepare(names: Sequence[str]) -> None:
 
 def become_nodes() -> int:
     """Serve; return the exit code, in a fork that of its node."""
-    number, *names = sys.argv[1:]
+    number, *names = ' '.join(sys.argv[1:]).split()
     channel = socket.socket(fileno=int(number))
     prepare(names)
     words = Children(channel).serve()

@@ -43,6 +43,7 @@ OF_A_RUN = ('experiment_recorder', 'plant_simulator', 'valve_watchdog', 'valve_d
             'sofc_controller', 'reference_generator')
 PREPARE_TIMEOUT_S = 60.0        # for its imports, on a busy machine
 END_TIMEOUT_S = 5.0
+ROOM_FOR_WORDS = 4000           # for the command lines of its nodes, see ``name_process``
 READ_BYTES = 1 << 16
 
 
@@ -64,7 +65,7 @@ class NodeTemplate:
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'pam_actuation.nodes.template', str(theirs.fileno()),
-                 *dict.fromkeys(names)],
+                 *dict.fromkeys(names), ' ' * ROOM_FOR_WORDS],
                 env=dict(environment), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, start_new_session=True, pass_fds=(theirs.fileno(),),
                 preexec_fn=partial(end_with_parent, os.getpid()))

@@ -217,7 +217,18 @@ def end_with_parent(parent_pid: int) -> None:
             os._exit(1)
 
 
-def name_process(name: str) -> None:
-    """Give this process a name, as ``top`` and ``pgrep`` show it (15 characters of it)."""
-    if LIBC is not None:
-        LIBC.prctl(PR_SET_NAME, name.encode()[:15], 0, 0, 0)
+def name_process(*words: str) -> None:
+    """
+    Give this process the name and the command line that ``top``, ``ps`` and ``pgrep -f`` show.
+
+    Linux shows the memory that held the words it was started with; they are written over. What
+    is too long for that place is cut off.
+    """
+    if LIBC is None:
+        return
+    LIBC.prctl(PR_SET_NAME, words[0].encode()[:15], 0, 0, 0)
+    numbers = Path('/proc/self/stat').read_text().rsplit(')', 1)[1].split()
+    start, end = (int(number) for number in numbers[45:47])      # fields 48 and 49
+    if end > start > 0:
+        text = '\0'.join(words).encode()[:end - start - 1]
+        ctypes.memmove(start, text.ljust(end - start, b'\0'), end - start)

@@ -92,6 +92,8 @@ def test_nodes_have_names_logs_and_ends_of_their_own(template, environment, tmp_
         'valve_watchdog', '/muscle', {}, environment, tmp_path, template=template)
     try:
         assert process_name(driver.pid) == 'valve_driver'
+        words = Path(f'/proc/{driver.pid}/cmdline').read_bytes().rstrip(b'\0').split(b'\0')
+        assert words[:4] == [b'valve_driver', b'--ros-args', b'-r', b'__ns:=/muscle']
         assert len({parent_of(one.pid) for one in (driver, killed)} | {os.getpid()}) == 2
         assert os.getsid(driver.pid) == driver.pid
         killed.send_signal(signal.SIGKILL)
