@@ -95,6 +95,8 @@ RUN = (
     Slot('--controller', 'controller'), Slot('--rules', 'rules file'), Slot('--seed', 'count'))
 BAG = Slot('', 'bag', 'bag')
 INSIDE = Slot('--namespace', 'namespace in a bag')
+LIVE = (Slot('--namespace', 'namespace'), Slot('--domain-id', 'domain'),
+        Slot('--wait', 'number above 0', '0.1'))
 # Arguments of every verb; several rows where an argument changes what others mean. The rows of
 # run, tune, gap and characterise could do their work: a mistake must be seen before it.
 VERBS = {
@@ -163,7 +165,14 @@ VERBS = {
         (Slot('', 'rules', 'sofc_ppr'), Slot('--against', 'rules'), Slot('--top', 'count'),
          Slot('--html', 'page', 'new.html'), Slot('--save', 'rule file to write', 'new.json'),
          Slot('--rig', 'rig'))],
+    'status': [LIVE], 'estop': [LIVE], 'reset': [LIVE],
+    'param': [(Slot('', 'choice', 'list'), Slot('', 'fixed', 'valve_driver'), *LIVE)],
+    'view': [(BAG, INSIDE, Slot('--port', 'count'))],
+    'campaign': [
+        (Slot('', 'recordings', 'bag'), Slot('--out', 'folder', 'new'),
+         Slot('--model', 'rig', RIG), Slot('--seed', 'count'), Slot('--jobs', 'count'))],
     'demo': [(Slot('--out', 'demo folder', 'new'),)]}
+VALUES['recordings'] = ('empty_folder', 'gone_bag', *ABSENT)
 VALUES['demo folder'] = (*VALUES['folder'], 'bag/bag_0.mcap')
 # Wrong whatever the values are.
 COMBINATIONS = (
