@@ -25,7 +25,6 @@ from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
-from pam_actuation.rigging.node_template import OF_A_RUN as NODES, template_for
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.topics.codec import Reader, Writer
 from pam_actuation.topics.table import OF_A_RUN
@@ -67,7 +66,7 @@ class LiveRig:
         log_dir.mkdir(exist_ok=True)
         process = NodeProcess(
             name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
-            log_dir, template=template_for(NODES, self.environment))
+            log_dir)
         # Also those that others replace by name: after a failed test they may still run.
         self._started.append(process)
         self.processes[f'{below}/{name}' if below else name] = process
