@@ -30,16 +30,16 @@ from collections.abc import Callable, Mapping
 import math
 
 import numpy as np
-from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
-from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
+from pam_actuation.control.law_parts import first_command_pa
+from pam_actuation.control.pid import command_of, tracking_error
 from pam_actuation.control.settings import parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.parameters import check_parameters
-from pam_sim.records import part, record, values_of
+from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
 SETTINGS = (
@@ -176,56 +176,22 @@ def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.r
 def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record,
           inp: np.record, out: np.record) -> float:
     """Run one tick; see ``ilc_step``."""
-    period = 1.0 / par.rate_hz
     if st.started < 0.5:
         _start(par, st, inp)
-    x = inp.contraction_m
-    change = filtered_change(
-        st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s,
-        x - st.contraction_m, inp.elapsed_s, period, st.ticks > 0.0)
-    st.change_m_per_s = change
-    st.contraction_m = x
-    held_back = inp.held_back
-    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
-                         par.start_time_s, period)
-    st.offset_m = faded_offset(offset, par.start_time_s, period)
-    error = inp.reference_m - offset - x
-    st.error_m = error
+    error, offset = tracking_error(par, st, inp, st.ticks > 0.0)
     place = int(st.ticks) % MEMORY_SIZE
     references, errors, taught = memory[0], memory[1], memory[2]
     references[place] = inp.reference_m
-    errors[place] = error if held_back == 0.0 else 0.0
+    errors[place] = error if inp.held_back == 0.0 else 0.0
     _find_cycle(par, references, st)
     learned = _learned_pa(par, errors, taught, st, inp.learning > 0.5)
     taught[place] = learned
     st.learned_pa = learned
     st.ticks += 1.0
-    base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
-    proportional = par.proportional_pa_per_m * error
-    derivative = par.derivative_pa_s_per_m * change
-    integral = st.integral_pa
-    wanted = base + proportional + integral + derivative + learned
-    lowest = P_ATM_PA + par.min_pressure_gauge_pa
-    highest = P_ATM_PA + par.max_pressure_gauge_pa
-    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
-    st.command_pa = command
-    st.integral_pa = integral + period * integral_growth(
-        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s, held_back)
-    out.command_pa = command
-    out.error_m = error
-    out.change_of_error_m_per_s = change
-    out.inverse_pa = base
-    out.proportional_pa = proportional
-    out.integral_pa = integral
-    out.derivative_pa = derivative
     out.learned_pa = learned
-    out.cycle_s = st.cycle_ticks * period
-    out.unlimited_command_pa = wanted
-    out.saturated_low = 1.0 if wanted < lowest else 0.0
-    out.saturated_high = 1.0 if wanted > highest else 0.0
-    out.slew_limited = 1.0 if command != inside else 0.0
-    out.start_offset_m = offset
-    return command
+    out.cycle_s = st.cycle_ticks * (1.0 / par.rate_hz)
+    base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
+    return command_of(par, st, inp, out, error, offset, base, learned)
 
 
 @compiled
@@ -258,7 +224,7 @@ def _entry(key: int) -> Compiled[..., float]:
 ilc_step = _entry(source_key(_step))
 
 
-class IlcController(CompiledController):
+class IlcController(FixedLawController):
     """
     Iterative learning control in the interface of all controllers.
 
@@ -285,16 +251,11 @@ class IlcController(CompiledController):
 
     def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
-        super().__init__(
-            check_parameters(SETTINGS, settings or {}, 'setting', where or ''), STATE, rig_name)
+        checked = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self.parameters = values_of(PARAMETERS, self.settings)
         self._memory = np.zeros((3, MEMORY_SIZE))
-        self._step = ilc_step
-        self._arguments = (self.parameters, self.static_inverse, self._memory, self._state,
-                           self._inputs, self._outputs)
-        self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
-        self.pause()
+        super().__init__(ilc_step, checked, self.static_inverse, PARAMETERS, STATE, rig_name,
+                         self._memory)
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

@@ -84,41 +84,53 @@ def _start(par: np.record, st: np.record, inp: np.record) -> None:
 
 
 @compiled
-def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
-          out: np.record) -> float:
-    """Run one tick; see ``pid_step``."""
+def tracking_error(par: np.record, st: np.record, inp: np.record, has_former: bool
+                   ) -> tuple[float, float]:
+    """
+    Return error and offset of the reference [m]; note what the next tick needs of this one.
+
+    ``par``, ``st`` and ``inp`` are records with the fields of ``PARAMETERS``, ``STATE`` and
+    ``inputs.INPUT``; ``has_former`` tells whether a contraction was measured before.
+    """
     period = 1.0 / par.rate_hz
-    if st.started < 0.5:
-        _start(par, st, inp)
     x = inp.contraction_m
     st.change_m_per_s = filtered_change(
         st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s,
-        x - st.contraction_m, inp.elapsed_s, period, st.history_ticks > 0.0)
+        x - st.contraction_m, inp.elapsed_s, period, has_former)
     st.contraction_m = x
-    st.history_ticks += 1.0
-    held_back = inp.held_back
-    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
+    offset = held_offset(st.offset_m, inp.held_back, inp.reference_m - x, st.error_m,
                          par.start_time_s, period)
     st.offset_m = faded_offset(offset, par.start_time_s, period)
     error = inp.reference_m - offset - x
     st.error_m = error
-    base = P_ATM_PA
-    if par.use_static_inverse > 0.5:
-        base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
+    return error, offset
+
+
+@compiled
+def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, error: float,
+               offset: float, base_pa: float, added_pa: float) -> float:
+    """
+    Return the command [absolute Pa] for an error, write the outputs, let the integral grow.
+
+    ``base_pa`` is what the terms of the PID are added to, ``added_pa`` what comes beside them.
+    Records as of ``tracking_error``, and ``OUTPUT``.
+    """
+    period = 1.0 / par.rate_hz
     proportional = par.proportional_pa_per_m * error
     derivative = par.derivative_pa_s_per_m * st.change_m_per_s
     integral = st.integral_pa
-    wanted = base + proportional + integral + derivative
+    wanted = base_pa + proportional + integral + derivative + added_pa
     lowest = P_ATM_PA + par.min_pressure_gauge_pa
     highest = P_ATM_PA + par.max_pressure_gauge_pa
     inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
     st.command_pa = command
     st.integral_pa = integral + period * integral_growth(
-        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s, held_back)
+        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s,
+        inp.held_back)
     out.command_pa = command
     out.error_m = error
     out.change_of_error_m_per_s = st.change_m_per_s
-    out.inverse_pa = base
+    out.inverse_pa = base_pa
     out.proportional_pa = proportional
     out.integral_pa = integral
     out.derivative_pa = derivative
@@ -128,6 +140,20 @@ def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
     out.slew_limited = 1.0 if command != inside else 0.0
     out.start_offset_m = offset
     return command
+
+
+@compiled
+def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
+          out: np.record) -> float:
+    """Run one tick; see ``pid_step``."""
+    if st.started < 0.5:
+        _start(par, st, inp)
+    error, offset = tracking_error(par, st, inp, st.history_ticks > 0.0)
+    st.history_ticks += 1.0
+    base = P_ATM_PA
+    if par.use_static_inverse > 0.5:
+        base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
+    return command_of(par, st, inp, out, error, offset, base, 0.0)
 
 
 @compiled
