@@ -32,11 +32,13 @@ another machine has the same bits.
 """
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from pam_actuation.control.lqi import LqiController, SETTINGS
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, used_numbers
 from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
@@ -58,10 +60,10 @@ _LISTS = (
         required=True, unit='-', lower=-1e3, upper=1e3),
     Key('numerator', list, 'Coefficients of the past pressures, as many.', required=True,
         unit='m/Pa', lower=-1.0, upper=1.0))
-GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
-            otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
+_GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
+             otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
 KEYS = (Key('model', dict, 'Linear model of the muscle that the gains rest on.',
-            otherwise='identified on the rig'), GAINS)
+            otherwise='identified on the rig'), _GAINS)
 MODEL_KEYS = (_DELAY, *_NUMBERS, *_LISTS)
 
 
@@ -77,25 +79,35 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
         cannot be identified.
 
     """
-    if 'model' in tree:
-        model = read_model(tree.require('model', dict))
-    elif rig is None:
-        raise InputError('without a rig the controller text must bring its `model`', tree.where())
-    else:
-        checked = check_parameters(SETTINGS, settings, 'setting', where)
-        model = identify_on_rig(rig, checked['rate_hz'])
+    model = model_of(tree, rig, lambda known: identify_on_rig(
+        known, check_parameters(SETTINGS, settings, 'setting', where)['rate_hz']))
     controller = LqiController(model, settings, rig_name, where)
-    if 'gains' in tree:
-        used = used_numbers(controller.gains)
-        kept = controller.gains.copy()
-        controller.gains[used] = read_floats(tree, GAINS, int(used.sum()))
-        before, now = fields(kept, MODEL), fields(controller.gains, MODEL)
-        if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
-            raise tree.error('`gains` are of a model of another order or delay', 'gains')
+    take_gains(tree, controller.gains, used_numbers(controller.gains), MODEL)
     return controller
 
 
-def read_model(table: Located) -> LinearModel:
+def model_of(tree: Located, rig: Rig | None, identified: Callable[[Rig], LinearModel]
+             ) -> LinearModel:
+    """Return the linear model of a controller file, else the one identified on the rig."""
+    if 'model' in tree:
+        return _read_model(tree.require('model', dict))
+    if rig is None:
+        raise InputError('without a rig the controller text must bring its `model`', tree.where())
+    return identified(rig)
+
+
+def take_gains(tree: Located, gains: FloatArray, used: BoolArray, record: 'np.dtype[Any]') -> None:
+    """Replace the used numbers of an array of gains by those of a file, where it has any."""
+    if 'gains' not in tree:
+        return
+    before = fields(gains.copy(), record)
+    gains[used] = _read_floats(tree, _GAINS, int(used.sum()))
+    now = fields(gains, record)
+    if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
+        raise tree.error('`gains` are of a model of another order or delay', 'gains')
+
+
+def _read_model(table: Located) -> LinearModel:
     """Return the model of a file."""
     table.check_keys(names_of(MODEL_KEYS))
     values = {key.name: key.read(table) for key in (*_NUMBERS, _DELAY)}
@@ -104,7 +116,7 @@ def read_model(table: Located) -> LinearModel:
         raise table.error(f'`denominator` has {order} numbers; allowed 1 to {MAX_ORDER}',
                           'denominator')
     for key in _LISTS:
-        values[key.name] = tuple(read_floats(table, key, order))
+        values[key.name] = tuple(_read_floats(table, key, order))
     model = LinearModel(**values)
     if np.max(np.abs(np.roots(np.r_[1.0, model.denominator]))) >= 1.0:
         raise table.error('`denominator` is of an unstable model', 'denominator')
@@ -113,7 +125,7 @@ def read_model(table: Located) -> LinearModel:
     return model
 
 
-def read_floats(tree: Located, key: Key, count: int) -> list[float]:
+def _read_floats(tree: Located, key: Key, count: int) -> list[float]:
     """Return a list of exactly ``count`` numbers within bounds."""
     table = tree.require(key.name, list)
     if len(table) != count:

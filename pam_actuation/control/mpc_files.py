@@ -33,14 +33,13 @@ Its pressures are equivalent ones (``mpc_gains``). A recording also keeps ``gain
 
 from collections.abc import Callable, Mapping
 
-from pam_actuation.control.lqi_files import GAINS, KEYS, read_floats, read_model
+import numpy as np
+from pam_actuation.control.lqi_files import KEYS, model_of, take_gains
 from pam_actuation.control.mpc import MpcController, SETTINGS
 from pam_actuation.control.mpc_gains import identify_behind_inverse, MODEL
 from pam_sim.annotations import FloatArray
-from pam_sim.errors import InputError
 from pam_sim.located_yaml import Located
 from pam_sim.parameters import check_parameters
-from pam_sim.records import fields
 from pam_sim.rig import Rig
 
 __all__ = ['KEYS', 'mpc_from_tree']
@@ -59,17 +58,8 @@ def mpc_from_tree(tree: Located, rig: Rig | None, inverse: FloatArray,
         cannot be identified.
 
     """
-    if 'model' in tree:
-        model = read_model(tree.require('model', dict))
-    elif rig is None:
-        raise InputError('without a rig the controller text must bring its `model`', tree.where())
-    else:
-        checked = check_parameters(SETTINGS, settings, 'setting', where)
-        model = identify_behind_inverse(rig, inverse, checked['rate_hz'])
+    model = model_of(tree, rig, lambda known: identify_behind_inverse(
+        known, inverse, check_parameters(SETTINGS, settings, 'setting', where)['rate_hz']))
     controller = MpcController(model, inverse, settings, rig_name, where)
-    if 'gains' in tree:
-        controller.gains[:] = read_floats(tree, GAINS, controller.gains.size)
-        kept = fields(controller.gains, MODEL)
-        if (kept.order, kept.delay_ticks) != (len(model.denominator), model.delay_ticks):
-            raise tree.error('`gains` are of a model of another order or delay', 'gains')
+    take_gains(tree, controller.gains, np.ones(controller.gains.size, dtype=bool), MODEL)
     return controller

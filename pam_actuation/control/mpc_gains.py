@@ -44,6 +44,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, record, values_of
 from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
 
 BLOCKS = (2, 4, 6, 8, 12, 18)             # ticks over which a command of the horizon stays
 MOVES, HORIZON = len(BLOCKS), sum(BLOCKS)
@@ -240,7 +241,7 @@ def pack(model: LinearModel, table: FloatArray, settings: Mapping[str, float]) -
     inverse = np.linalg.inv(hessian)
     observer = _observer(model, settings['disturbance_pa'], settings['noise_m'])
     (lowest, highest), slope = equivalent_pa(
-        table, np.array([settings[f'{end}_pressure_gauge_pa'] + 101_325.0
+        table, np.array([settings[f'{end}_pressure_gauge_pa'] + P_ATM_PA
                          for end in ('min', 'max')]), model.contraction_m)
     state = np.zeros((MOVES, MAX_ORDER))
     state[:, :n] = inverse @ moves.T @ free * si
