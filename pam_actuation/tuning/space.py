@@ -95,6 +95,8 @@ MPC_AXES = (
     Axis('noise_m', 1e-6, 1e-3),
 )
 
+AXES_OF = {'lqi': LQI_AXES, 'ilc': ILC_AXES, 'mpc': MPC_AXES}
+
 
 def default_axes(controller: 'Law') -> tuple[Axis, ...]:
     """
@@ -102,10 +104,8 @@ def default_axes(controller: 'Law') -> tuple[Axis, ...]:
 
     Settings that give learned rules their meaning stay fixed once rules have been learned.
     """
-    if controller.kind == 'lqi':
-        return LQI_AXES
-    if controller.kind in ('ilc', 'mpc'):
-        return ILC_AXES if controller.kind == 'ilc' else MPC_AXES
+    if controller.kind in AXES_OF:
+        return AXES_OF[controller.kind]
     if controller.kind == 'pid':
         return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
     from pam_actuation.control.sofc.settings import SCALING
