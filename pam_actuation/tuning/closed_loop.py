@@ -236,15 +236,22 @@ class ClosedLoop(MuscleLoop):
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
-        from pam_actuation.tuning import baseline_rollouts, rollouts    # bring the compiler
+        from pam_actuation.tuning.rollouts import LOG       # brings the compiler with it
         controller.pause()
-        log = np.empty(self.ticks * size_of(rollouts.LOG))
-        name = f'{controller.kind}_rollout'
-        rollout = getattr(rollouts if hasattr(rollouts, name) else baseline_rollouts, name)
-        rollout(
+        log = np.empty(self.ticks * size_of(LOG))
+        _rollout_of(controller.kind)(
             self._fresh_plant(), self.hsv, self._driver.fresh(),
             self._timing, self._reference.rows(controller.lead_s),
             self._noise, self._quantum, self._disturbance,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.compiled_arguments(), controller.input_array, log)
-        return log.view(rollouts.LOG)
+        return log.view(LOG)
+
+
+def _rollout_of(kind: str) -> Callable[..., None]:
+    """Return the compiled loop of a law, whose module is imported with the first of its kind."""
+    if kind in ('ilc', 'mpc'):
+        from pam_actuation.tuning import baseline_rollouts
+        return getattr(baseline_rollouts, f'{kind}_rollout')
+    from pam_actuation.tuning import rollouts
+    return getattr(rollouts, f'{kind}_rollout')
