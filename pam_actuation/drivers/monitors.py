@@ -258,13 +258,15 @@ class AirMonitor:
         """
         self._time_s += elapsed_s
         now_s = self._time_s
+        # A command that a later one goes below is never the lowest again: the first one kept is.
+        while self._commands and self._commands[-1][1] >= command_pa:
+            self._commands.pop()
         for kept, value, longest_s in ((self._commands, command_pa, self._window_s),
                                        (self._readings, measured_pa, self.FALLS_S)):
             kept.append((now_s, value))
             while now_s - kept[0][0] > longest_s:
                 kept.popleft()
-        lowest_pa = min(value for _, value in self._commands)
-        if not measured_pa < lowest_pa - self.MISSING_PA:
+        if not measured_pa < self._commands[0][1] - self.MISSING_PA:
             self._falls_s = self._empty_s = 0.0
             return False
         if measured_pa < self._readings[0][1] - self._FALL_PA:
