@@ -31,7 +31,7 @@ from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 
 FAILED = 'failed'
-WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_sim.identify',),
+WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
         'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
 _ATTEMPTS = 4           # to find a cluster again that was lost
 _LOST = {'sizes': [], 'ambiguous': [], 'least': {}, 'bad': True}

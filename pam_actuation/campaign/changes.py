@@ -100,11 +100,15 @@ def changes_of(several: Sequence[Series], level: float = LEVEL) -> list[Change]:
         Probability of any change found where there is none.
 
     """
-    tested = [one for one in several
-              if len(one) >= FEWEST and int(one.named.sum()) >= FEWEST_NAMED]
+    tested = list(filter(is_tested, several))
     tests = len(tested) * len(SHAPES)
     found = [change for one in tested if (change := _change(one, tests)) is not None]
     return [one for one in found if one.p <= level]
+
+
+def is_tested(series: Series) -> bool:
+    """Tell whether a series has values enough, and names enough among them, for a test."""
+    return len(series) >= FEWEST and int(series.named.sum()) >= FEWEST_NAMED
 
 
 def _change(series: Series, tests: int) -> Change | None:

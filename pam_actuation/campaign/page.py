@@ -19,7 +19,7 @@ import math
 from typing import Any
 
 from pam_actuation.campaign.campaign import Campaign, plain
-from pam_actuation.campaign.changes import Change, FEWEST, FEWEST_NAMED, LEVEL
+from pam_actuation.campaign.changes import Change, FEWEST, FEWEST_NAMED, is_tested, LEVEL
 from pam_actuation.campaign.findings import Findings, sentence, SHOWN, shown
 from pam_actuation.campaign.series import IN_95, Series
 from pam_actuation.report import figures
@@ -31,7 +31,7 @@ LEAD = ('Every recording was worked on by itself. This page compares what was fo
 NOT_FIRST = 'No recording stands out.'
 MARKS = 'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz'
 MOST_SERIES = 40        # of those without a change that are drawn
-REPORTS = {'gap': 'report.html', 'report': 'report.html', 'identify': 'report.txt',
+REPORTS = {'gap': 'report.html', 'report': 'report.html', 'identify': 'report.html',
            'replay': 'report.txt'}
 
 
@@ -139,8 +139,7 @@ def _sizes(row: dict[str, Any]) -> str:
 
 
 def _method(findings: Findings) -> Section:
-    tested = sum(len(one) >= FEWEST and int(one.named.sum()) >= FEWEST_NAMED
-                 for one in findings.series)
+    tested = sum(map(is_tested, findings.series))
     return Section('method', 'How a change is decided', paragraph(
         f'A series is one quantity on one rig. {tested} series have {FEWEST} values or more and '
         f'are named {FEWEST_NAMED} times or more. A constant, a line over all days, a step and '

@@ -113,13 +113,13 @@ def gap(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Fou
 
 def identify(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Found:
     """Determine the unknown numbers of a rig from one recording; files as of the verb."""
+    from pam_actuation.report.identify import save_identification
     from pam_sim import load_rig
     from pam_sim.identify import identify as identified
     found = identified([run], load_rig(model), list(settings.unknown), [], settings.seed)
     data = found.to_dict()
-    write_text(folder / 'identify.json', json.dumps(data, indent=2) + '\n')
-    write_text(folder / 'rig.yaml', found.rig.to_yaml())
-    write_text(folder / 'report.txt', found.text() + '\n')
+    save_identification(found, [run], folder)
+    share_plotly(folder / 'report.html')
     known = [one for one in data['numbers'] if one['status'] == 'determined']
     open_names = [one['name'] for one in data['numbers'] if one not in known]
     return {'verdict': 'incomplete' if found.incomplete else (
