@@ -115,11 +115,11 @@ def find_cases(source: StrPath, without: StrPath | None = None) -> list[Case]:
 
 def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
     """Give the bags below a folder, by name."""
-    left_out = Path(without).resolve() if without is not None else None
+    left_out = os.path.realpath(without) if without is not None else None
     for place, names, files in os.walk(folder):
         here = Path(place)
         names[:] = sorted(name for name in names if not name.startswith('.')
-                          and (here / name).resolve() != left_out)
+                          and os.path.realpath(here / name) != left_out)
         if 'metadata.yaml' in files and here != folder:
             names[:] = []
             yield here

@@ -21,7 +21,6 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.common import (
     add_seed_option, emit, EXIT_DONE, EXIT_FINDING, progress)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
-from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
     from pam_actuation.campaign.campaign import Campaign
@@ -76,8 +75,6 @@ def run(args: argparse.Namespace) -> int:
     effects = tuple(args.effects.split(',')) if args.effects else ()
     for name in effects:
         get_effect(name, '--effects')
-    if os.path.lexists(args.out) and not os.path.isdir(args.out):
-        raise InputError('is not a folder; name one that is new or from an earlier call', args.out)
     cases = find_cases(args.recordings, without=args.out)
     settings = Settings(args.work, args.model or '', effects, args.seconds, args.materiality,
                         tuple(args.unknown), args.seed)

@@ -62,8 +62,6 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.view.server import ViewServer
     access = Access(args.host)
     namespace = '' if args.namespace is None else namespace_of(args.namespace, '--namespace')
-    if args.namespace is not None and not namespace:
-        raise InputError(f'{args.namespace!r} names none; leave it out for all', '--namespace')
     if args.bag is not None:
         if args.domain_id is not None:
             raise InputError('is for a running rig, not for a bag', '--domain-id')

@@ -82,6 +82,7 @@ VALUES = {
     'number above 0': (*NUMBERS, '-5', '-1e-9', '-1e300'),
     'count': (*NUMBERS, '-5', '1.5', '1e3', '-999999999999', '9' * 5000),
     'namespace in a bag': ('nothing', '/a/b/c', '//', LONG),
+    'namespace to show': ('nothing', '/a/b/c', LONG),
     'namespace': ('a b', '1abc', '/ä', 'a-b', '/../x'),
     'choice': ('', 'nothing_such', 'RIG', '-5', LONG),
     'effects': ('nothing_such', 'coulomb_friction,nothing_such', '../x', LONG),
@@ -167,7 +168,7 @@ VERBS = {
          Slot('--rig', 'rig'))],
     'status': [LIVE], 'estop': [LIVE], 'reset': [LIVE],
     'param': [(Slot('', 'choice', 'list'), Slot('', 'fixed', 'valve_driver'), *LIVE)],
-    'view': [(BAG, INSIDE, Slot('--port', 'count'))],
+    'view': [(BAG, Slot('--namespace', 'namespace to show'), Slot('--port', 'count'))],
     'campaign': [
         (Slot('', 'recordings', 'bag'), Slot('--out', 'folder', 'new'),
          Slot('--model', 'rig', RIG), Slot('--seed', 'count'), Slot('--jobs', 'count'))],
