@@ -112,7 +112,7 @@ def kept_folder(cases: Path, key: str) -> Iterator[Path]:
             with open(path, 'rb') as stream:
                 os.fsync(stream.fileno())
         # Where another worker was faster, the folder is there already and holds the same.
-        with contextlib.suppress(FileExistsError, OSError):
+        with contextlib.suppress(OSError):
             os.rename(folder, cases / key)
     finally:
         shutil.rmtree(folder, ignore_errors=True)

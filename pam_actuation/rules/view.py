@@ -106,8 +106,7 @@ def view_of(found: 'FoundRules', against: 'FoundRules | None' = None) -> View:
         other = _other_scaling(found.rules.scaling, against.rules.scaling)
         if other:
             remarks.append(f'{found.title} and {against.title} differ in {", ".join(other)}.')
-    if found.rules.covariance.any():
-        remarks.append(numbers_in_words(found.rules))
+    remarks += filter(None, [numbers_in_words(found.rules)])
     return View(found.rules, before, tuple(grids(found.rules, before)),
                 tuple(ranked(found.rules)), since, tuple(remarks))
 

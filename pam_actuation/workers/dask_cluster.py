@@ -131,9 +131,8 @@ class DaskCluster:
             call, [function] * n, [key] * n, [blob] * n, items, pure=False)]
         waiting = tasks
         while waiting:
-            self.wait(waiting)
-            for task in tasks:
-                if task.future.status not in ('pending', 'finished'):
+            for task in self.wait(waiting):
+                if task.future.status != 'finished':
                     task.result()       # raises
             waiting = [task for task in waiting if not task.future.done()]
         found: list[Any] = self._client.gather([task.future for task in tasks])
