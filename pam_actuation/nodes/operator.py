@@ -27,6 +27,7 @@ from typing import Any
 
 from pam_actuation.rigging.client import context_by_environment, local_context, RigClient
 import rclpy
+from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 NAME = 'operator'           # of the node, and of its enclave in the access policies
@@ -45,6 +46,33 @@ class Answer:
     domain_id: int
     done: bool | None = None
     message: str = ''
+
+
+def is_below(full_name: str, namespace: str) -> bool:
+    """Tell whether a full name lies in or below a namespace; of '' all full names do."""
+    return full_name.startswith(f'{namespace}/')
+
+
+def serving(node: Node, namespace: str, service: str, type_name: str = TRIGGER) -> list[str]:
+    """
+    Return the full names of the nodes known to offer a service, sorted.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        What it knows of the graph counts.
+    namespace : str
+        Only nodes in or below it; '' for all.
+    service : str
+        Name of the service below that of its node.
+    type_name : str
+        Type of the service.
+
+    """
+    ending = f'/{service}'
+    return sorted(
+        name.removesuffix(ending) for name, types in node.get_service_names_and_types()
+        if name.endswith(ending) and type_name in types and is_below(name, namespace))
 
 
 class Operator(RigClient):
@@ -82,15 +110,11 @@ class Operator(RigClient):
 
     def serving(self, service: str, type_name: str = TRIGGER) -> list[str]:
         """Return the full names of the nodes known to offer a service ``~/service``, sorted."""
-        ending = f'/{service}'
-        return sorted(
-            name.removesuffix(ending)
-            for name, types in self.node.get_service_names_and_types()
-            if name.endswith(ending) and type_name in types and self.concerns(name))
+        return serving(self.node, self.namespace, service, type_name)
 
     def concerns(self, full_name: str) -> bool:
         """Tell whether a name lies in or below the namespace."""
-        return full_name.startswith(f'{self.namespace}/')
+        return is_below(full_name, self.namespace)
 
     def call(self, node: str, service: str, service_type: Any, request: Any,
              timeout_s: float = ANSWER_S) -> Any:

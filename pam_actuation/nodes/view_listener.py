@@ -28,6 +28,7 @@ from typing import Any, Final
 from pam_actuation.bags.series import table
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.operator import is_below, serving
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.view_player import experiments, PLAYER, Playing, RECORDER
 from pam_actuation.rigging.client import context_by_environment
@@ -47,7 +48,6 @@ PAGE: Final = 'pam_view'            # beginning of the name of the node, and its
 DIAGNOSTICS: Final = '/diagnostics'
 POLL_S, LOOK_S = 0.02, 1.0          # for messages; for new topics and drivers
 ANSWER_S: Final = 2.0               # a driver answers within a tick; later it is told as silent
-SERVICE: Final = 'std_srvs/srv/Trigger'
 
 
 class ViewListener:
@@ -137,7 +137,7 @@ class ViewListener:
             if name not in self._topics and self._is_drawn(name, types):
                 self._add(name)
         self._players = sorted(self._found_players())
-        found = set(self._found_drivers())
+        found = set(serving(self._node, self._namespace, EMERGENCY_STOP))
         for driver in self._clients.keys() - found:
             for client in self._clients.pop(driver).values():
                 self._node.destroy_client(client)
@@ -149,14 +149,7 @@ class ViewListener:
     def _is_drawn(self, name: str, types: list[str]) -> bool:
         short = short_name(name)
         return (short in KEPT and BY_NAME[short].type_name in types
-                and (not self._namespace or name.startswith(f'{self._namespace}/')))
-
-    def _found_drivers(self) -> Iterator[str]:
-        for name, types in self._node.get_service_names_and_types():
-            node, _, action = name.rpartition('/')
-            if action == EMERGENCY_STOP and SERVICE in types and (
-                    not self._namespace or node.startswith(f'{self._namespace}/')):
-                yield node
+                and is_below(name, self._namespace))
 
     def _found_players(self) -> Iterator[str]:
         """Yield reference generators that are not recorded: a bag tells of one experiment."""
@@ -164,7 +157,8 @@ class ViewListener:
         recorded = [namespace for name, namespace in nodes if name == RECORDER]
         for name, namespace in nodes:
             full_name = f'{namespace.rstrip("/")}/{name}'
-            if name == PLAYER and self._is_of(full_name) and namespace not in recorded:
+            if name == PLAYER and is_below(full_name, self._namespace) and (
+                    namespace not in recorded):
                 yield full_name
 
     def _add(self, full_name: str) -> None:
@@ -179,7 +173,9 @@ class ViewListener:
         if full_name == DIAGNOSTICS:
             for raw in raws:
                 self.store.add_statuses(
-                    status for status in self._read(raw) or () if self._is_of(status.name))
+                    status for status in self._read(raw) or ()
+                    # Other programs name what they tell without a slash before it.
+                    if not self._namespace or is_below(status.name, self._namespace))
             return
         namespace, _, short = full_name.rpartition('/')
         stamps_ns, values, bad = table(short, raws, KEPT[short])
@@ -188,12 +184,11 @@ class ViewListener:
             values = {name: column[~bad] for name, column in values.items()}
         self.store.add(namespace, short, stamps_ns, values, subscription.lost)
 
-    def _is_of(self, node: str) -> bool:
-        return not self._namespace or node.startswith(f'{self._namespace}/')
-
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown(timeout_sec=1.0)
+        for subscription in self._topics.values():
+            subscription.destroy()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._node.context)
 
