@@ -17,14 +17,14 @@ How well dead time and lag from command to pressure are found within 10 s of mov
 
 Run ``python benchmarks/delay_estimate.py``, with ``--part`` for a part and ``--rigs`` for another
 number. The self-organizing controllers track sines, a random motion, steps and a gait in closed
-loop, sensor noise on. Their rigs differ from the nominal one: dead time 0 to 80 ms, lag 10 to
-150 ms, gain and zero of the regulator wrong by up to 5 % and 5 kPa, every second pressure sensor
-with a lag of up to 20 ms. The estimate sees the command and the measured pressure, nothing else.
+loop, sensor noise on. Their rigs differ from the nominal one in dead time (0 to 80 ms) and lag (10
+to 150 ms). Gain and zero of the regulator are wrong by up to 5 % and 5 kPa. Every second pressure
+sensor has a lag of up to 20 ms. The estimate sees the command and the measured pressure alone.
 
-ppr, hsv  the rigs of this package. Wanted is the first order model that answers best to random
-          steps, in open loop and without noise
-hidden    a simulator of other equations, behind a regulator, in closed loop with the controller
-change    the same, dead time and lag change after 30 s: when the new ones are found
+- ``ppr``, ``hsv``: the rigs of this package. Wanted is the first order model that answers best to
+  random steps, in open loop and without noise.
+- ``hidden``: a simulator of other equations, behind a regulator, in closed loop.
+- ``change``: dead time and lag change after 30 s. When are the new ones found?
 """
 
 import argparse

@@ -18,8 +18,8 @@ Run ``python benchmarks/live_starts.py --valve hsv --starts 20``. Each start is 
 processes, so that the phases between plant, controller and driver are drawn anew. It tracks 0.25,
 0.5 and 1 Hz one after the other, +-10 mm about 14 mm. The rules begin as they are after four
 simulations of the same reference, and go on learning. The error is root mean square over the last
-cycles of each sine, divided by that of the same classes with exact timing (median of six seeds of
-sensor noise), without and with the time that messages are on their way.
+cycles of each sine. It is divided by that of the same classes with exact timing, the median of six
+seeds of sensor noise. Those are simulated without and with the time that messages take.
 With ``--hidden`` the plant is a node of the independent simulator under test/hidden, another rig
 in every start. Rules are taught on the rig of this package then, and the exact timing is that of
 each hidden rig.

@@ -22,8 +22,8 @@ loop; every error is that of the muscle (reference less true contraction, no sen
 - ``sine``: +-10 mm about 14 mm, rules untaught at the start. Root mean square and largest error
   of the last of 20 cycles, and what of it repeats from cycle to cycle.
 - ``step``: 10 mm up and down. Error at the end of the hold, overshoot, and the time from the step
-  until the error stays within 0.1 mm. First and sixth step after sines, and the share of the steps
-  of eight seeds that are within 0.1 mm in time.
+  until the error stays within 0.1 mm. Shown are the first and the sixth step after sines. So is
+  the share of the steps of eight seeds that are within 0.1 mm in time.
 - ``gait``: knee flexion, ten strides at 0.8 Hz after ten at 0.5 Hz.
 - ``rigs``: random rigs that differ from the data sheet, +-6 mm about 12 mm. All start from the
   rules taught on the nominal rig, beside the same rules frozen.

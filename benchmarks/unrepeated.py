@@ -18,14 +18,16 @@ How well controllers track motions that never repeat and steps that nobody annou
 Run ``python benchmarks/unrepeated.py``, with ``--valve ppr`` and ``--controller sofc_ppr`` for a
 part of it, ``--quick`` for one motion and two rigs. Offline, in compiled closed loop with sensor
 noise; errors are those of the muscle. No seed of motion, noise or rigs was used for a search.
-With ``--hidden`` the same on rigs of the independent simulator under test/hidden: the muscle has
-other equations, and its friction, valve and dead time are off by up to 30 %.
+With ``--hidden`` the rigs are those of the independent simulator under test/hidden. The muscle has
+other equations there. Its friction, valve and dead time are off by up to 30 %.
 
-random  a sum of 40 sines of random phase from 0.02 to 1 Hz, at most 8 mm about 14 mm, told as it
-        comes or 0.3 s ahead: root mean square error of the first 30 s, untaught, and from 60 s on
-rigs    the same on random rigs a data sheet does not tell of; the driver knows the nominal rig
-step    10 mm up and down, not announced, on random rigs after 60 s of the random motion
-gait    knee flexion whose cadence changes every five strides, from the third stride on
+- ``random``: a sum of 40 sines of random phase from 0.02 to 1 Hz, at most 8 mm about 14 mm. It is
+  told as it comes, or 0.3 s ahead. Root mean square error of the first 30 s, untaught, and from
+  60 s on.
+- ``rigs``: the same on random rigs a data sheet does not tell of. The driver knows the nominal
+  rig.
+- ``step``: 10 mm up and down, not announced, on random rigs after 60 s of the random motion.
+- ``gait``: knee flexion whose cadence changes every five strides, from the third stride on.
 """
 
 import argparse

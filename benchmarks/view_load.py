@@ -18,8 +18,8 @@ What the live page costs a rig: missed ticks with and without it, processor, fra
     python benchmarks/view_load.py --seconds 20 --rounds 3
 
 Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live, all in one run. Phases take
-turns, so that each has its share of what else the machine does: no viewer, one page in a real
-browser, 20 pages, 20 pages with one that never reads beside them, and a viewer that is killed
+turns, so that each has its share of what else the machine does. The phases are: no viewer, one
+page in a real browser, 20 pages, 20 pages beside one that never reads, and a viewer that is killed
 (SIGKILL) and started again. With ``--alone`` viewer and pages have a nice value of -15, as on a
 machine that has nothing else to do. They get no real-time priority: Linux stops all such processes
 of a core for 50 ms a second if they use it up. Exit code 1 if driver or controller miss more ticks

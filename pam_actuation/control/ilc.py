@@ -16,14 +16,15 @@
 Iterative learning control on top of a PID with static inverse: a baseline for what repeats.
 
 The pressure learned for a moment of a cycle is that of the same moment one cycle ago, plus the
-error a little later then, behind a filter without phase (P-type with lead and Q-filter, Bristow,
-Tharayil and Alleyne 2006)::
+error a little later then. A filter without phase follows. This is the P-type with lead and
+Q-filter (Bristow, Tharayil and Alleyne 2006)::
 
     u[k] = Q (u + gamma e[+ lead])[k - cycle]
 
-The length of a cycle is found from the reference: two that are alike to 0.1 mm, between two of its
-minima, no longer than half of what is remembered. Where the reference leaves its cycle, what was
-learned fades, and a PID is left. It suits one cycle and knows nothing of the muscle.
+The length of a cycle is found from the reference, between two of its minima. Two cycles must be
+alike to 0.1 mm, and together no longer than what is remembered. Where the reference leaves its
+cycle, what was learned fades, and a PID is left. It suits one cycle and knows nothing of the
+muscle.
 """
 
 from collections.abc import Callable, Mapping

@@ -15,8 +15,8 @@
 """
 What can be wrong in a call of ``pam``: verbs with their arguments, and wrong values per kind.
 
-Every value listed for a kind is a mistake wherever an argument of that kind stands, so a
-call with one of them has to end with exit code 2.
+Every value listed for a kind is a mistake wherever an argument of that kind stands. A call with
+one of them has to end with exit code 2.
 """
 
 from dataclasses import dataclass

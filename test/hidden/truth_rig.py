@@ -15,9 +15,9 @@
 """
 A rig with hidden effects, written anew: nothing here comes from the packages under test.
 
-Formulation: the air is a mass and an inner energy (its pressure is a result), the state is
-advanced by the explicit midpoint rule with 0.1 ms, dry friction is a bristle, memory is slip
-elements with anchors or Dahl's differential equation.
+Formulation: the air is a mass and an inner energy; its pressure is a result. The state is advanced
+by the explicit midpoint rule with 0.1 ms. Dry friction is a bristle. Memory is slip elements with
+anchors, or Dahl's differential equation.
 """
 
 import math

@@ -23,8 +23,8 @@ contracting, 1 extending; a muscle with hysteresis needs different pressures on
 the two branches. Shortly after a reversal both are active in part. Motion rules:
 ``motion[m, n]`` [Pa] of "if the reference is near r_m and moves at about v_n then
 add c_mn"; the rates are dense about zero, where the muscle turns round. Path rules, where there
-are any: ``path[q, k]`` [Pa] of "if the contraction is near r_k and the path of length q before
-led there by contracting then add c_qk, by extending take it off"; set 0 is any path.
+are any: ``path[q, k]`` [Pa] of "if the contraction is near r_k and a path of length q led there
+then add c_qk". After a path that extended the muscle, c_qk is taken off. Set 0 is any path.
 
 Inference is product and weighted mean; degrees sum to 1, so the mean needs no division. This is
 the zero-order Sugeno form of the rule table of Procyk and Mamdani (Automatica 15, 1979).
