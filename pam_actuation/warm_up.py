@@ -44,7 +44,7 @@ NOMINAL_RIG = 'dmsp_5_300_hanging_mass'
 FORCE_RIG = 'dmsp_5_300_isometric_realistic'
 JOINT = 'joint_dmsp_5_300'
 VALVES = ('ppr', 'hsv')
-LAWS = ('sofc_ppr', 'pid', 'lqi')
+LAWS = ('sofc_ppr', 'pid', 'lqi', 'ilc_ppr', 'mpc_ppr')
 ROWS = 10       # of a rollout: it is compiled before the first one
 
 
