@@ -211,7 +211,6 @@ class PolledSubscription:
 
     def destroy(self) -> None:
         """Remove the subscription from its node."""
-        self.mismatches.destroy()
         self._node.destroy_subscription(self._subscription)
 
 

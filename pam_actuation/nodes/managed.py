@@ -344,8 +344,6 @@ class ManagedNode(LifecycleNode):
         alive until the process ends. There Fast DDS takes its tables down under the threads
         that still receive, which now and then ended a process by a segmentation fault.
         """
-        for subscription in self.subscriptions_polled:
-            subscription.mismatches.destroy()       # holds the participant as well
         super().destroy_node()      # type: ignore[no-untyped-call]  # rclpy has no annotations
         del self._state_machine
 

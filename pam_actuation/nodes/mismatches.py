@@ -31,6 +31,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 PATIENCE_S = 2.0        # the graph is behind the event, and names of nodes are even later
 NAMELESS = '_NODE_NAME_UNKNOWN_'
+INCOMPATIBLE = QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS
 
 
 class Mismatches:
@@ -50,19 +51,12 @@ class Mismatches:
 
     def __init__(self, node: Node, subscription: Any, may_override: bool) -> None:
         self._node = node
+        self._subscription = subscription
         self._topic = subscription.topic_name
         self._profile = subscription.qos_profile
         self._may_override = may_override
         self._counted = 0
         self._since_s: float | None = None      # the last event, while it may concern anybody
-        self._event: Any = None
-        try:
-            with subscription.handle:
-                self._event = rclpy_implementation.EventHandle(
-                    subscription.handle,
-                    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS)
-        except UnsupportedEventTypeError:
-            pass                # of another middleware: nothing is told
 
     def sentences(self) -> list[str]:
         """Return one sentence for each such publisher there is now, with the line to write."""
@@ -82,11 +76,20 @@ class Mismatches:
         return [self._sentence(*one) for one in found]
 
     def _has_new(self) -> bool:
-        """Tell whether the middleware has counted another such publisher since the last call."""
-        if self._event is None:
+        """
+        Tell whether the middleware has counted another such publisher since the last call.
+
+        The middleware counts in the subscription. An event lasts for one call only: as long as
+        it exists, the participant of a destroyed node stays on the graph.
+        """
+        handle = self._subscription.handle
+        try:
+            with handle:
+                event = rclpy_implementation.EventHandle(handle, INCOMPATIBLE)
+                with event:
+                    status = event.take_event()
+        except UnsupportedEventTypeError:       # by another middleware: nothing is told
             return False
-        with self._event:
-            status = self._event.take_event()
         before, self._counted = self._counted, status.total_count if status else self._counted
         return self._counted > before
 
@@ -100,9 +103,3 @@ class Mismatches:
                 'reliability:=best_effort' if self._may_override else '')
         return (f'{who} sends {self._topic} best effort, which is not received here; let it '
                 f'publish reliable{here}')
-
-    def destroy(self) -> None:
-        """Give the event back to the middleware."""
-        if self._event is not None:
-            self._event.destroy_when_not_in_use()
-            self._event = None

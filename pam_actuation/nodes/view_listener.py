@@ -187,8 +187,6 @@ class ViewListener:
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown(timeout_sec=1.0)
-        for subscription in self._topics.values():
-            subscription.destroy()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._node.context)
 
