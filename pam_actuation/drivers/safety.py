@@ -23,11 +23,9 @@ certified safety function.
 """
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 import math
 import re
-from typing import TypeVar
 
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
@@ -79,7 +77,6 @@ def _without_figures(fault: Fault) -> tuple[str, str]:
 
 Reading = tuple[int, float]                         # stamp [ns], pressure [Pa]
 Command = tuple[int, float, int | None, bool]       # and number, whether it is a duty
-Queued = TypeVar('Queued')
 
 
 @dataclass
@@ -89,11 +86,6 @@ class _Pending:
     command: deque[Command] = field(default_factory=lambda: deque(maxlen=_QUEUE))
     pressure: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
     supply: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
-
-
-def _taken(queue: deque[Queued]) -> Iterator[Queued]:
-    while queue:
-        yield queue.popleft()
 
 
 class SafetySupervisor:
@@ -264,15 +256,17 @@ class SafetySupervisor:
         self.command_pa = math.nan
 
     def _drain(self, now_ns: int) -> None:
-        for stamp_ns, value in _taken(self._pending.pressure):
+        pending = self._pending
+        while pending.pressure:
+            stamp_ns, value = pending.pressure.popleft()
             if self.pressure.offer(stamp_ns, value, now_ns):
                 self._seen_pressure = True
                 self.frozen.reading(stamp_ns, value)
                 self._check_over_pressure(value)
-        for stamp_ns, value in _taken(self._pending.supply):
-            self.supply.offer(stamp_ns, value, now_ns)
-        for stamp_ns, value, sequence, is_duty in _taken(self._pending.command):
-            self._take_command(stamp_ns, value, sequence, is_duty, now_ns)
+        while pending.supply:
+            self.supply.offer(*pending.supply.popleft(), now_ns)
+        while pending.command:
+            self._take_command(*pending.command.popleft(), now_ns)
 
     def _check_over_pressure(self, measured_pa: float) -> None:
         trip = self.limits.trip_gauge_pa
@@ -451,9 +445,10 @@ class SafetySupervisor:
                              ' and waits for the measured pressure, which stays behind (air '
                              'supply, another node that vents, gain of the regulator?)'
                              if self._rise.waited_s > WAITS_LONG_S else ''))
-        self._warnings = {key: item for key, item in self._warnings.items()
-                          if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}
-        texts += [text for text, _ in self._warnings.values()]
+        if self._warnings:
+            self._warnings = {key: item for key, item in self._warnings.items()
+                              if 0 <= now_ns - item[1] <= _WARNING_HOLD_NS}
+            texts += [text for text, _ in self._warnings.values()]
         level = LEVEL_WARN if self._warnings else LEVEL_OK
         message = '; '.join(texts) if texts else what
         return Decision(OK, target, level, message, '', tuple(self._warnings), duty)
