@@ -109,13 +109,14 @@ interrupts.end_interrupted()
 def test_what_was_asked_too_late_does_not_end_the_process(tmp_path):
     """The interpreter gives SIGALRM its deadly default back while it ends."""
     code = BEGIN + """
+interrupts.AGAIN_S = 0.2        # surely after main(), on a busy machine as well
 class Owner:
     def __del__(self):
         ask()
         print('closed')
 class Last:
     def __del__(self, sleep=time.sleep):
-        sleep(0.1)
+        sleep(0.4)
 last = Last()
 def main():
     interrupts.Worker()
