@@ -23,6 +23,7 @@ from pam_actuation.messages import Pressure
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.ros_messages import class_of
+from pam_actuation.rigging import node_template
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
@@ -66,7 +67,8 @@ class LiveRig:
         log_dir.mkdir(exist_ok=True)
         process = NodeProcess(
             name, f'{self._namespace}/{below}'.rstrip('/'), parameters, self.environment,
-            log_dir)
+            log_dir, template=node_template.template_for(
+                node_template.OF_A_RUN, self.environment))
         # Also those that others replace by name: after a failed test they may still run.
         self._started.append(process)
         self.processes[f'{below}/{name}' if below else name] = process
