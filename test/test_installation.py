@@ -42,7 +42,7 @@ SOURCES = (
 
 # Raises on any import of ROS, as on a machine without it.
 # Within a second, at the first use.
-SOON_COMPILED = {'walk_messages', 'sample_into', 'residual_sum'}
+SOON_COMPILED = {'walk_many_messages', 'sample_into', 'residual_sum'}
 
 NO_ROS = """
 import sys

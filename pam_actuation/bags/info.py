@@ -39,7 +39,7 @@ from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
-from pam_actuation.topics.table import OF_A_RUN, short_name
+from pam_actuation.topics.table import OF_A_RUN, short_name, TOPICS
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -48,6 +48,8 @@ __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
 
 # An interval between stamps this many times the usual one counts as a gap.
 GAP_FACTOR = 2.5
+# Every message of the rig begins with a header; of others the type store has to be read.
+_WITH_HEADER = {row.type_name for row in TOPICS}
 
 
 @dataclass
@@ -266,6 +268,8 @@ def _stamps_and_values(topic: TopicData,
 
 
 def _has_header(topic: TopicData) -> bool:
+    if topic.encoding == 'cdr' and topic.type_name in _WITH_HEADER:
+        return True
     fields = typestore().fielddefs.get(topic.type_name)
     return bool(
         topic.encoding == 'cdr' and fields and fields[1]

@@ -25,16 +25,15 @@ from dataclasses import dataclass, field
 import io
 import os
 import struct
-from typing import BinaryIO, TYPE_CHECKING
+from typing import BinaryIO
 import zlib
 
 import lz4.frame
 import numpy as np
-from pam_sim.annotations import ByteArray
+from pam_actuation.bags.message_batch import MessageBatch, MessageColumns
+from pam_actuation.bags.record_walk import walk_messages
+from pam_sim.annotations import ByteArray, IntArray
 import zstandard
-
-if TYPE_CHECKING:
-    from pam_actuation.bags.message_batch import MessageColumns
 
 # Whether to keep the messages of a channel, by topic, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
@@ -45,8 +44,8 @@ _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 1, 2, 3, 4, 5, 6
 _METADATA, _DATA_END = 12, 15
 _READ_BYTES = 1024 * 1024
 _POSITIONS = 2**16
-# To load compiled code takes half a second, as long as 60000 messages take without it.
-_FEW_MESSAGES = 5000
+# To start the compiler takes half a second, as long as a million messages take without it.
+_FEW_MESSAGES = 500_000
 _RECORD = struct.Struct('<BQ')
 _CHUNK_HEAD = struct.Struct('<QQQI')
 _U16 = struct.Struct('<H')
@@ -73,7 +72,7 @@ class Channel:
     schema_encoding: str
     schema: str
     metadata: dict[str, str]
-    messages: 'MessageColumns'
+    messages: MessageColumns
 
 
 @dataclass
@@ -135,15 +134,10 @@ def _read(stream: BinaryIO, position: int, size: int) -> bytes:
 
 class _Scanner:
 
-    # Messages walked over by interpreted code, in all files of this process.
-    interpreted = 0
+    # Messages walked over without the compiler, in all files of this process.
+    walked = 0
 
     def __init__(self, content: McapContent, stream: BinaryIO, wanted: Wanted | None) -> None:
-        # Imported late: a recorder reads bags only after a crash, the compiler is large.
-        from pam_actuation.bags.message_batch import MessageBatch
-        from pam_actuation.bags.record_walk import walk_messages
-        from pam_sim.compiled import interpreted
-        self._compiled, self._interpreted = walk_messages, interpreted(walk_messages)
         self._positions = np.empty(_POSITIONS, dtype=np.int64)
         self._unpack_zstd = zstandard.ZstdDecompressor().decompress
         self.content = content
@@ -252,17 +246,22 @@ class _Scanner:
     def _messages(self, view: ByteArray, position: int) -> int:
         """Take the messages that follow each other; return where anything else begins."""
         while True:
-            if _Scanner.interpreted < _FEW_MESSAGES:
-                count, end = self._interpreted(view, position, self._positions[:_FEW_MESSAGES])
-                _Scanner.interpreted += count
-            else:
-                count, end = self._compiled(view, position, self._positions)
+            count, end = self._walk(view, position, self._positions)
             if not count:
                 return position
             records = view[position:end]
             if self.batch.add(records, self._positions[:count] - position) < count:
                 raise Damaged('a message of an unknown channel', self.where)
             position = int(end)
+
+    def _walk(self, view: ByteArray, begin: int, positions: IntArray) -> tuple[int, int]:
+        """Return ``walk_messages`` of the arguments; with the compiler once they are many."""
+        if _Scanner.walked >= _FEW_MESSAGES:
+            from pam_actuation.bags.record_walk_compiled import walk_many_messages
+            return walk_many_messages(view, begin, positions)
+        count, end = walk_messages(view, begin, positions)
+        _Scanner.walked += count
+        return count, end
 
     def _loose_messages(self, position: int, length: int) -> int:
         """Take messages outside of chunks, a block of the file at a time."""

@@ -12,14 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Find the messages among MCAP records: one compiled loop instead of a Python call each."""
+"""
+Find the messages among MCAP records, one after the other.
 
+``walk_messages`` is plain Python, and at once there. ``record_walk_compiled`` has the same for
+large files, where the compiler is worth its start.
+"""
+
+import struct
 from typing import Any
 
-from numba import njit
 import numpy as np
 from pam_sim.annotations import ByteArray, IntArray
-from pam_sim.compiled import Compiler
 
 RECORD_BYTES = 9                       # opcode and length in front of every record
 MESSAGE_BYTES = RECORD_BYTES + 22      # and channel, sequence and two times of a message
@@ -28,12 +32,9 @@ MESSAGE_OPCODE = 5
 MESSAGE_HEAD = np.dtype([
     ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
     ('log_time_ns', '<u8'), ('publish_time_ns', '<u8')])
+_RECORD = struct.Struct('<BQ')
 
 
-_compiled: Compiler = njit(cache=True, error_model='numpy', nogil=True)
-
-
-@_compiled
 def walk_messages(data: ByteArray, begin: int, positions: IntArray) -> tuple[int, int]:
     """
     Walk over the message records that follow each other from ``begin`` on.
@@ -56,19 +57,18 @@ def walk_messages(data: ByteArray, begin: int, positions: IntArray) -> tuple[int
         into ``data``, at the end, or where ``positions`` is full.
 
     """
-    position, count = begin, 0
-    while (count < len(positions) and position + MESSAGE_BYTES <= len(data)
-           and data[position] == MESSAGE_OPCODE):
-        length: Any = np.int64(0)
-        for i in range(8):
-            length |= np.int64(data[position + 1 + i]) << np.int64(8 * i)
-        # A length with its highest bit set has become negative.
-        if length < MESSAGE_BYTES - RECORD_BYTES or length > len(data) - position - RECORD_BYTES:
+    records, size, room = data.data, len(data), len(positions)
+    position = begin
+    found: list[int] = []
+    while len(found) < room and position + MESSAGE_BYTES <= size:
+        opcode, length = _RECORD.unpack_from(records, position)
+        if (opcode != MESSAGE_OPCODE or length < MESSAGE_BYTES - RECORD_BYTES
+                or length > size - position - RECORD_BYTES):
             break
-        positions[count] = position
-        count += 1
+        found.append(position)
         position += RECORD_BYTES + length
-    return count, position
+    positions[:len(found)] = found
+    return len(found), position
 
 
 def windows(data: ByteArray, size: int) -> 'np.ndarray[Any, np.dtype[np.void]]':

@@ -35,8 +35,6 @@ from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.short_repr import short_repr
-from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.errors import ReaderError
 
 # Whether to keep the messages of a topic, by its name, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
@@ -271,6 +269,8 @@ def _full_type_name(name: str) -> str:
 
 
 def _read_with_rosbags(path: Path, opened: Path, wanted: Wanted | None) -> Bag:
+    from rosbags.rosbag2 import Reader
+    from rosbags.rosbag2.errors import ReaderError
     bag = Bag(path=path, storage='sqlite3')
     try:
         with Reader(opened) as reader:

@@ -24,12 +24,12 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.options import (  # noqa: F401, the codes are for the verbs
     count, EXIT_BAD_INPUT as EXIT_BAD_INPUT, EXIT_DONE as EXIT_DONE,
     EXIT_FINDING as EXIT_FINDING, HIGHEST_SEED, Parser, source)
-from tqdm import tqdm
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
+    from tqdm import tqdm
 
 
 def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
@@ -84,12 +84,13 @@ def note_implausible(args: argparse.Namespace, runs: 'list[RecordedRun]',
 
 
 def progress(args: argparse.Namespace, total: float, unit: str = '',
-             description: str = '') -> tqdm:
+             description: str = '') -> 'tqdm':
     """
     Return a tqdm bar on stderr; silent with ``--json`` or when stderr is no terminal.
 
     A log file gets no thousand redrawn lines; set PAM_PROGRESS=1 to force the bar.
     """
+    from tqdm import tqdm
     quiet = args.json or not (sys.stderr.isatty() or os.environ.get('PAM_PROGRESS'))
     return tqdm(
         total=total, unit=unit, desc=description, disable=quiet, file=sys.stderr,

@@ -40,7 +40,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, interpreted
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.muscle.geometry import braid
@@ -101,8 +101,9 @@ EFFECT = Effect(
     amplitude=('friction_coefficient',),
     reported=(Reported(
         'force_at_400kpa_n', 'N', lambda values, rig: float(
-            friction_n(_REFERENCE_PA, rig.muscle.length_m - _REFERENCE_M,
-                       *_constants(values, rig.muscle)))),),
+            interpreted(friction_n)(
+                _REFERENCE_PA, rig.muscle.length_m - _REFERENCE_M,
+                *_constants(values, rig.muscle)))),),
     packed=record(
         'friction_per_pa_m', 'patch_m3_per_pa', 'radius_m', 'length_m', 'atmosphere_pa'),
     pack=_pack,

@@ -24,7 +24,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, interpreted
 from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -49,7 +49,7 @@ def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
 
 def flow_at_400kpa(values: Mapping[str, float], rig: 'Rig') -> float:
     """Return the mass flow of the orifice at 400 kPa gauge [kg/s]."""
-    return float(mass_flow_kg_per_s(
+    return float(interpreted(mass_flow_kg_per_s)(
         400e3 + P_ATM_PA, P_ATM_PA, values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
         CRITICAL_RATIO))
 

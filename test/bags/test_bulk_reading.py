@@ -24,6 +24,7 @@ from pam_actuation import messages
 from pam_actuation.bags import mcap_scan, series
 from pam_actuation.bags.payloads import Payloads
 from pam_actuation.bags.record_walk import walk_messages
+from pam_actuation.bags.record_walk_compiled import walk_many_messages
 from pam_actuation.topics import cdr, codec
 from pam_actuation.topics.definitions import typestore
 import pytest
@@ -65,13 +66,12 @@ def test_messages_of_every_length_come_in_order(options):
 
 def test_walk_is_the_same_without_compiler():
     record = struct.pack('<BQHIQQ', 5, 22 + 3, 1, 0, 1, 2) + b'abc'
-    walk = getattr(walk_messages, 'py_func', walk_messages)
     for data in (record * 3, record * 3 + b'\x07' + bytes(40), record + record[:-1], b'',
                  record + b'\x05' + struct.pack('<Q', 2**64 - 1) + bytes(40),
                  record + b'\x05' + struct.pack('<Q', 21) + bytes(40)):
         view = np.frombuffer(data, dtype=np.uint8)
         results = []
-        for one in (walk_messages, walk):
+        for one in (walk_many_messages, walk_messages):
             positions = np.full(2, -1)
             results.append([*one(view, 0, positions), *positions])
         assert results[0] == results[1]

@@ -54,6 +54,8 @@ def test_names_are_unique_and_words_are_known():
     for topic in TOPICS:
         assert topic.place in ('muscle', 'joint', 'root') and topic.meaning
         assert topic.need in ('needed', 'used', 'extra')
+        # Told without the type store, which takes long to read.
+        assert typestore().fielddefs[topic.type_name][1][0][0] == 'header'
         assert topic.missing in ('told', 'kept', 'allowed')
         if topic.numeric:
             assert set(topic.limits) <= set(topic.numeric.always)
