@@ -82,16 +82,12 @@ def draw(folder: Path) -> dict[str, str]:
     _errors(runs[1], corrected, folder)
     shares = _screened(runs[0], folder)
     plain = result.to_dict()
-    parts = {part: sum(one['share_of_gap'] for one in plain['where'] if one['subsystem'] == part
-                       and one['condition'] == 'all' and one['signal'] == 'contraction')
-             for part in ('valve', 'muscle', 'load')}
     low, high = plain['effects'][0]['equivalent']['loop_half_width_at_400kpa_n']['ci95']
     return {
-        'verdict': ' '.join(result.text().split('\n')[0].split()),
         **{f'line {k}': ' '.join(line.split())
-           for k, line in enumerate(result.text().split('\n')[1:], 2)},
+           for k, line in enumerate(result.text().split('\n'), 1)},
         'interval': f'{low:.2f} to {high:.2f} N',
-        'share of the muscle': f'{100.0 * parts["muscle"]:.0f} %',
+        'share of the muscle': f'{100.0 * plain["where"][0]["share_of_gap"]:.0f} %',
         **{f'{name} explains': f'{100.0 * share:.0f} %' for name, share in shares.items()
            if name in (*EFFECTS[:4], 'numbers')}}
 

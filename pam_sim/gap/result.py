@@ -58,17 +58,31 @@ class SignalGap:
 
 @dataclass(frozen=True)
 class Share:
-    """A part of the gap: of ``signal``, caused in ``subsystem``, under ``condition``."""
+    """
+    A part of the gap: of ``signal``, caused in ``subsystem``, under ``condition``.
+
+    ``certainty`` that it is this subsystem, 0 to 1, is stated of the first row alone.
+    """
 
     subsystem: str
     signal: str
     condition: str
     share_of_gap: float
+    certainty: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of gap.json."""
         return {'subsystem': self.subsystem, 'signal': self.signal,
-                'condition': self.condition, 'share_of_gap': self.share_of_gap}
+                'condition': self.condition, 'share_of_gap': self.share_of_gap,
+                'certainty': self.certainty}
+
+    def text(self) -> str:
+        """Return the place in one sentence."""
+        subsystem = {'sensor': f'sensor of the {self.signal}'}.get(self.subsystem, self.subsystem)
+        when = '' if self.condition == 'all' else f', {_when(self.condition)}'
+        sure = '' if self.certainty is None else f' (certainty {self.certainty:.2f})'
+        return (f'After calibration the disagreement lives in the {subsystem}{sure}: '
+                f'{100 * self.share_of_gap:.0f} % of the squared gap in {self.signal}{when}.')
 
 
 @dataclass(frozen=True)
@@ -170,7 +184,8 @@ class GapResult:
     signals : dict of str -> SignalGap
         By signal name; signals that were not recorded are absent.
     where : list of Share
-        Shares of the squared gap by subsystem and by condition.
+        The first row is the place in which the disagreement lives after calibration. Then
+        the shares of the squared gap of the whole chain by subsystem and by condition.
     parameters : list of Calibrated
         Numbers found wrong.
     calibration : list of Calibrated
@@ -227,9 +242,15 @@ class GapResult:
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
 
+    @property
+    def place(self) -> str:
+        """Return in one sentence where the disagreement lives; empty where there is none."""
+        return self.where[0].text() if self.where else ''
+
     def text(self) -> str:
         """Return the result in lines for a person."""
-        rows = [*self.first_lines, f'{self.verdict}: {self.reason}']
+        rows = [*self.first_lines, *([self.place] if self.place else []),
+                f'{self.verdict}: {self.reason}']
         rows += [f'  {name}: {found.text()}' for name, found in self.subsystems.items()]
         for name, s in self.signals.items():
             factor, unit = READABLE[name]
@@ -253,6 +274,13 @@ class GapResult:
             'fingerprint': self.fingerprint, 'minimum_detectable': self.minimum_detectable,
             'runtime_s': self.runtime_s, 'simulations': self.simulations,
             'reason': self.reason, 'numbers_first': self.numbers_first})
+
+
+def _when(condition: str) -> str:
+    """Return a condition as the end of a sentence."""
+    if condition in ('contracting', 'extending'):
+        return f'while {condition}'
+    return f'at {condition}' if condition[0].isdigit() else condition
 
 
 def _finite(value: Any) -> Any:

@@ -26,9 +26,9 @@ from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
-from pam_sim.gap.report.by_subsystem import subsystem_verdicts
+from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
-from pam_sim.gap.report.location import locate
+from pam_sim.gap.report.place import places
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.context import context_of
@@ -163,7 +163,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
     result.subsystems = subsystem_verdicts(
         result, outcome.named, own_runs, criteria, materiality)
-    result.where = locate(rig, validation.recording, validation.before, validation.floor)
+    result.where = places(
+        result, outcome, estimator, validation, own_runs, final, certify is not None)
+    add_place(result)
     result.traces = validation.traces()
     result.fingerprint = fingerprint(estimator, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)

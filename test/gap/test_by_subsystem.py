@@ -55,8 +55,8 @@ def test_a_valve_without_a_name_takes_none_from_the_muscle(own_proof):
     assert muscle.unexplained_fraction < 0.05 < result.unexplained_fraction
     assert muscle.gap.rmse_after < muscle.gap.noise_floor < muscle.gap.rmse_refit
     lines = result.text().splitlines()
-    assert lines[1].startswith('  valve: ') and lines[1].endswith(' kPa unexplained')
-    assert lines[2].startswith('  muscle: coulomb_friction, ')
+    assert lines[2].startswith('  valve: ') and lines[2].endswith(' kPa unexplained')
+    assert lines[3].startswith('  muscle: coulomb_friction, ')
     page = gap_section(result).body
     assert 'By subsystem' in page and '% of the squared gap' in page
 

@@ -55,6 +55,7 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
 
     """
     body = paragraph(remark) if remark else ''
+    body += paragraph(result.place) if result.place else ''
     body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
     body += _subsystems(result)
     if result.signals:
@@ -148,11 +149,12 @@ def _next(result: 'GapResult', command: str) -> str:
 def _where(result: 'GapResult') -> str:
     if not result.where:
         return ''
-    whole = [w for w in result.where if w.condition == 'all']
-    body = '<h3>Where the gap sits</h3>'
+    rows = result.where[1:]
+    whole = [w for w in rows if w.condition == 'all']
+    body = '<h3>Where the gap of the whole chain sits</h3>'
     body += table(['signal', 'subsystem', 'share of the squared gap'],
                   [[w.signal, w.subsystem, f'{100 * w.share_of_gap:.0f} %'] for w in whole])
-    parts = [w for w in result.where if w.condition != 'all']
+    parts = [w for w in rows if w.condition != 'all']
     names = list(dict.fromkeys(w.condition for w in parts))
     groups = []
     for signal, role in (('pressure', 'after'), ('contraction', 'second'), ('force', 'green')):

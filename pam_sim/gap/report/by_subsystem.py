@@ -79,6 +79,15 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
             for s, one in found.items()}
 
 
+def add_place(result: GapResult) -> None:
+    """Add the subsystem of the first row of ``where`` where it is unknown and not yet told of."""
+    place = result.where[0].subsystem if result.where else ''
+    if result.verdict == 'unknown' and place and place not in result.subsystems:
+        found = {**result.subsystems, place: next(
+            one for one in result.subsystems.values() if one.verdict == 'unknown')}
+        result.subsystems = {s: found[s] for s in SUBSYSTEMS if s in found}
+
+
 def subsystem_of(name: str) -> str:
     """Return the subsystem of an effect or of a parameter of a rig."""
     if name in effects():

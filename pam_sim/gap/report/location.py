@@ -13,18 +13,20 @@
 # limitations under the License.
 
 """
-Where the gap sits: which subsystem makes it, and under which condition.
+How the gap of the whole chain divides, by subsystem and by condition.
 
 Subsystems are cut at measured signals. With the measured pressure as input, the valve plays no
 role, and the remaining gap belongs to muscle and load. With the measured contraction as input too,
 the load cell shows what the muscle alone misses. Force and measured motion show what the load
-misses. The subsystem needs no knowledge of what is missing.
+misses. The cut needs no knowledge of what is missing; what is named stands in its own subsystem.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.result import Share
 from pam_sim.gap.subsystems.simulation import pressure_driven, run_from_pressure, simulate_driven
@@ -36,23 +38,28 @@ MOVING_M_PER_S = 1e-3
 AT_STOP_M = 3e-4             # nearer to the lower stop the force balance is not the muscle's
 BANDS = 3
 ROUND_PA = 10e3
+FORCE_SMOOTH_S = 0.02        # width (standard deviation) of the smoothing of a balance of forces
+MOST_SCALE, MOST_SKEW_S = 0.07, 3e-3         # of it, that calibration may take up
+SMALL_PART = 0.1             # of two errors: what they leave of each other is none
 
 
 def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
-           floor: Mapping[str, float]) -> list[Share]:
+           floor: Mapping[str, float], only: Mapping[str, str] | None = None) -> list[Share]:
     """
     Return the shares of the squared gap.
 
     Parameters
     ----------
     rig : pam_sim.Rig
-        The given model.
+        The calibrated model.
     recording : Recording
         The measurements.
     simulated : dict of str -> numpy.ndarray
-        Whole-chain free run of the given model at the stamps.
+        Whole-chain free run of the calibrated model at the stamps.
     floor : dict of str -> float
         Noise floor of each signal.
+    only : dict of str -> str, optional
+        The subsystem that makes all of the gap of a signal, where that is known.
 
     Returns
     -------
@@ -64,19 +71,22 @@ def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
     """
     found = []
     by_pressure = run_from_pressure(rig, recording)
-    muscle_share = muscle_part(rig, recording, floor)
+    forces = force_errors(rig, recording)
+    muscle_share = None if forces is None else forces.muscle_part
     for signal in recording.signals:
         residual = simulated[signal] - recording.measured[signal]
         if _squared(residual, floor[signal]) <= 0.0:
             continue
-        if signal == 'pressure':
+        if only and signal in only:
+            parts = {only[signal]: 1.0}
+        elif signal == 'pressure':
             parts = {'valve': 1.0}
         else:
             parts = _split(residual, by_pressure[signal] - recording.measured[signal],
                            floor[signal], muscle_share, rig.load)
         found += [Share(name, signal, 'all', share) for name, share in parts.items()]
         main = max(parts, key=lambda name: parts[name])
-        for conditions in (_directions(recording, signal), _bands(recording, signal)):
+        for conditions in signal_conditions(recording, recording.time_s[signal])[:2]:
             found += _by_condition(residual, floor[signal], conditions, main, signal)
     return found
 
@@ -102,34 +112,70 @@ def _split(whole: FloatArray, without_valve: FloatArray, floor: float, muscle_sh
             'load': rest / total * (1.0 - muscle_share)}
 
 
-def muscle_part(rig: Rig, recording: Recording, floor: Mapping[str, float]) -> float | None:
+@dataclass(frozen=True)
+class ForceErrors:
     """
-    Return which part (0 to 1) of the force error belongs to the muscle, not to the load.
+    Errors of the balance of forces, squared, beyond the noise of the load cell [N^2].
+
+    ``muscle``: tension of the model against the cell. ``load``: weight and inertia against the
+    cell. ``both``: tension against weight and inertia, without the cell.
+    """
+
+    muscle: float
+    load: float
+    both: float
+
+    @property
+    def muscle_part(self) -> float | None:
+        """Return which part (0 to 1) belongs to the muscle, None where there is no error."""
+        whole = self.muscle + self.load
+        return self.muscle / whole if whole > 0.0 else None
+
+    @property
+    def is_of_cell(self) -> bool:
+        """Return whether the cell contradicts muscle and load, which agree with each other."""
+        return self.both < SMALL_PART * min(self.muscle, self.load)
+
+
+def force_errors(rig: Rig, recording: Recording) -> ForceErrors | None:
+    """
+    Return the ForceErrors of a model on a recording.
 
     Muscle: tension of the model at measured pressure and contraction against the load
-    cell. Load: m (a + g) of the measured motion against the load cell. None without
+    cell. Load: m (a + g) of the measured motion against the load cell. All are smoothed alike.
+    What a scale of each side and a skew of the stamps explain is no error. None without
     a load cell or where the mass never leaves its stop.
     """
     if 'force' not in recording.signals or rig.load != 'hanging_mass':
         return None
-    grid = recording.grid_s
-    cell = np.interp(grid, recording.time_s['force'], recording.measured['force'])
-    x, _, a = smooth_motion(recording)
+    from scipy.ndimage import gaussian_filter1d       # slow to import
+    grid, steps = recording.grid_s, FORCE_SMOOTH_S / GRID_S
+    cell, x = (np.interp(grid, recording.time_s[s], recording.measured[s])
+               for s in ('force', 'contraction'))
     lifted = x > AT_STOP_M
     if lifted.mean() < 0.05:
         return None
-    tension = simulate_driven(pressure_driven(rig), recording, x).force_n
+    tension = simulate_driven(pressure_driven(rig), recording, smooth_motion(recording)[0]).force_n
+    acceleration = gaussian_filter1d(x, steps, order=2) / GRID_S ** 2
     external = recording.external_force_n
-    weight = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
+    weight = rig.parameters['mass_kg'] * (acceleration + GRAVITY_M_PER_S2)
     if external is not None:
-        weight = weight + np.append(external, external[-1])
-    muscle = _averaged(tension - cell)[lifted]
-    load = _averaged(weight - cell)[lifted]
-    # Averaging over the window leaves this much of the cell's noise.
-    left = floor['force'] * np.sqrt(max(GRID_S / SMOOTH_S, 1e-3))
-    of_muscle, of_load = _squared(muscle, left), _squared(load, left)
-    whole = of_muscle + of_load
-    return float(of_muscle / whole) if whole > 0.0 else None
+        weight = weight + gaussian_filter1d(np.append(external, external[-1]), steps)
+    tension, cell = (gaussian_filter1d(y, steps) for y in (tension, cell))
+    period_s = float(np.median(np.diff(recording.time_s['force'])))
+    left = noise_sd(recording.measured['force']) * np.sqrt(
+        period_s / (2.0 * np.sqrt(np.pi) * FORCE_SMOOTH_S))
+    return ForceErrors(*(_squared(_unscaled(one[lifted], other[lifted], np.gradient(
+        other, GRID_S)[lifted]), left) for one, other in (
+            (tension, cell), (weight, cell), (tension, weight))))
+
+
+def _unscaled(one: FloatArray, other: FloatArray, rate: FloatArray) -> FloatArray:
+    """Return what two sides of a balance differ by beyond a scale and a skew of the stamps."""
+    columns = np.column_stack([other, rate])
+    factors, *_ = np.linalg.lstsq(columns, one - other, rcond=None)
+    most = np.array([MOST_SCALE, MOST_SKEW_S])
+    return one - other - columns @ np.clip(factors, -most, most)
 
 
 def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -141,23 +187,25 @@ def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatAr
     return tuple(savgol_filter(x, window, 3, deriv=k, delta=GRID_S) for k in range(3))
 
 
-def _averaged(values: FloatArray) -> FloatArray:
-    window = int(SMOOTH_S / GRID_S)
-    return np.convolve(values, np.ones(window) / window, mode='same')
+def signal_conditions(recording: Recording, time_s: FloatArray) -> list[dict[str, BoolArray]]:
+    """Return divisions of instants [s], each condition name -> mask: motion, pressure, thirds."""
+    third = recording.grid_s[-1] / BANDS
+    return [_directions(recording, time_s), _bands(recording, time_s), {
+        f'in the {name} third': (time_s >= k * third) & (time_s < (k + 1) * third)
+        for k, name in enumerate(('first', 'second', 'last'))}]
 
 
-def _directions(recording: Recording, signal: str) -> dict[str, BoolArray]:
-    """Return condition name -> mask of the samples of a signal, by direction of motion."""
+def _directions(recording: Recording, time_s: FloatArray) -> dict[str, BoolArray]:
+    """Return condition name -> mask of instants, by direction of motion."""
     _, v, _ = smooth_motion(recording)
-    v = np.interp(recording.time_s[signal], recording.grid_s, v)
+    v = np.interp(time_s, recording.grid_s, v)
     return {'contracting': v > MOVING_M_PER_S, 'extending': v < -MOVING_M_PER_S,
             'at rest': np.abs(v) <= MOVING_M_PER_S}
 
 
-def _bands(recording: Recording, signal: str) -> dict[str, BoolArray]:
+def _bands(recording: Recording, time_s: FloatArray) -> dict[str, BoolArray]:
     """Return condition name -> mask, by thirds of the range of the pressure."""
-    p = np.interp(recording.time_s[signal], recording.time_s['pressure'],
-                  recording.measured['pressure']) - P_ATM_PA
+    p = np.interp(time_s, recording.time_s['pressure'], recording.measured['pressure']) - P_ATM_PA
     low, high = np.percentile(recording.measured['pressure'] - P_ATM_PA, [1, 99])
     edges = np.round(np.linspace(low, high, BANDS + 1)[1:-1] / ROUND_PA) * ROUND_PA
     if edges[0] == edges[1]:

@@ -23,7 +23,7 @@ its own.
 from collections.abc import Mapping
 
 import numpy as np
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import CERTIFY, SETTLE_S
 from pam_sim.gap.fit.estimator import Estimator
@@ -66,7 +66,7 @@ class OwnRuns:
             estimator.rig, [validation.recording], False, seed, estimator.criteria
         ) if whole else estimator.problems
         before, refit, after = self._given(), self._errors(base), self._errors(final)
-        self._after = after
+        self._refit, self._after = refit, after
         self.gaps = {p.subsystem: {s: SignalGap(
             UNIT[s], p.floor[s], *(_rms(errors[p.subsystem, s]) for errors in (
                 before, refit, after))) for s in p.signals} for p in self._problems}
@@ -79,6 +79,11 @@ class OwnRuns:
     def spread(self) -> dict[tuple[str, str], float]:
         """Return the rms by which the final model may be off by its numbers alone."""
         return spread_of_runs(self._estimator.spread(self._final), self._errors, self._after)
+
+    def residual(self, subsystem: str, signal: str) -> tuple[FloatArray, FloatArray]:
+        """Return (instants [s], errors of the calibrated model, SI) on the certify data."""
+        p = next(p for p in self._problems if p.subsystem == subsystem)
+        return p.time_s[self._chosen(p, signal)], self._refit[subsystem, signal]
 
     def _given(self) -> dict[tuple[str, str], FloatArray]:
         """Return the errors of the given model, by subsystem and signal."""
@@ -100,13 +105,17 @@ class OwnRuns:
             parts.update(self._cut(p, p.errors(rig, known)))
         return parts
 
+    def _chosen(self, p: SubsystemProblem, signal: str) -> BoolArray:
+        """Return which samples are those of a signal on the certify data."""
+        part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
+        return part & (p.signal == p.signals.index(signal))
+
     def _cut(self, p: SubsystemProblem, errors: FloatArray
              ) -> dict[tuple[str, str], FloatArray]:
         """Return the errors on the certify data in SI units, by subsystem and signal."""
-        part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
         found = {}
-        for place, s in enumerate(p.signals):
-            chosen = part & (p.signal == place)
+        for s in p.signals:
+            chosen = self._chosen(p, s)
             error = errors[chosen] * p.floor[s]
             if self._whole and p.subsystem != 'valve':
                 error = _aligned(error, p.time_s[chosen], p.measured[chosen])

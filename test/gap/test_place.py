@@ -1,0 +1,155 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The first row of ``where``: the subsystem in which the disagreement lives after calibration."""
+
+from types import SimpleNamespace
+
+from gap_runs import nominal, recorded, voltages
+import numpy as np
+from pam_actuation.report.sections.gap import gap_section
+from pam_sim.gap import find_gap
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.report.by_subsystem import add_place
+from pam_sim.gap.report.location import force_errors, ForceErrors
+from pam_sim.gap.report.place import Evidence, first_place
+from pam_sim.gap.result import GapResult, Share, SignalGap, SubsystemVerdict
+from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.select.screening import Screened
+import pytest
+
+QUIET = SignalGap('Pa', 300.0, 310.0, 290.0, 290.0)
+WIDE = SignalGap('Pa', 300.0, 9e3, 7e3, 7e3)
+MUSCLE = {'contraction': SignalGap('m', 2e-5, 6e-4, 4e-4, 4e-4),
+          'force': SignalGap('N', 0.1, 1.0, 0.11, 0.1)}
+STILL = {'contraction': SignalGap('m', 2e-5, 2e-5, 2e-5, 2e-5)}
+CELL = ForceErrors(0.5, 0.4, 0.01)
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded(nominal(), voltages(6.0))
+
+
+@pytest.fixture(scope='module')
+def pool():
+    return {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction', 'force'))}
+
+
+def place(run, verdict, valve=QUIET, muscle=MUSCLE, named=(), screened=(), forces=None,
+          errors=None):
+    """Return the first row of a result with these gaps."""
+    gaps = {'valve': {'pressure': valve}, 'muscle': muscle}
+    recording = Recording(run, 'ppr')
+    time_s = recording.time_s['contraction']
+    result = GapResult(verdict, '', subsystems={
+        s: SubsystemVerdict('unknown' if any(
+            g.rmse_after > 2.0 * g.noise_floor for g in one.values()) else 'no_gap', (), '', QUIET,
+            0.0) for s, one in gaps.items()})
+    return first_place(result, named, Evidence(
+        recording, SimpleNamespace(gaps=gaps, residual=lambda problem, signal: (
+            time_s, 7e3 * np.ones(time_s.size) if errors is None else errors(time_s))),
+        screened, forces, lambda w: {}, CRITERIA))
+
+
+def found_as(name, pool, others=()):
+    """Return what is named, with rivals that are behind by t."""
+    fit = Fit(Hypothesis((pool[name],)), np.zeros(0), {}, {}, {})
+    rivals = [Rival(name, fit, {'muscle': 0.99}, {'muscle': 0.0})]
+    rivals += [Rival(o, fit, {'muscle': 0.9}, {'muscle': t}) for o, t in others]
+    return NamedEffect(name, 'muscle', rivals, (name,))
+
+
+def test_nothing_lives_anywhere_without_a_gap(run):
+    assert place(run, 'no_gap', muscle=STILL) is None
+
+
+def test_what_is_unknown_lives_where_its_own_run_errs(run):
+    found = place(run, 'unknown', WIDE, STILL)
+    assert (found.subsystem, found.signal, found.certainty) == ('valve', 'pressure', 1.0)
+    found = place(run, 'unknown')
+    assert (found.subsystem, found.signal) == ('muscle', 'contraction')
+    assert found.certainty == 0.5              # no load cell tells it from the load
+    for muscle, load, where in ((0.5, 0.02, 'muscle'), (0.02, 0.5, 'load')):
+        found = place(run, 'unknown', forces=ForceErrors(muscle, load, 0.52))
+        assert found.subsystem == where and found.certainty > 0.9 and found.share_of_gap > 0.9
+
+
+def test_a_sensor_is_a_place_of_its_own(run, pool):
+    lag, creep = (Screened(pool[name], (), {'muscle': promise}) for name, promise in (
+        ('contraction_lag', 0.97), ('creep', 0.6)))
+    found = place(run, 'unknown', screened=(creep, lag))
+    assert (found.subsystem, found.signal) == ('sensor', 'contraction')
+    assert place(run, 'unknown', screened=(creep,)).subsystem == 'muscle'
+    found = place(run, 'unknown', forces=CELL)
+    assert (found.subsystem, found.signal) == ('sensor', 'force')
+
+
+def test_a_name_and_the_place_agree(run, pool):
+    explained = {'contraction': SignalGap('m', 2e-5, 6e-4, 4e-4, 2e-5)}
+    for name, subsystem, signal in (
+            ('creep', 'muscle', 'contraction'), ('guide_friction', 'load', 'contraction'),
+            ('contraction_lag', 'sensor', 'contraction'), ('force_bias', 'sensor', 'force')):
+        found = place(run, 'effects', muscle=explained, named=[found_as(name, pool)], forces=CELL)
+        assert (found.subsystem, found.signal) == (subsystem, signal)
+        assert found.share_of_gap == 1.0 and found.certainty == 1.0
+    # A rival of another subsystem that is hardly behind makes it less sure, one of the same not.
+    near = [found_as('creep', pool, [(other, 2.0)]) for other in ('hysteresis', 'guide_friction')]
+    same, apart = (place(run, 'effects', muscle=explained, named=[w]) for w in near)
+    assert same.certainty == 1.0 and 0.8 < apart.certainty < 0.9
+
+
+def test_a_condition_is_told_where_it_holds_most_of_the_gap(run):
+    def late(time_s):
+        return np.where(time_s > 4.1, 4e-4, 0.0)
+
+    found = place(run, 'unknown', errors=late)
+    assert found.condition == 'in the last third' and found.share_of_gap > 0.9
+    assert Share('muscle', 'force', '380 to 470 kPa', 0.5).text().endswith(
+        ': 50 % of the squared gap in force, at 380 to 470 kPa.')
+    assert place(run, 'unknown').condition == 'all'
+    assert 'of the squared gap in contraction, in the last third.' in found.text()
+
+
+def test_the_balance_of_forces_tells_muscle_from_load(run):
+    rig = nominal()
+    recording = Recording(run, 'ppr')
+    noise = force_errors(rig, recording)
+    rubbing = force_errors(rig.with_(effects=[
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}]), recording)
+    assert rubbing.muscle_part > 0.9 and rubbing.muscle > 1.0 > 100.0 * noise.muscle
+
+
+def test_an_unknown_load_is_told_of_by_subsystem():
+    unknown = SubsystemVerdict('unknown', (), 'contraction', WIDE, 1.0)
+    result = GapResult('unknown', '', where=[Share('load', 'contraction', 'all', 1.0, 0.9)],
+                       subsystems={'valve': unknown, 'muscle': unknown})
+    add_place(result)
+    assert list(result.subsystems) == ['valve', 'muscle', 'load']
+
+
+def test_page_and_terminal_open_with_the_place():
+    rig = nominal().with_(effects=[
+        {'name': 'contraction_lag', 'parameters': {'time_constant_s': 0.02}}])
+    result = find_gap(recorded(rig, voltages(12.0)), nominal(), effects=['contraction_lag'])
+    assert [e['name'] for e in result.effects] == ['contraction_lag']
+    sentence = result.where[0].text()
+    assert sentence.startswith('After calibration the disagreement lives in the sensor of the '
+                               'contraction (certainty 1.00): ')
+    assert result.text().startswith(f'{sentence}\neffects: ')
+    assert gap_section(result).body.startswith(f'<p>{sentence}</p>')
+    assert {w.subsystem for w in result.where} == {'sensor'}
