@@ -141,7 +141,8 @@ setup(
     name=PACKAGE,
     version=VERSION,
     packages=find_packages(include=['pam_actuation*', 'pam_sim*']),
-    package_data={'pam_actuation': ['py.typed', 'view/page/*'], 'pam_sim': [
+    package_data={'pam_actuation': [
+        'py.typed', 'view/page/*', 'investigate/*.schema.json'], 'pam_sim': [
         'py.typed', 'presets/*.yaml', 'muscle/*.csv', 'muscle/sizes/*.yaml',
         'muscle/lookup_tables/*', 'joint/presets/*.yaml', 'valve/regulators/*.yaml',
         'gap/*.schema.json', 'identify/*.schema.json']},

@@ -30,6 +30,7 @@ LAYERS = (
     ('report', 'models', 'view'),
     ('campaign',),
     ('rigging',),
+    ('investigate',),
     ('nodes',),
     ('cli', 'demo', 'warm_up'))
 # What studies a rig or lists all there is; the physics below knows none of it.

@@ -12,29 +12,38 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page on ``gap.json``, made from its JSON Schema in the package."""
+"""The pages on ``gap.json`` and ``investigation.json``, made from their JSON Schemas."""
 
 import json
 
 from generate.command_line import plain
+from pam_actuation.investigate.schema import investigation_schema
 from pam_sim.gap.report.schema import report_schema
 
 
 def pages():
-    """Return the path below docs/ and the text of the page and of the schema itself."""
-    schema = report_schema()
+    """Return the path below docs/ and the text of each page and of the schemas themselves."""
+    return {
+        **_page('gap', report_schema(), 'pam_sim.gap.report.schema.report_schema()',
+                'Tests hold reports of every verdict against it.'),
+        **_page('investigation', investigation_schema(),
+                'pam_actuation.investigate.schema.investigation_schema()',
+                'What it shares with gap.json has the same form.')}
+
+
+def _page(name, schema, function, remark):
+    """Return the page on one file and its schema."""
     parts = [
-        '# gap.json', plain(schema['description']),
-        'The schema is in the package: `pam_sim.gap.report.schema.report_schema()` returns it. '
-        'Tests hold reports of every verdict against it. '
-        '{download}`gap.schema.json <gap.schema.json>` is the file.',
+        f'# {name}.json', plain(schema['description']),
+        f'The schema is in the package: `{function}` returns it. {remark} '
+        f'{{download}}`{name}.schema.json <{name}.schema.json>` is the file.',
         _table(schema)]
-    for name, definition in schema['$defs'].items():
-        parts += [f'## {name}', plain(definition['description'])]
+    for definition_name, definition in schema['$defs'].items():
+        parts += [f'## {definition_name}', plain(definition['description'])]
         if 'properties' in definition:
             parts.append(_table(definition))
-    return {'reference/gap_json.md': '\n\n'.join(parts) + '\n',
-            'reference/gap.schema.json': json.dumps(schema, indent=2) + '\n'}
+    return {f'reference/{name}_json.md': '\n\n'.join(parts) + '\n',
+            f'reference/{name}.schema.json': json.dumps(schema, indent=2) + '\n'}
 
 
 def _table(schema):

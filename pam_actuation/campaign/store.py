@@ -19,7 +19,7 @@ A case is known by a key of all that its result depends on: the bytes of the rec
 the settings, the version. A run that was killed goes on where it stopped.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import contextlib
 import fcntl
 import hashlib
@@ -73,17 +73,7 @@ class Store:
 
         """
         make_folder(self.cases)
-        with open(self.folder / LOCK, 'w', encoding='utf-8') as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise InputError('another campaign works in this folder', self.folder) from None
-            for left in (*self.cases.glob(f'{UNFINISHED}*'), *self.folder.glob(
-                    f'{UNFINISHED}*')):
-                if left.is_dir():
-                    shutil.rmtree(left, ignore_errors=True)
-                else:
-                    left.unlink(missing_ok=True)
+        with only_one(self.folder, 'campaign', (self.cases,)):
             yield
 
     def result(self, key: str) -> dict[str, Any] | None:
@@ -102,15 +92,50 @@ class Store:
 
 
 @contextlib.contextmanager
+def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[None]:
+    """
+    Keep other processes out of a folder, and remove what a killed one left half done.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        It is there.
+    what : str
+        What works in it, for the message.
+    below : iterable of pathlib.Path
+        Further folders that may hold something half done.
+
+    Raises
+    ------
+    InputError
+        Another process works in it.
+
+    """
+    with open(folder / LOCK, 'w', encoding='utf-8') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError(f'another {what} works in this folder', str(folder)) from None
+        for one in (*below, folder):
+            for left in one.glob(f'{UNFINISHED}*'):
+                if left.is_dir():
+                    shutil.rmtree(left, ignore_errors=True)
+                else:
+                    left.unlink(missing_ok=True)
+        yield
+
+
+@contextlib.contextmanager
 def kept_folder(cases: Path, key: str) -> Iterator[Path]:
-    """Give a folder that becomes that of a case when the block ends well."""
+    """Give a folder that becomes ``key`` in the folder ``cases`` when the block ends well."""
     folder = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=cases))
     try:
         yield folder
         os.chmod(folder, 0o755)
-        for path in folder.iterdir():
-            with open(path, 'rb') as stream:
-                os.fsync(stream.fileno())
+        for path in folder.rglob('*'):
+            if path.is_file():
+                with open(path, 'rb') as stream:
+                    os.fsync(stream.fileno())
         # Where another worker was faster, the folder is there already and holds the same.
         with contextlib.suppress(OSError):
             os.rename(folder, cases / key)

@@ -46,6 +46,7 @@ GROUPS = {
         'tune': 'tune a controller on a model',
         'identify': 'determine the unknown numbers of a rig',
         'gap': 'find what a model misses, name it and add it',
+        'investigate': 'record and compare in rounds, until the gap has one answer',
         'campaign': 'many recordings: what changed on which rig since which day',
         'characterise': 'make static surfaces from runs under fixed loads',
         'valves': 'compare the valve types on one rig'},
@@ -59,7 +60,7 @@ VERBS = tuple(verb for group in GROUPS.values() for verb in group)
 def overview() -> str:
     """Return the text that ``pam`` prints without arguments."""
     wide = max(len(command) for command, _ in FIRST_STEPS) + 2
-    lines = ['Simulate, run, record, replay and tune a pneumatic muscle rig.', '', 'First steps']
+    lines = ['Simulate, run, record, replay and tune a pneumatic muscle rig.', 'First steps']
     lines += [*(f'  {command:{wide}}{text}' for command, text in FIRST_STEPS), '']
     for title, verbs in GROUPS.items():
         lines += [title, *(f'  {verb:14}{text}' for verb, text in verbs.items())]

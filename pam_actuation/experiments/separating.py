@@ -58,6 +58,7 @@ LOWEST_GAUGE_PA = 200e3      # a hanging mass of 5 kg has left its stop
 NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothing is recorded
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
+PREFIX = 'tell_apart'
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
 SURE_SHARE = 10.0 * CRITERIA.same_form_share
@@ -154,6 +155,23 @@ def next_experiment(
             'needs': needs, 'experiment': {**plain, 'needs': needs}}
 
 
+def not_played(valve: str, names: Collection[str]) -> tuple[str, ...]:
+    """
+    Return the pieces of the menu that experiments of this module have not shown yet.
+
+    Parameters
+    ----------
+    valve : str
+        ``ppr`` or ``hsv``.
+    names : collection of str
+        Names of experiments that were played; others than ours are passed over.
+
+    """
+    shown = {piece for name in names if name.startswith(f'{PREFIX}_')
+             for piece in name.removeprefix(f'{PREFIX}_').split('_')}
+    return tuple(piece for piece in menu(valve) if piece not in shown)
+
+
 def _experiment(pieces: Menu, names: Sequence[str]) -> dict[str, Any]:
     """Return an experiment as plain data: rest, then pieces of the menu, each from below."""
     low = {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': 1.5}}
@@ -161,7 +179,7 @@ def _experiment(pieces: Menu, names: Sequence[str]) -> dict[str, Any]:
     for name in names:
         segments += [low, *pieces[name][1]]
     text = '; '.join(pieces[name][0] for name in names)
-    return {'name': '_'.join(['tell_apart', *names]), 'domain': 'pressure', 'segments': segments,
+    return {'name': '_'.join([PREFIX, *names]), 'domain': 'pressure', 'segments': segments,
             'description': f'{text[0].upper()}{text[1:]}'}
 
 

@@ -19,7 +19,7 @@ Run the gap workflow on loaded bags and write its folder.
 not at all.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import json
 import os
 from pathlib import Path
@@ -32,7 +32,7 @@ import numpy as np
 
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
-from pam_actuation.experiments.separating import next_experiment
+from pam_actuation.experiments.separating import next_experiment, not_played
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
@@ -103,11 +103,12 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
 
 
 def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' = None,
-           **options: Any) -> 'GapResult':
+           played: Collection[str] = (), **options: Any) -> 'GapResult':
     """
     Find the gap between recordings and a model, and the experiment that would tell rivals apart.
 
-    Arguments and errors as of ``write_gap``; nothing is written.
+    Arguments and errors as of ``write_gap``; nothing is written. ``played`` names experiments
+    that were suggested and recorded before: their pieces are not suggested again.
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
@@ -123,11 +124,13 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     if found is not None:
         result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)
         result.runtime_s += spent
-    if len(result.rivals) > 1:
+    pieces = not_played(rig.valve, played)
+    if len(result.rivals) > 1 and pieces:
+        if result.at_one_speed and 'speeds' in pieces and set(memories()) <= {
+                rival[0] for rival in result.rivals}:
+            pieces = ('speeds',)
         result.next_experiment = next_experiment(
-            rig, result.rivals, tuple(result.signals), result.noise,
-            pieces=('speeds',) if result.at_one_speed and set(memories()) <= {
-                rival[0] for rival in result.rivals} else (),
+            rig, result.rivals, tuple(result.signals), result.noise, pieces=pieces,
             may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     return result

@@ -14,7 +14,7 @@
 
 """Bring nodes up, watch them, take them down safely; no ``ros2 launch`` needed."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 import os
 import time
@@ -77,9 +77,15 @@ class Supervisor:
         """
         self._group.start()
 
-    def watch(self, seconds: float | None = None) -> None:
+    def status(self, name: str) -> tuple[int, str]:
+        """Return level and message of what a node said last, (0, '') if nothing."""
+        level, message, _ = self._group.started.statuses.get(name, (0, '', {}))
+        return level, message
+
+    def watch(self, seconds: float | None = None,
+              until: Callable[[], bool] = lambda: False) -> None:
         """
-        Return when the time is over; None: watch until a node ends.
+        Return when the time is over or ``until`` says so; None: watch until a node ends.
 
         Raises
         ------
@@ -93,6 +99,8 @@ class Supervisor:
             ended = self._group.ended()
             if ended is not None:
                 raise SessionFailed(self._how_it_ended(ended))
+            if until():
+                return
 
     def finish(self) -> list[str]:
         """

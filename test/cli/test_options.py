@@ -24,7 +24,8 @@ import pytest
 # What each verb needs before an option is looked at.
 NEEDS = {'run': ['short_sine'], 'simulate': ['short_sine'], 'up': ['rig'], 'replay': ['bag'],
          'characterise': ['--out', 'folder'], 'report': ['bag'], 'info': ['bag'],
-         'campaign': ['runs', '--out', 'folder'], 'valves': ['compare'], 'rules': ['sofc_ppr'],
+         'campaign': ['runs', '--out', 'folder'], 'investigate': ['--out', 'folder'],
+         'valves': ['compare'], 'rules': ['sofc_ppr'],
          'import': ['table.csv'], 'export': ['bag', '--out', 'table.csv'], 'rig': ['new'],
          'param': ['list', 'valve_driver']}
 WRONG_NUMBERS = {
@@ -55,6 +56,9 @@ NUMBERS = {
     ('characterise', '--dead-volume-m3'): '0 to 1 m^3',
     ('identify', '--added-kg'): '0 to 500 kg', ('identify', '--seed'): '0 to 4294967295',
     ('gap', '--seconds'): '1 s or more', ('gap', '--materiality'): '0.01 to 1000',
+    ('investigate', '--rounds'): '1 to 50', ('investigate', '--minutes'): '0 min or more',
+    ('investigate', '--materiality'): '0.01 to 1000',
+    ('investigate', '--domain-id'): '0 to 232', ('investigate', '--seed'): '0 to 4294967295',
     ('campaign', '--seconds'): '1 s or more', ('campaign', '--materiality'): '0.01 to 1000',
     ('campaign', '--seed'): '0 to 4294967295',
     ('campaign', '--jobs'): '1 to 1024, or -1 for one a core',

@@ -1,0 +1,148 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What came out of an investigation: as plain data, as lines for a person, as files."""
+
+from dataclasses import dataclass
+import json
+import os
+import shlex
+import shutil
+from typing import Any, TYPE_CHECKING
+
+from pam_actuation.investigate.decide import (
+    ANSWERED, DECLINED, FAILED, IMPOSSIBLE, MINUTES, REFUSED, ROUNDS)
+from pam_actuation.investigate.page import investigation_page
+from pam_actuation.report.sections.replay import SHOWN
+from pam_sim.files import StrPath, whole_files, write_text
+
+if TYPE_CHECKING:
+    from pam_actuation.investigate.rounds import Round
+    from pam_actuation.investigate.store import Store
+
+SCHEMA = 1
+# What gap.json of the last round says of all recordings.
+_OF_THE_LAST = ('verdict', 'reason', 'effects', 'parameters', 'ambiguity_set', 'subsystems',
+                'signals', 'unexplained_fraction', 'proposal', 'next_experiment')
+_NOTHING: dict[str, Any] = {
+    'verdict': None, 'reason': '', 'effects': [], 'parameters': [], 'ambiguity_set': [],
+    'subsystems': {}, 'signals': {}, 'unexplained_fraction': None, 'proposal': None,
+    'next_experiment': None}
+MAY_GO_ON = (ROUNDS, MINUTES, DECLINED, FAILED, IMPOSSIBLE)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """
+    What an investigation found.
+
+    Parameters
+    ----------
+    question : dict
+        What was asked, as plain data.
+    rounds : tuple of Round
+        All that are over.
+    ended : str
+        A key of ``pam_actuation.investigate.decide.ENDINGS``.
+    because : str
+        Why it ended, in a sentence.
+
+    """
+
+    question: dict[str, Any]
+    rounds: 'tuple[Round, ...]'
+    ended: str
+    because: str
+
+    @property
+    def answered(self) -> bool:
+        """Return whether one answer holds for all recordings."""
+        return self.ended == ANSWERED
+
+    @property
+    def wrong(self) -> bool:
+        """Return whether something is wrong with the data or with a run."""
+        return self.ended in (REFUSED, FAILED)
+
+    @property
+    def has_model(self) -> bool:
+        """Return whether there is a model to go on with."""
+        return bool(self.rounds) and self.ended != REFUSED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what investigation.json holds; paths are told as seen from its folder."""
+        last = self.rounds[-1].gap if self.rounds else _NOTHING
+        return {
+            'schema': SCHEMA, 'ended': self.ended, 'because': self.because,
+            **{key: last[key] for key in _OF_THE_LAST},
+            'rounds': [one.to_dict() for one in self.rounds],
+            'model': 'model.yaml' if self.has_model else None,
+            'next_command': self.next_command('.'), 'question': self.question}
+
+    def next_command(self, folder: StrPath) -> str | None:
+        """Return the command that tunes a controller on the final model, None without one."""
+        if not self.has_model:
+            return None
+        model, tuned = (shlex.quote(os.path.normpath(os.path.join(folder, name)))
+                        for name in ('model.yaml', 'tuned.yaml'))
+        return f'pam tune --model {model} --out {tuned}'
+
+    def text(self, folder: StrPath) -> str:
+        """Return the outcome in lines for a person; ``folder`` is that of the investigation."""
+        lines = []
+        for one in self.rounds:
+            what = ', '.join(f'{each["experiment"] or each["path"]} ({each["duration_s"]:.0f} s)'
+                             for each in one.recordings)
+            lines.append(f'round {one.number}, {what}: {one.found()}')
+        lines.append(f'ended: {self.because}')
+        if self.rounds:
+            lines.append(f'answer: {self.rounds[-1].gap["reason"]}')
+            lines += [f'  {line}' for line in shrunk(self.rounds[-1].gap)]
+        lines.append(f'page: {os.path.join(folder, "report.html")}')
+        if self.has_model:
+            lines.append(f'model: {os.path.join(folder, "model.yaml")}')
+        if self.ended in MAY_GO_ON:
+            more = f' (with --rounds {len(self.rounds) + 1} or more)' * (self.ended == ROUNDS)
+            lines.append(f'the same command goes on from here{more}')
+        command = self.next_command(folder)
+        return '\n'.join([*lines, *([f'next: {command}'] if command else [])])
+
+    def write(self, store: 'Store') -> None:
+        """Write investigation.json, report.html and model.yaml, all of them or none."""
+        with whole_files(store.folder) as folder:
+            write_text(folder / 'investigation.json',
+                       json.dumps(self.to_dict(), indent=2, allow_nan=False) + '\n')
+            model = ''
+            if self.has_model:
+                last = store.rounds / str(self.rounds[-1].number)
+                for name in ('model.yaml', 'proposed_effect.py'):
+                    if (last / name).is_file():
+                        shutil.copyfile(last / name, folder / name)
+                model = (last / 'model.yaml').read_text(encoding='utf-8')
+            write_text(folder / 'report.html', investigation_page(self, model))
+
+
+def shrunk(gap: dict[str, Any]) -> list[str]:
+    """Return a line on each signal: what the model missed, and what it misses at the end."""
+    lines = []
+    for name, one in gap['signals'].items():
+        factor, _, unit, _ = SHOWN[name]
+        before, refit, after, floor = (
+            '-' if one[key] is None else f'{one[key] * factor:.3g}'
+            for key in ('rmse_before', 'rmse_refit', 'rmse_after', 'noise_floor'))
+        closed = one['shrink_percent']
+        closed = '' if closed is None else f', {closed:.0f} % of the gap closed'
+        lines.append(f'{name}: model off by {before}, calibrated {refit}, final {after} {unit} '
+                     f'rms; noise floor {floor}{closed}')
+    return lines
