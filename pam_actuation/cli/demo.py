@@ -37,6 +37,8 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo and print where the bags and the page are."""
+    from pam_actuation.rigging.node_template import prepare_template
+    prepare_template()
     from pam_actuation.cli.common import progress
     from pam_actuation.demo import check_place, Demo
     out = args.out or os.path.join('runs', f'demo-{time.strftime("%Y%m%d-%H%M%S")}')

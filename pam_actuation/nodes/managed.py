@@ -316,8 +316,7 @@ class ManagedNode(LifecycleNode):
             if was_active:
                 self._end_work(why)
                 self.get_logger().info(why)
-            else:
-                self._farewell()
+            self._farewell()
 
     def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status of all."""
@@ -327,7 +326,6 @@ class ManagedNode(LifecycleNode):
         diagnostics = self.diagnostics
         diagnostics.level, diagnostics.message, diagnostics.values = self.last_status(why)
         diagnostics.send()
-        self._farewell()
         self.stop()
 
     def _farewell(self) -> None:

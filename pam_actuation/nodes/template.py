@@ -20,10 +20,12 @@ this is done once; every node is a fork of it, with memory of its own from there
 ROS is begun before a fork, and no thread runs.
 
 Started by ``rigging.node_template`` with the number of a socket and names of nodes. It reads one
-request a line, as JSON, and answers with the process id, later with how the process ended. When
-its parent ends, it ends as well, and the nodes with it, as those they had been started by.
+request a line, as JSON, and answers with the process id, later with how the process ended. It
+also compiles ahead what the nodes of a run need. When its parent ends, it ends as well, and the
+nodes with it, as those they had been started by.
 """
 
+import atexit
 from collections.abc import Sequence
 import gc
 import importlib
@@ -36,6 +38,7 @@ import sys
 from typing import Any
 
 from pam_actuation.nodes import executables
+from pam_actuation.rigging.compile_ahead import compile_ahead
 from pam_actuation.rigging.processes import end_with_parent, name_process
 
 # What nodes import only once they know their parameters.
@@ -88,9 +91,22 @@ class Children:
                     return None
                 *lines, self._unread = (self._unread + data).split(b'\n')
                 for line in lines:
-                    words = self._fork(json.loads(line))
+                    words = self._answer(json.loads(line))
                     if words is not None:
                         return words
+
+    def _answer(self, request: dict[str, Any]) -> list[str] | None:
+        """Do what is asked for; return as ``_fork``."""
+        if 'compile' not in request:
+            return self._fork(request)
+        try:
+            compile_ahead(*request['compile'])
+        except Exception as error:      # the nodes will say so, each of its part
+            self._tell({'compiled': str(error)})
+        else:
+            self._tell({'compiled': ''})
+        gc.freeze()
+        return None
 
     def _fork(self, request: dict[str, Any]) -> list[str] | None:
         """Return the words of the node in the fork, None in this process."""
@@ -115,6 +131,7 @@ class Children:
         for end in (self._channel, self._read_end, self._write_end):
             end.close()
         os.setsid()
+        gc.enable()
         end_with_parent(own)
         _become(request)
         os.close(begins)
@@ -155,7 +172,12 @@ def _become(request: dict[str, Any]) -> None:
 
 
 def prepare(names: Sequence[str]) -> None:
-    """Import what these nodes need, and let the compiler get ready; what is missing is not."""
+    """
+    Import what these nodes need, and let the compiler get ready; what is missing is not.
+
+    Nothing of it is garbage: a collection would only take time, and in a node copy what is shared.
+    """
+    gc.disable()
     for module in (*LATER, *(f'pam_actuation.nodes.{name}' for name in names)):
         try:
             importlib.import_module(module)
@@ -163,8 +185,7 @@ def prepare(names: Sequence[str]) -> None:
             pass        # the node says so itself
     from numba import njit
     njit(lambda number: number + 1.0)(1.0)
-    gc.collect()
-    gc.freeze()         # a collection in a node would copy all that is shared
+    gc.freeze()
 
 
 def become_nodes() -> int:
@@ -178,7 +199,12 @@ def become_nodes() -> int:
     name, *arguments = words
     module = sys.modules.get(f'pam_actuation.nodes.{name}')
     sys.argv[:] = [getattr(module, '__file__', None) or name, *arguments]
-    return executables.start(name)
+    code = executables.start(name)
+    # The node has left the graph. What is left to take down is memory shared with others.
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 if __name__ == '__main__':

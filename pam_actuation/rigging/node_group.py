@@ -21,13 +21,14 @@ whatever its cause, goes the other way round: the drivers vent while watchdogs, 
 still run.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 import shutil
 import tempfile
 from typing import Self, TYPE_CHECKING
 
 from pam_actuation.interrupts import held, undisturbed
+from pam_actuation.rigging.compile_ahead import compile_ahead
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
 from pam_actuation.rigging.node_template import template_for
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from pam_actuation.rigging.client import RigClient
 
 START_TIMEOUT_S = 150.0       # the first start compiles: two minutes on a small machine
-VENT_S = 0.6                  # for the air, before watchdogs and plant stop
+VENT_S = 0.8                  # for the air, before watchdogs and plant stop
 
 
 class NodeGroup:
@@ -117,9 +118,14 @@ class NodeGroup:
         """Tell whether a node was asked to become active."""
         return name in self._asked
 
-    def start(self) -> None:
+    def start(self, compiled: Sequence[str] = ()) -> None:
         """
         Start all processes and bring them up in order.
+
+        Parameters
+        ----------
+        compiled : sequence of str
+            Arguments of ``compile_ahead.compile_ahead``: what is compiled first, once for all.
 
         Raises
         ------
@@ -132,7 +138,14 @@ class NodeGroup:
         environment = node_environment(self.domain_id, folder)
         template = template_for([node.name for node in self._nodes.values()], environment)
         if template is not None:
+            if compiled:
+                template.compile_ahead(compiled)
+            # Meanwhile: from here on this process has threads, and leaves forking to the template.
+            self.client = self._new_client(self.domain_id)
+            template.wait_until_compiled()      # what is wrong, the nodes say
             template.wait_until_ready()
+        elif compiled:
+            compile_ahead(*compiled)
         for name, node in self._nodes.items():
             log_dir = folder / node.namespace.strip('/')
             log_dir.mkdir(parents=True, exist_ok=True)
@@ -144,8 +157,9 @@ class NodeGroup:
                     template=template)
             if interrupted():
                 raise KeyboardInterrupt
-        # Only now: a process with the threads of the middleware does not fork safely.
-        self.client = self._new_client(self.domain_id)
+        if self.client is None:
+            # Only now: a process with the threads of the middleware does not fork safely.
+            self.client = self._new_client(self.domain_id)
         self.change(self.processes, 'configure', START_TIMEOUT_S)
         for kind in ORDER:
             names = self.of_kind(kind)
@@ -195,6 +209,8 @@ class NodeGroup:
                 # Of a driver that is dead or hangs the watchdog vents the muscle.
                 self.client.spin(VENT_S)
         self.client.spin(0.1)
+        if not problems:
+            end_all(self.processes.values())        # the drivers have vented
         self.end()
         return problems
 

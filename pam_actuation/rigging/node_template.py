@@ -21,7 +21,7 @@ systems than Linux there is none, and each node is started by itself.
 """
 
 import atexit
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 import contextlib
 from functools import partial
 import json
@@ -70,7 +70,8 @@ class NodeTemplate:
                 stderr=subprocess.DEVNULL, start_new_session=True, pass_fds=(theirs.fileno(),),
                 preexec_fn=partial(end_with_parent, os.getpid()))
         self._unread = b''
-        self._ready = self._spoiled = False
+        self._ready = self._spoiled = self._compiling = False
+        self._not_compiled = ''
         self._ended: dict[int, int] = {}
         self._lock = threading.RLock()
         self._owner = os.getpid()
@@ -88,6 +89,27 @@ class NodeTemplate:
         while not self._ready and self.usable and time.monotonic() < deadline_s:
             with self._lock:
                 self._read(0.1)
+
+    def compile_ahead(self, files: Sequence[str]) -> None:
+        """
+        Ask it to compile what a run needs; it does so before it forks the next node.
+
+        Parameters
+        ----------
+        files : sequence of str
+            Arguments of ``compile_ahead.compile_ahead``.
+
+        """
+        with self._lock, contextlib.suppress(OSError):      # it has ended: nodes compile
+            self._channel.sendall(json.dumps({'compile': list(files)}).encode() + b'\n')
+            self._compiling = True
+
+    def wait_until_compiled(self) -> str:
+        """Wait for what was asked for; return why not, '' if done. Ctrl-C ends the waiting."""
+        while self._compiling and self.usable:
+            with self._lock:
+                self._read(0.1)
+        return self._not_compiled
 
     def start(self, words: list[str], environment: Mapping[str, str],
               log_file: str | os.PathLike[str]) -> 'ForkedNode | None':
@@ -144,6 +166,9 @@ class NodeTemplate:
         self._ended.update(
             (answer['ended'], answer['exit_code']) for answer in answers if 'ended' in answer)
         self._ready = self._ready or any('ready' in answer for answer in answers)
+        for answer in answers:
+            if 'compiled' in answer:
+                self._compiling, self._not_compiled = False, answer['compiled']
         self._spoiled = spoiled or not data
         return answers
 

@@ -69,6 +69,16 @@ class RigPlan:
         """Return the places of the watchdogs, in the order of the drivers."""
         return tuple(f'{place.removesuffix(DRIVER)}{WATCHDOG}' for place in self.drivers)
 
+    @property
+    def rig_file(self) -> Path:
+        """Return the file in which the nodes read their rig."""
+        return self.folder / 'rig.yaml'
+
+    @property
+    def controller_file(self) -> Path:
+        """Return the file in which the nodes read their controller; there if there is one."""
+        return self.folder / 'controller.yaml'
+
     def remove(self) -> None:
         """Delete the files made for the nodes."""
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -82,8 +92,7 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig
     """
     Load experiment, rig and controller and write them down for the nodes.
 
-    Loading here tells of the user's mistakes before anything is started, and compiles
-    what the nodes would otherwise all compile at once.
+    Loading here tells of the user's mistakes before anything is started.
 
     Parameters
     ----------
@@ -134,7 +143,6 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig
             raise InputError(
                 'exists already; choose another folder or allow to replace it', str(bag))
         check_bag_target(bag, overwrite)
-    _compile(model, law)
     folder = Path(tempfile.mkdtemp(prefix='pam_session_'))
     plan = RigPlan(asked, model, law, '', {}, folder)
     if isinstance(model, JointRig):
@@ -150,32 +158,19 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig
     return plan
 
 
-def _compile(rig: 'Rig | JointRig', controller: 'Controller | None') -> None:
-    """Run every compiled function once, so that its machine code is in the cache."""
-    from pam_actuation.drivers.loop import DriverLoop
-    if isinstance(rig, JointRig):
-        flexor, extensor = ((0.0,) * len(one.signal_names) for one in rig.muscles.values())
-        rig.plant().step(flexor, extensor)
-    else:
-        rig.plant().step((0.0,) * len(rig.signal_names))
-    DriverLoop(rig.valve)
-    if controller is not None:
-        from pam_actuation.control.config import load_controller
-        spare = load_controller(controller.to_yaml(), rig, accept_other_rig=True)
-        spare.step(0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, namespace: str,
                 overwrite: bool) -> dict[str, Parameters]:
     """Return the place of each node to its parameters and write the files they name."""
     from pam_actuation.drivers.config import driver_facts
     rig, controller = plan.rig, plan.controller
-    rig_file = _write(plan.folder / 'rig.yaml', rig.to_yaml())
+    rig_file = _write(plan.rig_file, rig.to_yaml())
+    law_text = '' if controller is None else controller.to_yaml()
     nodes: dict[str, Parameters] = {}
     if bag is not None:
         metadata = experiment_metadata(
-            plan.experiment, rig, controller, rig.valve, seed, origin='live',
+            plan.experiment, rig, law_text or None, rig.valve, seed, origin='live',
             learning=str(bool(learning)).lower(),
+            controller_other_rig='' if controller is None else controller.other_rig,
             remarks='\n'.join(plan.experiment.remarks(rig.valve, rig, controller)),
             **driver_facts())
         nodes[RECORDER] = {
@@ -198,7 +193,7 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
         nodes[plan.controller_node] = {
             **model, 'valve_type': rig.valve,
             'accept_other_rig': bool(controller.other_rig),
-            'controller': _write(plan.folder / 'controller.yaml', controller.to_yaml())}
+            'controller': _write(plan.controller_file, law_text)}
         if controller.kind == 'sofc':
             nodes[plan.controller_node]['learning'] = learning
     nodes[REFERENCE] = {

@@ -161,7 +161,10 @@ class RigSession:
             A node ended or refused.
 
         """
-        self.group.start()
+        compiled = [str(self.plan.rig_file)]
+        if self.plan.controller is not None:
+            compiled.append(str(self.plan.controller_file))
+        self.group.start(compiled)
         self._active_since = time.monotonic()
         self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
 

@@ -110,6 +110,14 @@ def test_nodes_have_names_logs_and_ends_of_their_own(template, environment, tmp_
     driver.send_signal(signal.SIGTERM)          # to nobody
 
 
+def test_a_run_is_compiled_before_its_nodes_are_forked(template):
+    template.compile_ahead(['dmsp_5_300_realistic', 'sofc_ppr'])
+    assert template.wait_until_compiled() == ''
+    template.compile_ahead(['no_such_rig'])
+    assert 'no_such_rig' in template.wait_until_compiled()
+    assert template.usable
+
+
 def test_a_folder_and_variables_may_change_between_nodes(
         template, environment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

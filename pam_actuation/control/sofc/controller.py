@@ -112,9 +112,6 @@ class SelfOrganizingFuzzyController(CompiledController):
         self._arguments = (
             self.parameters, self.static_inverse, tables, self._ring, self._state, self._inputs,
             self._outputs)
-        # Compile, or load what was compiled before, now and not in the first real tick.
-        sofc_step(*(tuple(part.copy() for part in array) if isinstance(array, tuple)
-                    else array.copy() for array in self._arguments))
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
