@@ -27,8 +27,10 @@ nodes with it, as those they had been started by.
 
 import atexit
 from collections.abc import Sequence
+import contextlib
 import gc
 import importlib
+import inspect
 import json
 import os
 import select
@@ -43,9 +45,13 @@ from pam_actuation.rigging.processes import end_with_parent, name_process
 
 # What nodes import only once they know their parameters.
 LATER = ('pam_actuation.bags.recorder', 'pam_actuation.control.config',
-         'pam_actuation.drivers.for_rig', 'pam_actuation.experiments', 'pam_sim.joint',
-         'pam_sim.rollout.packing', 'scipy.linalg', 'diagnostic_msgs.msg', 'geometry_msgs.msg',
-         'rosidl_generator_py', 'sensor_msgs.msg', 'std_msgs.msg')
+         'pam_actuation.control.loop', 'pam_actuation.drivers.for_rig',
+         'pam_actuation.experiments', 'pam_sim.joint.model_file', 'pam_sim.plant',
+         'pam_sim.rollout.packing', 'scipy.linalg')
+# Packages of the messages and services of every node.
+MESSAGES = ('builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs',
+            'rcl_interfaces', 'sensor_msgs', 'service_msgs', 'std_msgs', 'std_srvs',
+            'trajectory_msgs', 'type_description_interfaces')
 READ_BYTES = 1 << 16
 
 
@@ -178,13 +184,19 @@ def prepare(names: Sequence[str]) -> None:
     Nothing of it is garbage: a collection would only take time, and in a node copy what is shared.
     """
     gc.disable()
-    for module in (*LATER, *(f'pam_actuation.nodes.{name}' for name in names)):
-        try:
+    for module in (*LATER, *(f'{package}.msg' for package in MESSAGES),
+                   *(f'pam_actuation.nodes.{name}' for name in names)):
+        with contextlib.suppress(ImportError):      # the node says so itself
             importlib.import_module(module)
-        except ImportError:
-            pass        # the node says so itself
+    with contextlib.suppress(ImportError):
+        from rosidl_generator_py import import_type_support, UnsupportedTypeSupport
+        for package in MESSAGES:
+            with contextlib.suppress(UnsupportedTypeSupport):
+                import_type_support(package)
     from numba import njit
     njit(lambda number: number + 1.0)(1.0)
+    # The first line that a node logs would look up the files of all modules.
+    inspect.getframeinfo(sys._getframe())
     gc.freeze()
 
 
