@@ -25,6 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
+import shlex
 import time
 from typing import Any
 
@@ -104,6 +105,11 @@ class DemoResult:
         lines += [f'finding: {text}' for text in self.findings]
         lines += [f'bag: {bag}' for bag in self.bags.values()]
         lines.append(f'page: {self.page}')
+        if 'ppr_learning' in self.bags:
+            out = os.path.join(self.folder, 'investigation')
+            lines.append('next, record until it is clear what the nominal model misses: pam '
+                         f'investigate {shlex.quote(self.bags["ppr_learning"])} --rig {RIG} '
+                         f'--out {shlex.quote(out)}')
         lines.append('see one live in the browser: pam run sine_quarter_hz --view')
         return '\n'.join(lines)
 

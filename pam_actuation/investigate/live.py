@@ -60,6 +60,8 @@ class LiveRecorder(Recorder):
 
     """
 
+    is_live = True
+
     def __init__(self, rig: 'Rig', ask: Ask, hardware: str = '',
                  domain_id: int | None = None) -> None:
         self._rig, self._ask, self._domain_id = rig, ask, domain_id

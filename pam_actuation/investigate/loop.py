@@ -120,33 +120,41 @@ class Investigation:
         deadline = time.monotonic() + 60.0 * self._budget.minutes
         with self._store.locked(self._asked, self._overwrite):
             rounds = self._store.read()
+            if rounds and rounds[-1].verdict == 'refused' and self._recorder.is_live \
+                    and self._store.set_aside(rounds[-1].number):
+                rounds.pop()        # recorded again: a person may have mended the rig
             ended, because = '', ''
             while not ended:
-                number = len(rounds) + 1
-                given = bool(self._question.given) and not rounds
-                decision = decide(rounds, self._question.experiment)
-                ended = decision.ended or self._spent(number, deadline)
-                if ended:
-                    break
                 try:
-                    if not given:
-                        self._record(number, decision)
+                    ended, because = self._round(rounds, deadline)
                 except KeyboardInterrupt:
                     raise KeyboardInterrupt(STOPPED) from None
-                except Declined as error:
-                    ended, because = DECLINED, str(error)
-                except RecordingFailed as error:
-                    ended, because = FAILED, str(error)
-                except InputError as error:
-                    if not rounds:
-                        raise
-                    ended, because = IMPOSSIBLE, str(error)
-                else:
-                    rounds.append(self._look(number, given, decision))
             outcome = Outcome(self._asked, tuple(rounds), ended, because or ENDINGS[ended])
             outcome.write(self._store)
         self._report(1.0, 'done')
         return outcome
+
+    def _round(self, rounds: list[Round], deadline: float) -> tuple[str, str]:
+        """Add a round, or return how the investigation ended and why, ('', '') if it did not."""
+        number = len(rounds) + 1
+        given = bool(self._question.given) and not rounds
+        decision = decide(rounds, self._question.experiment)
+        ended = decision.ended or self._spent(number, deadline)
+        if ended:
+            return ended, ''
+        try:
+            if not given:
+                self._record(number, decision)
+        except Declined as error:
+            return DECLINED, str(error)
+        except RecordingFailed as error:
+            return FAILED, str(error)
+        except InputError as error:
+            if not rounds:
+                raise
+            return IMPOSSIBLE, str(error)
+        rounds.append(self._look(number, given, decision))
+        return '', ''
 
     def _spent(self, number: int, deadline: float) -> str:
         """Return which part of the budget does not allow another round, '' for none."""

@@ -41,10 +41,13 @@ class Recorder(ABC):
     ----------
     valve : str
         ``ppr`` or ``hsv``, of the rig.
+    is_live : bool
+        Whether the same experiment may give another recording the next time.
 
     """
 
     valve: str
+    is_live: bool = False
 
     @abstractmethod
     def check(self, experiment: 'Experiment') -> None:

@@ -34,7 +34,8 @@ from pam_sim.errors import InputError
 from pam_sim.files import check_folder, make_folder, StrPath, write_text
 
 QUESTION, TIMES = 'question.json', 'times.csv'
-RECORDINGS, ROUNDS, BAG, STOPPED = 'recordings', 'rounds', 'bag', '_stopped'
+RECORDINGS, ROUNDS, BAG = 'recordings', 'rounds', 'bag'
+STOPPED, REFUSED = '_stopped', '_refused'      # after the number, of recordings put aside
 PAGE, RESULT, MODEL = 'report.html', 'investigation.json', 'model.yaml'
 PROPOSAL = 'proposed_effect.py'
 RESULTS = (PAGE, RESULT, MODEL, PROPOSAL)
@@ -141,6 +142,24 @@ class Store:
                 if (folder / BAG).is_dir():
                     os.rename(folder / BAG, self._free(f'{number}{STOPPED}'))
                 raise
+
+    def set_aside(self, number: int) -> bool:
+        """
+        Take a round back and keep its recording beside the others.
+
+        Returns
+        -------
+        bool
+            False where the round has no recording of its own; then nothing is done.
+
+        """
+        bag = self.bag(number)
+        if bag is None:
+            return False
+        shutil.rmtree(self.rounds / str(number))
+        os.rename(bag, self._free(f'{number}{REFUSED}'))
+        bag.parent.rmdir()
+        return True
 
     def new_round(self, number: int) -> contextlib.AbstractContextManager[Path]:
         """Give a folder that becomes that of a round when the block ends well."""

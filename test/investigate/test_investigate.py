@@ -256,6 +256,18 @@ def test_a_motion_that_is_declined_or_fails_ends_in_order(small, tmp_path):
     assert outcome.answered and [one[0] for one in played] == ['tell_apart_edges']
 
 
+def test_a_live_recording_that_is_refused_is_made_again(small, tmp_path, monkeypatch):
+    outcome, _ = small(['refused'])
+    assert outcome.wrong and not outcome.has_model
+    outcome, played = small([])                 # a simulated rig would give the same again
+    assert outcome.ended == 'refused' and not played
+    monkeypatch.setattr(Copies, 'is_live', True)
+    outcome, played = small(['no_gap'])
+    assert outcome.answered and len(played) == 1 and len(outcome.rounds) == 1
+    assert sorted(path.name for path in (tmp_path / 'out' / 'recordings').iterdir()) == [
+        '1', '1_refused']
+
+
 def test_recordings_that_are_there_are_the_first_round(small, done):
     bags = [done / 'recordings' / '1' / 'bag'] * 2
     outcome, played = small(['unknown', 'refused'], given=bags)
