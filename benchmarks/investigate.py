@@ -76,10 +76,11 @@ class HiddenRecorder(Recorder):
 
 
 def investigated(question, recorder, folder):
-    """Run an investigation; return (outcome, minutes)."""
-    began = time.perf_counter()
+    """Run an investigation; return (outcome, its time in words)."""
+    began, used = time.perf_counter(), time.process_time()
     outcome = Investigation(question, recorder, folder, Budget(ROUNDS, 600.0)).run()
-    return outcome, (time.perf_counter() - began) / 60.0
+    return outcome, (f'{(time.process_time() - used) / 60.0:.1f} min '
+                     f'({(time.perf_counter() - began) / 60.0:.1f})')
 
 
 def recorded_s(outcome):
@@ -112,7 +113,8 @@ def held_out(rig, model, folder):
 def realistic(args):
     """Print one line per rig with the effects of a real one."""
     print('| rig | valve | rounds | recorded | hidden effects named | other names | ended '
-          '| gap closed (certify) | held-out multisine, rms: nominal → final | minutes |\n'
+          '| gap closed (certify) | held-out multisine, rms: nominal → final '
+          '| processor time (wall) |\n'
           '|---|---|---|---|---|---|---|---|---|---|')
     for valve in args.valves.split(','):
         rigs = {REALISTIC: load_rig(REALISTIC, valve=valve)} | {
@@ -121,7 +123,7 @@ def realistic(args):
         for title, rig in rigs.items():
             with tempfile.TemporaryDirectory(prefix='investigate_') as folder:
                 folder = Path(folder)
-                outcome, minutes = investigated(
+                outcome, time_used = investigated(
                     Question(load_rig(MODEL, valve=valve), load_experiment(EXPERIMENT)),
                     SimulatedRecorder(rig), folder / 'out')
                 names = outcome.rounds[-1].names
@@ -133,7 +135,7 @@ def realistic(args):
                       f'| {told} | {", ".join(n for n in names if n not in right) or "–"} '
                       f'| {outcome.ended}, {outcome.rounds[-1].verdict} | {closed(outcome)} | '
                       f'{held_out(rig, load_rig(str(folder / "out" / "model.yaml")), folder)} '
-                      f'| {minutes:.1f} |', flush=True)
+                      f'| {time_used} |', flush=True)
 
 
 def cases_of(count, seed):
@@ -153,13 +155,13 @@ def cases_of(count, seed):
 def rivals(args):
     """Print one line per hidden rig, and how many ambiguities ended with the right name."""
     print('| case | valve | hidden | load cell | round 1 | played | last round | right | '
-          'recorded | minutes |\n|---|---|---|---|---|---|---|---|---|---|')
+          'recorded | processor time (wall) |\n|---|---|---|---|---|---|---|---|---|---|')
     sets, right, wrong = 0, 0, 0
     for case in cases_of(args.number, args.seed):
         with tempfile.TemporaryDirectory(prefix='investigate_') as folder:
             folder = Path(folder)
             key = truth_cases.build(case, folder / 'case', with_gap=False)
-            outcome, minutes = investigated(
+            outcome, time_used = investigated(
                 Question(load_rig(MODEL, valve=case.valve), load_experiment(EXPERIMENT),
                          (str(folder / 'case' / 'fit'),)), HiddenRecorder(case), folder / 'out')
         first, last = outcome.rounds[0], outcome.rounds[-1]
@@ -173,7 +175,7 @@ def rivals(args):
         print(f'| {case.name} | {case.valve} | {case.effects[0]} '
               f'| {"yes" if case.with_force else "no"} | {first.found()} | {played or "–"} '
               f'| {last.found() if last is not first else "–"} | {"yes" if is_right else "no"} '
-              f'| {recorded_s(outcome):.0f} s | {minutes:.1f} |', flush=True)
+              f'| {recorded_s(outcome):.0f} s | {time_used} |', flush=True)
     print(f'\nOf {sets} recordings that left several names, {right} ended with the right single '
           f'name and {wrong} with a wrong one.')
 
@@ -183,7 +185,7 @@ def command_line():
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('part', choices=('realistic', 'rivals'))
     parser.add_argument('--valves', default='ppr,hsv')
-    parser.add_argument('--hidden', type=int, default=2, metavar='N',
+    parser.add_argument('--hidden', type=int, default=1, metavar='N',
                         help='rigs of the independent simulator beside the realistic one')
     parser.add_argument('--number', type=int, default=20, metavar='N',
                         help='cases of rivals')
