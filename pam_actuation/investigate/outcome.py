@@ -39,6 +39,8 @@ _NOTHING: dict[str, Any] = {
     'verdict': None, 'reason': '', 'effects': [], 'parameters': [], 'ambiguity_set': [],
     'subsystems': {}, 'signals': {}, 'unexplained_fraction': None, 'proposal': None,
     'next_experiment': None}
+PROPOSED_MODEL = 'proposed_model.yaml'
+OPTIONAL = ('model.yaml', 'proposed_effect.py', PROPOSED_MODEL)
 MAY_GO_ON = (ROUNDS, MINUTES, DECLINED, FAILED, IMPOSSIBLE)
 
 
@@ -80,6 +82,12 @@ class Outcome:
         """Return whether there is a model to go on with."""
         return bool(self.rounds) and self.ended != REFUSED
 
+    @property
+    def proposal(self) -> dict[str, Any] | None:
+        """Return the term without a name that the last round found, None without one."""
+        found: dict[str, Any] | None = self.rounds[-1].gap['proposal'] if self.rounds else None
+        return found
+
     def to_dict(self) -> dict[str, Any]:
         """Return what investigation.json holds; paths are told as seen from its folder."""
         last = self.rounds[-1].gap if self.rounds else _NOTHING
@@ -109,6 +117,9 @@ class Outcome:
         if self.rounds:
             lines.append(f'answer: {self.rounds[-1].gap["reason"]}')
             lines += [f'  {line}' for line in shrunk(self.rounds[-1].gap)]
+            if self.proposal:
+                lines.append(f'proposed: {self.proposal["equation"]}; file '
+                             f'{os.path.join(folder, self.proposal["file"])}')
         lines.append(f'page: {os.path.join(folder, "report.html")}')
         if self.has_model:
             lines.append(f'model: {os.path.join(folder, "model.yaml")}')
@@ -123,14 +134,19 @@ class Outcome:
         with whole_files(store.folder) as folder:
             write_text(folder / 'investigation.json',
                        json.dumps(self.to_dict(), indent=2, allow_nan=False) + '\n')
-            model = ''
-            if self.has_model:
-                last = store.rounds / str(self.rounds[-1].number)
-                for name in ('model.yaml', 'proposed_effect.py'):
-                    if (last / name).is_file():
-                        shutil.copyfile(last / name, folder / name)
-                model = (last / 'model.yaml').read_text(encoding='utf-8')
+            model, names = '', ['model.yaml'] * self.has_model
+            if self.proposal:
+                names += [os.path.basename(self.proposal['file']), PROPOSED_MODEL]
+            for name in names:
+                file = store.rounds / str(self.rounds[-1].number) / name
+                if file.is_file():
+                    shutil.copyfile(file, folder / name)
+                    if name == 'model.yaml':
+                        model = file.read_text(encoding='utf-8')
             write_text(folder / 'report.html', investigation_page(self, model))
+            left_over = [name for name in OPTIONAL if not (folder / name).is_file()]
+        for name in left_over:      # of an earlier run, which saw fewer rounds
+            (store.folder / name).unlink(missing_ok=True)
 
 
 def shrunk(gap: dict[str, Any]) -> list[str]:

@@ -87,8 +87,10 @@ def _answer(outcome: 'Outcome') -> Section:
         body += paragraph(f'{VERDICT_TEXT[last.verdict]}. {last.gap["reason"]}')
         body += _effects(last.gap) + _parameters(last.gap)
         if last.gap['proposal']:
-            body += paragraph('A term without a name was found from the data: '
-                              f'{last.gap["proposal"]["equation"]}')
+            body += paragraph(
+                'A term without a name was found from the data, and holds on the proof: '
+                f'{last.gap["proposal"]["equation"]}. Its file is '
+                f'{last.gap["proposal"]["file"]} beside this page.')
     return Section('answer', 'Answer', body)
 
 

@@ -37,8 +37,7 @@ QUESTION, TIMES = 'question.json', 'times.csv'
 RECORDINGS, ROUNDS, BAG = 'recordings', 'rounds', 'bag'
 STOPPED, REFUSED = '_stopped', '_refused'      # after the number, of recordings put aside
 PAGE, RESULT, MODEL = 'report.html', 'investigation.json', 'model.yaml'
-PROPOSAL = 'proposed_effect.py'
-RESULTS = (PAGE, RESULT, MODEL, PROPOSAL)
+RESULTS = (PAGE, RESULT, MODEL, 'proposed_effect.py', 'proposed_model.yaml')
 # What tells another question: each key of question.json with a word for people.
 _ASKED = {'model': 'model', 'experiment': 'first experiment', 'recorder': 'rig',
           'given': 'recordings', 'namespace': 'namespace', 'effects': 'names',

@@ -276,6 +276,24 @@ def test_recordings_that_are_there_are_the_first_round(small, done):
     assert outcome.rounds[0].recordings[0]['path'].startswith('..')
 
 
+def test_a_proposed_term_lies_beside_the_model(small, done, tmp_path):
+    bag, out = done / 'recordings' / '1' / 'bag', tmp_path / 'out'
+    small(['unknown'], given=[bag])
+    round_1 = out / 'rounds' / '1'
+    gap = json.loads((round_1 / 'gap.json').read_text())
+    gap['proposal'] = {'equation': 'dF = a x', 'file': 'proposed_effect.py', 'explained': 0.9,
+                       'subsystem': 'muscle', 'range': {'x': [0.0, 0.02]}}
+    (round_1 / 'gap.json').write_text(json.dumps(gap))
+    (round_1 / 'proposed_effect.py').write_text('a = 1\n')
+    outcome, _ = small([], given=[bag])
+    assert outcome.ended == 'not_named' and 'dF = a x' in outcome.text('x')
+    assert (out / 'proposed_effect.py').read_text() == 'a = 1\n'
+    gap['proposal'] = None
+    (round_1 / 'gap.json').write_text(json.dumps(gap))
+    small([], given=[bag])
+    assert not (out / 'proposed_effect.py').exists() and (out / 'model.yaml').is_file()
+
+
 def test_what_follows_a_round():
     wide = load_experiment(EXPERIMENT)
 
