@@ -268,6 +268,17 @@ class DriverLoop:
 
     def status(self) -> Status:
         """Return how the driver is as of the last tick; there must have been one."""
+        level, message = self.state()
+        assert self._last_ns is not None
+        return Status(self._last_ns, level, 'valve_driver', message, self.values())
+
+    def state(self) -> tuple[int, str]:
+        """Return level and message of the last tick."""
+        assert self._decision is not None
+        return self._decision.level, self._decision.message
+
+    def values(self) -> tuple[tuple[str, str], ...]:
+        """Return the values of the status: keys and texts."""
         now_ns, decision, safety = self._last_ns, self._decision, self.safety
         assert now_ns is not None and decision is not None
         command_ns = safety.command_stamp_ns
@@ -296,7 +307,7 @@ class DriverLoop:
         ]
         if safety.supply.received:
             values.append(('supply_kpa_gauge', f'{gauge_kpa(safety.supply.pressure_pa):.1f}'))
-        return Status(now_ns, decision.level, 'valve_driver', decision.message, tuple(values))
+        return tuple(values)
 
 
 def _followed_pa(decision: Decision) -> float | None:

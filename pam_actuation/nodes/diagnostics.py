@@ -22,6 +22,7 @@ publisher of the node has sent (``published.<topic>``), by which a recording pro
 complete.
 """
 
+from collections.abc import Callable
 import re
 from typing import Any, TYPE_CHECKING
 
@@ -58,7 +59,7 @@ class DiagnosticsReporter:
         self.publisher = CountedPublisher(node, class_of(TOPIC), TOPIC)
         self.level = OK
         self.message = 'starting'
-        self.values: Values = ()
+        self.values_of: Callable[[], Values] = tuple
         self.remark = ''            # what is wrong besides, such as another node of the same name
         self.silent = True
         self.console = Console(node.get_fully_qualified_name())
@@ -66,9 +67,15 @@ class DiagnosticsReporter:
         self._sent: tuple[int, str] | None = None
         self._sent_ns = 0
 
-    def update(self, level: int, message: str, values: Values = ()) -> None:
-        """Set the state; send it at once when level or message changed."""
-        self.level, self.message, self.values = level, message, values
+    def update(self, level: int, message: str,
+               values_of: Callable[[], Values] = tuple) -> None:
+        """
+        Set the state; send it at once when level or message changed.
+
+        ``values_of`` is asked for the values only when a status is sent: they are many texts,
+        and most ticks send none.
+        """
+        self.level, self.message, self.values_of = level, message, values_of
         if (level, message) != self._sent:
             now_ns = self._node.now_ns()
             worse = self._sent is None or level != self._sent[0]
@@ -86,7 +93,7 @@ class DiagnosticsReporter:
             level, message = max(level, WARN), f'{message}; {self.remark}'
         self.publisher.publish(encode(TOPIC, Status(
             now_ns, level, self._node.get_fully_qualified_name(), message,
-            (*self.values, *self._node.diagnostic_values(), *self._counts()), HARDWARE_ID)))
+            (*self.values_of(), *self._node.diagnostic_values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)
 
     def _say(self, now_ns: int, level: int, message: str) -> None:

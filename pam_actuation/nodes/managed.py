@@ -320,11 +320,12 @@ class ManagedNode(LifecycleNode):
 
     def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status of all."""
-        return ERROR if self.exit_code else OK, why, self.diagnostics.values
+        return ERROR if self.exit_code else OK, why, self.diagnostics.values_of()
 
     def _end_work(self, why: str) -> None:
         diagnostics = self.diagnostics
-        diagnostics.level, diagnostics.message, diagnostics.values = self.last_status(why)
+        diagnostics.level, diagnostics.message, values = self.last_status(why)
+        diagnostics.values_of = lambda: values
         diagnostics.send()
         self.stop()
 

@@ -217,7 +217,7 @@ class ValveDriver(ManagedNode):
         fault = self.ear.fault(now_ns)
         self.loop.set_sender_fault(fault)
         self._answering.every(ANSWER_PERIOD_S if fault else IDLE_PERIOD_S)
-        signal, status = self.loop.tick(now_ns)
+        signal = self.loop.act(now_ns)
         problem = self._refusal = self.output.send(signal.efforts)
         self.loop.on_device(problem)
         self.send('valve_signal', self.loop.safe_signal(now_ns) if problem else signal)
@@ -227,7 +227,8 @@ class ValveDriver(ManagedNode):
         safety = self.loop.safety
         self._latencies['command'].used(safety.command_stamp_ns, now_ns)
         self._latencies['pressure'].used(safety.pressure.stamp_ns, now_ns)
-        self.diagnostics.update(status.level, status.message, status.values)
+        level, message = self.loop.state()
+        self.diagnostics.update(level, message, self.loop.values)
 
     def safe_stop(self, why: str) -> None:
         """Send the signal that vents, again if the device refuses it."""
@@ -243,7 +244,7 @@ class ValveDriver(ManagedNode):
     def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status: that it ended, and vented."""
         ended = {'state': 'ended', 'fault': '', 'target_kpa_gauge': 'vent'}
-        values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values)
+        values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values_of())
         level, message, _ = super().last_status(why)
         if self._not_vented:
             return ERROR, f'{message}, not vented: {self._not_vented}', values
