@@ -58,6 +58,8 @@ def facts(entry: dict[str, Any]) -> list[tuple[str, str]]:
         ('simpler look-alikes, named instead where they explain as much',
          ', '.join(entry.get('limits', ()))),
         ('does the same as the number', entry.get('same_as', '')),
+        ('does the same, unless the force is measured, as the number',
+         entry.get('same_without_force', '')),
         ('fitted', '; '.join(
             f'{item["name"]} {_range((item["lower"], item["upper"]), 1.0)}, '
             f'typically {item["typical"]:g}' for item in entry.get('fitted', ()))),

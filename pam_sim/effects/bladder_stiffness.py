@@ -37,7 +37,8 @@ EFFECT = Effect(
     fitting=Fitting(
         free=(
             # It takes force; one that gave some would be an error of the force map.
-            FreeParameter('stiffness_n_per_m', 200.0, 0.0, 1e4),)),
+            FreeParameter('stiffness_n_per_m', 200.0, 0.0, 1e4),),
+        same_without_force='spring_n_per_m'),
 )
 
 

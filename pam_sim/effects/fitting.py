@@ -90,6 +90,8 @@ class Fitting:
         such effects look alike, and they are a set.
     same_as : str
         Parameter of the model that does the same.
+    same_without_force : str
+        Parameter of the model that does the same to all signals but a measured force.
     delay : str
         Parameter by which the effect is late as a whole, as behind the filter of a sensor.
     edges : tuple of str
@@ -108,6 +110,7 @@ class Fitting:
     together: tuple[str, ...] = ()
     remembers: bool = False
     same_as: str = ''
+    same_without_force: str = ''
     delay: str = ''
     edges: tuple[str, ...] = ()
     sensor_signal: str = ''

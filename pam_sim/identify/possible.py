@@ -60,8 +60,10 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     Return the effects that may be missing, as numbers with a prior about zero.
 
     Formulations of the same name, and what stands in the rig or among ``numbers``, are left out.
-    So are sensors: they count as calibrated, unless their zero is asked for.
+    So are sensors: they count as calibrated, unless their zero is asked for. An effect that acts
+    as an unknown number does is left to that number.
     """
+    acts_as_unknown = {e.name for e, _ in counted_in(problems, numbers)}
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
     unknown = {n.name for n in numbers if n.unknown}
     if 'spring_n_per_m' in unknown:
@@ -70,6 +72,7 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     for effect in effects().values():
         if (effect.variant_of or effect.subsystem == 'sensor' or effect.name in there
                 or effect.name in NOT_GRADUAL or rig.valve not in effect.valves
+                or effect.name in acts_as_unknown
                 or effect.fitting.same_as in unknown):
             continue
         sizes = [p for p in effect.parameters if p.name in effect.amplitude]
@@ -81,6 +84,20 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
             if any(number.acts_in(problem) for problem in problems):
                 found.append(number)
     return found
+
+
+def counted_in(problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
+               ) -> list[tuple[Effect, str]]:
+    """
+    Return (effect, unknown number) where the recordings cannot tell one from the other.
+
+    A tube that resists contraction is one with the spring of the load, unless the force between
+    them is measured.
+    """
+    unknown = {n.name for n in numbers if n.unknown}
+    with_force = any('force' in p.signals for p in problems)
+    return [(effect, effect.fitting.same_without_force) for effect in effects().values()
+            if not with_force and effect.fitting.same_without_force in unknown]
 
 
 def in_other_forms(weighted: Weighted, x: FloatArray, count: int

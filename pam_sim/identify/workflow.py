@@ -30,7 +30,7 @@ from pam_sim.identify.judgement import DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import (
-    in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
+    counted_in, in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
@@ -125,6 +125,9 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(weighted, x)), incomplete)
     result.remarks += _starting_values(weighted, x, acting)
+    result.remarks += [
+        f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
+        'apart' for effect, name in counted_in(problems, acting)]
     result.remarks += [
         f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
         for n in wanted if n not in acting]

@@ -120,6 +120,17 @@ def test_a_missing_effect_widens_the_intervals_and_is_said():
     assert inside(found['mass_kg'], 3.3)
 
 
+def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured():
+    rig = RIG.with_(effects=[spring(400.0), {'name': 'valve_dead_time'}])
+    found = identify(record(rig, keep=('pressure', 'contraction')), RIG, ['spring_n_per_m'],
+                     advise=False)
+    assert found.incomplete and inside(found['spring_n_per_m'], 400.0)
+    assert statuses(found)['spring_n_per_m'] == 'determined'
+    assert 'bladder_stiffness would look the same' in found.text()
+    with_force = record(RIG.with_(effects=[spring(400.0)]))
+    assert 'would look the same' not in identify(with_force, RIG, ['spring_n_per_m']).text()
+
+
 @pytest.mark.parametrize('change, said', [
     (lambda run: run.topics.pop('pressure'), 'has no `pressure`'),
     (lambda run: [run.topics.pop(n) for n in ('contraction', 'force', 'valve_signal')],
