@@ -18,7 +18,8 @@ The demo: the real nodes on DDS for both valves, then everything that can be don
 The steps are live tracking on the PPR with learning, the same with frozen rules, and live tracking
 on the HSV pair. Then bags are checked with two independent readers and the controller is replayed.
 A short offline tuning, the gap to the nominal model and one page follow. Every step is what the
-``pam`` verbs do, called in a row.
+``pam`` verbs do. The search of the gap and the independent readers take long: they begin as soon
+as their bag is there, as processes of low priority beside the next live run.
 """
 
 from collections.abc import Callable
@@ -37,7 +38,7 @@ from pam_actuation.bags.place import check_bag_target
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
-from pam_actuation.parallel import in_processes
+from pam_actuation.parallel import abandon, giving_way, in_processes, Results
 from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.report.demo_page import demo_report, DemoPart
 from pam_actuation.report.gap import FILES, free_run_overlay, write_gap
@@ -75,6 +76,11 @@ def check_place(folder: StrPath) -> None:
     check_folder(os.path.join(folder, 'gap'), FILES, overwrite=False)
     for name in TITLES:
         check_bag_target(os.path.join(folder, name))
+
+
+def gap_of_bag(bag: StrPath, folder: StrPath, seconds: float) -> GapResult:
+    """Hold a recording against the nominal model; write the result folder."""
+    return write_gap([load_run(bag)], NOMINAL, folder, seconds=seconds)
 
 
 @dataclass
@@ -143,6 +149,9 @@ class Demo:
         self._checks: list[list[str]] = []
         self._tuning: TuneResult | None = None
         self._gap: GapResult | None = None
+        # What runs beside: name of a bag to the readers' counts, and the gap of the first.
+        self._read: dict[str, Results[dict[str, dict[str, int]]]] = {}
+        self._found: Results[GapResult] | None = None
 
     def run(self) -> DemoResult:
         """Run all steps and return the DemoResult."""
@@ -151,13 +160,16 @@ class Demo:
         steps = self._steps()
         total = sum(seconds for seconds, _, _ in steps)
         done = 0.0
-        for seconds, what, step in steps:
-            def inner(share: float, done: float = done, seconds: float = seconds,
-                      what: str = what) -> None:
-                self._progress((done + seconds * share) / total, what)
-            inner(0.0)
-            step(inner)
-            done += seconds
+        try:
+            for seconds, what, step in steps:
+                def inner(share: float, done: float = done, seconds: float = seconds,
+                          what: str = what) -> None:
+                    self._progress((done + seconds * share) / total, what)
+                inner(0.0)
+                step(inner)
+                done += seconds
+        finally:
+            abandon(*filter(None, (self._found, *self._read.values())))
         self._progress(1.0, 'done')
         self.result.wall_s = time.perf_counter() - started
         return self.result
@@ -165,14 +177,14 @@ class Demo:
     def _steps(self) -> list[tuple[float, str, Callable[[Progress], object]]]:
         """Return (expected seconds, name, function) of each step."""
         return [
-            (52, 'PPR, learning', lambda p: self._live('ppr_learning', self._long, True, p)),
-            (52, 'PPR, rules frozen', lambda p: self._live('ppr_frozen', self._long, False, p)),
-            (32, 'HSV, learning', lambda p: self._live('hsv_learning', self._short, True, p)),
-            (6, 'checking the bags', self._check),
-            (2, 'replaying the controller', self._replay),
-            (8, 'tuning offline', self._tune),
-            (25, 'gap between model and recording', self._look_at_gap),
-            (3, 'writing the page', self._write_page),
+            (50, 'PPR, learning', lambda p: self._live('ppr_learning', self._long, True, p)),
+            (49, 'PPR, rules frozen', lambda p: self._live('ppr_frozen', self._long, False, p)),
+            (29, 'HSV, learning', lambda p: self._live('hsv_learning', self._short, True, p)),
+            (4, 'replaying the controller', self._replay),
+            (2, 'tuning offline', self._tune),
+            (3, 'checking the bags', self._check),
+            (1, 'gap between model and recording', self._look_at_gap),
+            (2, 'writing the page', self._write_page),
         ]
 
     def _live(self, name: str, experiment: str, learning: bool, progress: Progress) -> None:
@@ -192,15 +204,18 @@ class Demo:
             lost = sum(result.published.values()) - sum(result.recorded.values())
             self.result.findings.append(f'{TITLES[name]}: {lost} messages were not recorded')
         self.result.findings += [f'{TITLES[name]}: {text}' for text in result.findings]
+        self._read[name] = in_processes(2, [
+            joblib.delayed(giving_way)(independent_readers, result.bag)])
         self._runs[name] = load_run(result.bag)
+        if name == 'ppr_learning':
+            self._found = in_processes(2, [joblib.delayed(giving_way)(
+                gap_of_bag, result.bag, os.path.join(self.result.folder, 'gap'),
+                self._gap_search_s)])
 
     def _check(self, progress: Progress) -> None:
         """Open every bag with readers this project did not write, and count."""
-        bags = self.result.bags
-        read_by_others = in_processes(2, (
-            joblib.delayed(independent_readers)(bag) for bag in bags.values()))
-        for (name, bag), readers in zip(bags.items(), read_by_others):
-            info = bag_info(bag)
+        for name, bag in self.result.bags.items():
+            info, readers = bag_info(bag), next(self._read[name])
             counts = {topic.name: topic.count for topic in info.topics}
             self._checks.append([name, 'published = recorded', 'yes' if info.complete else 'no'])
             for reader, read in readers.items():
@@ -231,10 +246,9 @@ class Demo:
         self._tuning.save(Path(self.result.folder, 'tuned.yaml'))
 
     def _look_at_gap(self, progress: Progress) -> None:
-        """Hold the recording against the nominal model."""
-        self._gap = write_gap(
-            [self._runs['ppr_learning']], NOMINAL, os.path.join(self.result.folder, 'gap'),
-            seconds=self._gap_search_s, progress=progress)
+        """Wait for what was found between the recording and the nominal model."""
+        assert self._found is not None      # since the first live run
+        self._gap = next(self._found)
 
     def _write_page(self, progress: Progress) -> None:
         """Put everything on one page."""

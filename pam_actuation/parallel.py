@@ -14,20 +14,26 @@
 
 """Work in processes of joblib that Ctrl-C does not reach: who started them ends them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker as standard_tracker
+import os
 import sys
-from typing import Any
+from typing import Any, TypeVar
+import warnings
 
 import joblib
 from joblib.externals.loky.backend import resource_tracker
 from pam_actuation.interrupts import kept_from_children
 
+R = TypeVar('R')
+Results = Generator[R, None, None]
+NICENESS = 10               # of 19
 
-def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
+
+def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Results[Any]:
     """
-    Return a generator of the results of some calls, in their order.
+    Return a generator of the results of some calls, in their order; they begin at once.
 
     Parameters
     ----------
@@ -42,8 +48,26 @@ def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
         for tracker in (resource_tracker, standard_tracker):
             tracker.ensure_running()
     with kept_from_children():
-        results: Iterator[Any] = joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)
+        results: Results[Any] = joblib.Parallel(n_jobs=jobs, return_as='generator')(calls)
         return results
+
+
+def giving_way(call: Callable[..., R], *arguments: Any) -> R:
+    """
+    Return what a call returns; from now on this process has a low priority.
+
+    For calls ``in_processes`` beside live nodes: these go first.
+    """
+    os.nice(max(NICENESS - os.nice(0), 0))
+    return call(*arguments)
+
+
+def abandon(*results: Results[Any]) -> None:
+    """End the calls of ``in_processes`` whose results are not wanted any more."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', UserWarning)        # joblib's, that they did not end
+        for one in results:
+            one.close()
 
 
 @contextmanager

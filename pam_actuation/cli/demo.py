@@ -22,7 +22,7 @@ from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import out_path, Parser
 
 HELP = ('Run the real nodes as separate processes on DDS for both valves: record, replay, tune, '
-        'gap between model and recording, one HTML page. Takes about three minutes.')
+        'gap between model and recording, one HTML page. Takes two and a half minutes.')
 EXAMPLE = 'pam demo --out runs/demo'
 
 

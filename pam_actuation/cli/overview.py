@@ -29,7 +29,7 @@ GROUPS = {
         'up': 'bring up the nodes of a rig, a joint or both knees',
         'import': 'make a bag of a table measured elsewhere: CSV, Parquet, MAT, HDF5',
         'rig': 'write a commented file of a rig, known and unknown numbers, or check one',
-        'demo': 'see everything once with live nodes, in about three minutes'},
+        'demo': 'see everything once with live nodes, in two and a half minutes'},
     'Operate running nodes': {
         'status': 'how each node is, and why',
         'estop': 'emergency stop: every driver vents until it is reset',
