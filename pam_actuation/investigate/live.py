@@ -26,7 +26,9 @@ from pam_actuation.investigate.motion import Ask, limit_of, Motion
 from pam_actuation.investigate.recorder import Declined, Progress, Recorder, RecordingFailed
 from pam_actuation.investigate.simulated import controller_for
 from pam_actuation.namespaces import MUSCLE
+from pam_sim.errors import InputError
 from pam_sim.files import write_text
+from pam_sim.units import gauge_kpa, P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
@@ -69,8 +71,14 @@ class LiveRecorder(Recorder):
         self.valve = rig.valve
 
     def check(self, experiment: 'Experiment') -> None:
-        """Raise InputError where the rig cannot do an experiment."""
+        """Raise InputError where the rig cannot do an experiment, or its driver would cut it."""
         experiment.check_reachable(self._rig)
+        limit_pa = self.motion(experiment).limit_gauge_pa
+        if experiment.domain == 'pressure' and \
+                experiment.chain.extremes()[1] - P_ATM_PA > limit_pa + 1e-6:
+            raise InputError(
+                f'asks for {gauge_kpa(experiment.chain.extremes()[1]):.0f} kPa gauge; the driver '
+                f'allows 0 to {limit_pa * 1e-3:.0f} kPa', f'experiment "{experiment.name}"')
 
     def motion(self, experiment: 'Experiment', why: str = '') -> Motion:
         """Return what a person is asked before an experiment."""

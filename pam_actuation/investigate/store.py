@@ -29,7 +29,7 @@ from typing import Any
 
 from pam_actuation.campaign.store import kept_folder, only_one
 from pam_actuation.investigate.recorder import RecordingFailed
-from pam_actuation.investigate.rounds import Round, ROUND_FILE
+from pam_actuation.investigate.rounds import Round
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, make_folder, StrPath, write_text
 
@@ -119,10 +119,15 @@ class Store:
             yield
 
     def read(self) -> list[Round]:
-        """Return the rounds that are there, in order."""
+        """Return the rounds that are there, in order; InputError where one is damaged."""
         found: list[Round] = []
-        while (self.rounds / str(len(found) + 1) / ROUND_FILE).is_file():
-            found.append(Round.read(self.rounds / str(len(found) + 1)))
+        while (folder := self.rounds / str(len(found) + 1)).is_dir():
+            try:
+                found.append(Round.read(folder))
+            except (OSError, ValueError, KeyError, TypeError):
+                raise InputError(
+                    'this round is damaged; remove its folder, and it is found again',
+                    self.as_seen(folder)) from None
         return found
 
     def bag(self, number: int) -> Path | None:
@@ -190,4 +195,12 @@ class Store:
         if not isinstance(known, dict):
             known = {}
         plain = json.loads(json.dumps(asked))
+        for one in (known, plain):      # a recording stays the same when it is moved
+            one['given'] = _hashes(one.get('given'))
         return next((word for key, word in _ASKED.items() if known.get(key) != plain[key]), '')
+
+
+def _hashes(given: Any) -> list[Any]:
+    """Return what tells the recordings of a question, whatever their paths are."""
+    listed = given if isinstance(given, list) else []
+    return [one.get('sha256') for one in listed if isinstance(one, dict)]

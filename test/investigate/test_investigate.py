@@ -139,6 +139,10 @@ def test_a_folder_holds_one_question(done, lab, tmp_path, capsys):
     assert main(arguments(lab, tmp_path)) == 2
     assert 'belongs to no investigation' in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ['rounds']
+    shutil.copytree(done, tmp_path / 'damaged')
+    (tmp_path / 'damaged' / 'rounds' / '1' / 'gap.json').write_text('{')
+    assert main(arguments(lab, tmp_path / 'damaged')) == 2
+    assert 'rounds/1: this round is damaged' in capsys.readouterr().err
 
 
 def test_mistakes_are_told_before_anything_moves(lab, tmp_path, capsys, monkeypatch):

@@ -24,6 +24,7 @@ from pam_actuation.investigate.recorder import Declined, RecordingFailed
 from pam_actuation.rigging import supervisor as supervisors
 from pam_actuation.rigging.transitions import SessionFailed
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -131,6 +132,9 @@ def test_the_limit_told_is_the_lower_one(tmp_path):
                     'max_pressure_gauge_pa: 250000.0}\n')
     recorder = LiveRecorder(load_rig(MODEL), lambda motion: True, str(file))
     assert recorder.motion(load_experiment('rest')).limit_gauge_pa == 250e3
+    recorder.check(load_experiment('rest'))
+    with pytest.raises(InputError, match='asks for 539 kPa gauge; the driver allows 0 to 250'):
+        recorder.check(load_experiment('random_steps'))
     simulated = LiveRecorder(load_rig(MODEL), lambda motion: True)
     told = simulated.motion(load_experiment('rest'))
     assert told.limit_gauge_pa == 600e3 and 'a simulated muscle' in told.text()
