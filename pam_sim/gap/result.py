@@ -209,6 +209,8 @@ class GapResult:
     subsystems : dict of str -> SubsystemVerdict
         By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
         them is named.
+    noticed : list of Notice
+        What is no noise, where it makes an answer ``unknown``.
     numbers_first : dict, optional
         What was found of unknown numbers before the look: the entry of gap.json.
     first_lines : list of str
@@ -239,6 +241,7 @@ class GapResult:
     evidence: list[dict[str, Any]] = field(default_factory=list)
     at_one_speed: bool = False
     subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
+    noticed: list[Any] = field(default_factory=list)
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
 

@@ -28,6 +28,8 @@ from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.materiality import is_material
 from pam_sim.gap.verify.model import held_without, model_of, numbers_of
+from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
+from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
 from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
 from pam_sim.gap.verify.validation import Validation
@@ -61,8 +63,13 @@ def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
 
 
 def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation: Validation,
-          base: Fit, final: Fit, materiality: float, whole: bool) -> None:
-    """Set verdict, ambiguity set and the unexplained fraction of a result."""
+          base: Fit, final: Fit, materiality: float, whole: bool, runs: OwnRuns) -> None:
+    """
+    Set verdict, ambiguity set and the unexplained fraction of a result.
+
+    What is too small for a name stands beside a gap without one where the verdict is ``unknown``
+    though something is named.
+    """
     named, criteria = outcome.named, estimator.criteria
     result.moved = validation.moved(base, whole) if named else {}
     own = validation.moved(held_without(final), whole) if named else {}
@@ -84,16 +91,17 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
         {'subsystem': w.subsystem, 'name': r.name, 'share': r.share.get(w.subsystem, 0.0),
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.prior_deviation) > criteria.max_prior_sd]
-    # A gap without a name must be likely, however small an effect matters.
-    least = criteria.likely_sd * max(materiality, 1.0)
-    if not outcome.share or (not material and not wrong and (
-            named or not _is_left(result, estimator, validation, base, least, whole))):
+    if not outcome.share or not (material or wrong):
+        # A gap without a name must be likely, however small an effect matters.
+        least = criteria.likely_sd * max(materiality, 1.0)
+        is_left = _is_left(result, estimator, validation, base, least, whole)
+        result.noticed = _noticed(estimator, validation, base, materiality,
+                                  None if is_left else runs)
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
+        if is_left or result.noticed:
+            result.verdict, result.unexplained_fraction = 'unknown', 1.0
         return
     result.unexplained_fraction = validation.unexplained()
-    if not named:
-        result.verdict, result.unexplained_fraction = 'unknown', 1.0
-        return
     result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
     if any(len(w.names) > 1 for w in named):
         result.verdict = 'ambiguous'
@@ -108,6 +116,27 @@ def _at_most(estimator: Estimator, final: Fit, named: Sequence[NamedEffect]) -> 
     names = [c.name for c in final.hypothesis.effects]
     return 1.0 + NORMAL_95 / min((estimator.certainty(final, names.index(w.name))
                                   for w in named if w.name in names), default=math.inf)
+
+
+def _noticed(estimator: Estimator, validation: Validation, base: Fit, materiality: float,
+             runs: OwnRuns | None) -> list[Notice]:
+    """
+    Return what calibration leaves that is no noise, and that may matter in a free run.
+
+    Without ``runs``, where the free run itself shows a gap, the recorded supply pressure alone.
+    """
+    criteria, recording = estimator.criteria, validation.recording
+    least = max(materiality, 1.0)
+    found = [one for one in [supply_notice(
+        recording, model_of(estimator, base), validation.noise['pressure'], least)]
+        if one is not None and one.is_gap(criteria)]
+    if runs is None:
+        return found
+    floor = validation.floor_with(stamp_sd_s(recording))
+    may_matter = any(gap.rmse_refit > math.hypot(floor[s], least * validation.noise[s])
+                     for s, gap in validation.signals().items())
+    return found + [one for one in (notices(runs, estimator, base) if may_matter else ())
+                    if one.is_gap(criteria)]
 
 
 def _is_left(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,

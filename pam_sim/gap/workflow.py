@@ -29,7 +29,7 @@ from pam_sim.gap.plan.detectable import least_sizes
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.place import places
-from pam_sim.gap.report.reason import explain
+from pam_sim.gap.report.reason import explain, join
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.context import context_of
 from pam_sim.gap.select.memory import as_sets, memories
@@ -157,10 +157,23 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         outcome.named = as_sets(context, outcome.named, final)
     if not outcome.complete:
         result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
-    fill(result, estimator, outcome, final, validation)
-    judge(result, outcome, estimator, validation, base, final, materiality, certify is not None)
+
+    def judged() -> OwnRuns:
+        runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
+        fill(result, estimator, outcome, final, validation)
+        judge(result, outcome, estimator, validation, base, final, materiality,
+              certify is not None, runs)
+        return runs
+
+    own_runs = judged()
+    if result.verdict == 'unknown' and outcome.named:
+        # Too small for a name; the gap is another one.
+        small = join(w.name for w in outcome.named)
+        result.remarks.append(f'What {small} would explain is too small to matter.')
+        outcome.named, final = [], base
+        validation = validated(final)
+        own_runs = judged()
     result.at_one_speed = one_speed and set(memories()) <= set(result.ambiguity_set)
-    own_runs = OwnRuns(validation, certify is not None, estimator, base, final, seed)
     result.subsystems = subsystem_verdicts(
         result, outcome.named, own_runs, criteria, materiality)
     result.where = places(

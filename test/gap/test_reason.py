@@ -26,8 +26,9 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.report.reason import explain
-from pam_sim.gap.result import Calibrated, GapResult, SignalGap
+from pam_sim.gap.result import Calibrated, GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.verify.notice import Notice
 from pam_sim.run import Run, Series
 import pytest
 
@@ -109,6 +110,22 @@ def test_unknown_is_never_explained():
                     'it: the best fit explains 42 % in the valve.')
     assert said('unknown', signals, share={'valve': -0.2}).endswith(
         'no known effect explains it.')
+
+
+def test_unknown_tells_of_fits_only_where_the_gap_is():
+    quiet, wide = (SubsystemVerdict(v, (), 'pressure', PRESSURE, 1.0)
+                   for v in ('no_gap', 'unknown'))
+    text = said('unknown', {'pressure': PRESSURE}, share={'valve': 0.3, 'muscle': 1.0},
+                subsystems={'valve': wide, 'muscle': quiet})
+    assert '100 %' not in text and 'explains 30 % in the valve.' in text
+    still = SignalGap('Pa', 300.0, 310.0, 300.0, 300.0)
+    text = said('unknown', {'pressure': still},
+                noticed=[Notice('valve', 'pressure', 0.3, 0.2, 9.0)])
+    assert 'little' not in text and text.startswith(
+        'The calibrated model leaves a gap that its free run hides and no known effect')
+    assert text.endswith('follow time or pressure by 9 deviations.')
+    text = said('unknown', {'pressure': still}, noticed=[Notice('muscle', 'force', 0.9, 0.3)])
+    assert text.endswith('The force errs 3.0 times as much over half a second as noise does.')
 
 
 def test_a_wrong_number_is_a_sentence_of_its_own():

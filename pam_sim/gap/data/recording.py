@@ -68,6 +68,8 @@ class Recording:
         Stamp of time 0; the first instant at which all signals are known.
     steps : int
         Physics steps of a free run.
+    supply : tuple of numpy.ndarray or None
+        Seconds since the start and supply pressure [Pa], where it was recorded.
 
     """
 
@@ -98,6 +100,12 @@ class Recording:
         stamped = [] if command is None else [
             _ordered(command, name) for name in VALVE_FIELDS[valve]]
         self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
+        self.supply: tuple[FloatArray, FloatArray] | None = None
+        if 'supply_pressure' in run and 'pressure_pa' in run.topics['supply_pressure'].values:
+            stamp, value = _ordered(run.topics['supply_pressure'], 'pressure_pa')
+            seconds = (stamp - self.start_ns) * 1e-9
+            inside = (seconds >= 0.0) & (seconds <= self.grid_s[-1])
+            self.supply = seconds[inside], value[inside]
         self.external_force_n = None
         if 'external_force' in run:
             stamp, value = _ordered(run.topics['external_force'], 'force_n')
@@ -119,6 +127,11 @@ class Recording:
                 moved = np.maximum.accumulate(moved + stamp_shift_s[:moved.size])
             columns.append(held_mean(moved, value, self.grid_s))
         return columns[0] if len(columns) == 1 else np.column_stack(columns)
+
+    @property
+    def valve_stamps_s(self) -> FloatArray:
+        """Return the stamps of the valve signal since the start [s], rising."""
+        return self._valve[0][0]
 
     @property
     def messages(self) -> int:

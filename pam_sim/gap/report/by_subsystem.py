@@ -73,6 +73,8 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
         left = {s: _left(runs.gaps[s], result, criteria, {
             signal: doubt[s, signal] for signal in runs.gaps[s]}) for s in open_ones}
     unknown = {s for s, value in left.items() if value > least}
+    if result.verdict == 'unknown':
+        unknown |= {one.subsystem for one in result.noticed}
     if result.verdict == 'unknown' and not unknown:
         unknown = {max(plain, key=lambda s: plain[s])}     # or the doubt hides it here
     return {s: replace(one, verdict='unknown') if s in unknown else one

@@ -20,7 +20,7 @@ from typing import Any
 from pam_sim.effects.registry import effects
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.report.words import in_words
-from pam_sim.gap.result import Calibrated, GapResult, SignalGap
+from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.harm import Harm
 
@@ -43,8 +43,8 @@ def _told(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'parameter' and result.unexplained_fraction < WORTH_A_WORD:
         return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
-        missed = _sizes(result.signals, 'rmse_refit')
-        return f'The calibrated model misses {missed}{_nearest(outcome)}.{_mistaken(outcome)}'
+        return (f'{_missed(result)}{_nearest(result, outcome)}.{_noticed(result)}'
+                f'{_mistaken(outcome)}')
     # Of several that are named, some may be certain.
     open_sets = list({frozenset(w.names): w.names for w in outcome.named
                       if len(w.names) > 1}.values())
@@ -118,10 +118,28 @@ def _harm(harm: Harm) -> str:
             f'to {after} {unit}, so {they} not added.')
 
 
-def _sizes(signals: Mapping[str, SignalGap], name: str) -> str:
-    return join([f'{getattr(s, name) * READABLE[k][0]:.3g} {READABLE[k][1]} of {k}'
-                 for k, s in signals.items() if getattr(s, name) > 1.1 * s.noise_floor]
-                or ['little'])
+def _missed(result: GapResult) -> str:
+    """Return the beginning of a sentence that says what calibration leaves."""
+    sizes = [f'{s.rmse_refit * READABLE[k][0]:.3g} {READABLE[k][1]} of {k}'
+             for k, s in result.signals.items() if s.rmse_refit > 1.1 * s.noise_floor]
+    if sizes:
+        return f'The calibrated model misses {join(sizes)}'
+    return 'The calibrated model leaves a gap that its free run hides'
+
+
+def _noticed(result: GapResult) -> str:
+    """Return in sentences what shows a gap that is no noise."""
+    parts = []
+    for one in result.noticed:
+        if one.signal == 'supply_pressure':
+            parts.append(' The recorded supply pressure moves, that of the model does not.')
+        elif one.deviations > 0.0:
+            parts.append(' Over short spans the pressure errs as noise and stamps do not: its '
+                         f'errors follow time or pressure by {one.deviations:.0f} deviations.')
+        else:
+            parts.append(f' The {one.signal} errs {one.rms / one.expected:.1f} times as much '
+                         'over half a second as noise does.')
+    return ''.join(parts)
 
 
 def _mistaken(outcome: Outcome) -> str:
@@ -130,9 +148,11 @@ def _mistaken(outcome: Outcome) -> str:
                    for name, relative in outcome.mistaken.items())
 
 
-def _nearest(outcome: Outcome) -> str:
-    """Return in words what was fitted, and why it is no explanation."""
-    shares = {s: share for s, share in outcome.share.items() if share >= LEAST_SHARE}
+def _nearest(result: GapResult, outcome: Outcome) -> str:
+    """Return in words what was fitted where the gap is, and why it is no explanation."""
+    closed = {s for s, one in result.subsystems.items() if one.verdict == 'no_gap'}
+    shares = {s: share for s, share in outcome.share.items()
+              if share >= LEAST_SHARE and s not in closed}
     parts = [f'{100 * share:.0f} % in the {s}' for s, share in shares.items()]
     if not parts:
         return ' and no known effect explains it'

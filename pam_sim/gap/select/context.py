@@ -17,8 +17,10 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.data.supply import supply_stands
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
@@ -127,6 +129,8 @@ def context_of(estimator: Estimator, seen_gap: float, least_gap: float,
     """
     outputs: tuple[str, ...] = sum((problem.signals for problem in estimator.problems), ())
     pool = candidates(estimator.rig, outputs, only)
+    if supply_stands(estimator.problems[0].recordings, estimator.criteria):
+        pool = [c for c in pool if 'supply' not in get_effect(c.effect).hooks]
     base = estimator.base
     screened = screen(estimator, base, split_refinements(pool)[0])
     first_gap = {p.subsystem: first_gap_of(p, base, screened, seen_gap)

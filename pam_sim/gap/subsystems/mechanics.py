@@ -80,6 +80,11 @@ class MechanicsProblem(SubsystemProblem):
         self._noise_pa = [0.0 if random is None else noise.draw(r.time_s['pressure'], random)
                           for r, noise in zip(self.recordings, self._noise)]
 
+    def shift_inputs(self, noise_sd: float) -> None:
+        """Shift the measured pressure by so many deviations of its noise, until ``disturb``."""
+        self._command.cache_clear()
+        self._noise_pa = [noise_sd * noise.sd for noise in self._noise]
+
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
         rig = pressure_driven(rig)

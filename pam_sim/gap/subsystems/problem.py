@@ -21,7 +21,7 @@ import threading
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.noise import sensor_floor
+from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import part_of
@@ -83,7 +83,7 @@ class SubsystemProblem:
         self._place = lru_cache(maxsize=KEPT)(self._place_of)
         self.signals = tuple(s for s in SIGNALS
                              if any(s in self.outputs(r) for r in recordings))
-        self.level = 1.0
+        self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
         self.simulations, self._lock = 0, threading.Lock()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
@@ -123,9 +123,19 @@ class SubsystemProblem:
     def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
         raise NotImplementedError
 
+    def disturb(self, random: np.random.Generator | None, stamp_sd_s: float = STAMP_SD_S
+                ) -> None:
+        """Disturb the measured inputs as noise and stamps do, or no more where it is None."""
+        self._stamp_sd_s = stamp_sd_s
+        self._disturb(random)
+
     def _disturb(self, random: np.random.Generator | None) -> None:
         """Disturb the measured inputs as their noise does, or no more."""
         raise NotImplementedError
+
+    def shift_inputs(self, noise_sd: float) -> None:
+        """Shift measured inputs by so many deviations of their noise, until ``disturb``."""
+        self._disturb(None)
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         raise NotImplementedError

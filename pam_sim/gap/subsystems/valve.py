@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.noise import noise_sd, SMALLEST, STAMP_SD_S
+from pam_sim.gap.data.noise import noise_sd, SMALLEST
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.subsystems.effects import acts_on, true_value
 from pam_sim.gap.subsystems.known import (
@@ -71,7 +71,7 @@ class ValveProblem(SubsystemProblem):
 
     def _disturb(self, random: np.random.Generator | None) -> None:
         self._shift_s = None if random is None else [
-            STAMP_SD_S * random.standard_normal(r.messages) for r in self.recordings]
+            self._stamp_sd_s * random.standard_normal(r.messages) for r in self.recordings]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]

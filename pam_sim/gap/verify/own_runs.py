@@ -34,6 +34,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verify.spread import spread_of_runs
 from pam_sim.gap.verify.validation import Validation
+from pam_sim.rig import Rig
 
 
 class OwnRuns:
@@ -83,7 +84,7 @@ class OwnRuns:
     def residual(self, subsystem: str, signal: str) -> tuple[FloatArray, FloatArray]:
         """Return (instants [s], errors of the calibrated model, SI) on the certify data."""
         p = next(p for p in self._problems if p.subsystem == subsystem)
-        return p.time_s[self._chosen(p, signal)], self._refit[subsystem, signal]
+        return p.time_s[self.chosen(p, signal)], self._refit[subsystem, signal]
 
     def _given(self) -> dict[tuple[str, str], FloatArray]:
         """Return the errors of the given model, by subsystem and signal."""
@@ -94,18 +95,21 @@ class OwnRuns:
 
     def _errors(self, found: Fit) -> dict[tuple[str, str], FloatArray]:
         """Return the errors of a fit, by subsystem and signal."""
+        parts = {}
+        for p, rig, known in self.at(found):
+            parts.update(self._cut(p, p.errors(rig, known)))
+        return parts
+
+    def at(self, found: Fit) -> list[tuple[SubsystemProblem, Rig, FloatArray]]:
+        """Return (problem of the certify data, rig, its normalised known numbers) of a fit."""
         rig = self._estimator.with_effects(found.settings())
         z = {k.name: float(z) for p in self._estimator.problems
              for k, z in zip(p.known, found.known_z[p.subsystem])}
         if self._whole:          # a closed volume keeps the error of its start: another one here
             z['start_error'] = 0.0
-        parts = {}
-        for p in self._problems:
-            known = np.array([z.get(k.name, 0.0) for k in p.known])
-            parts.update(self._cut(p, p.errors(rig, known)))
-        return parts
+        return [(p, rig, np.array([z.get(k.name, 0.0) for k in p.known])) for p in self._problems]
 
-    def _chosen(self, p: SubsystemProblem, signal: str) -> BoolArray:
+    def chosen(self, p: SubsystemProblem, signal: str) -> BoolArray:
         """Return which samples are those of a signal on the certify data."""
         part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
         return part & (p.signal == p.signals.index(signal))
@@ -115,7 +119,7 @@ class OwnRuns:
         """Return the errors on the certify data in SI units, by subsystem and signal."""
         found = {}
         for s in p.signals:
-            chosen = self._chosen(p, s)
+            chosen = self.chosen(p, s)
             error = errors[chosen] * p.floor[s]
             if self._whole and p.subsystem != 'valve':
                 error = _aligned(error, p.time_s[chosen], p.measured[chosen])

@@ -142,6 +142,12 @@ class Validation:
         return {s: Trace(r.stamp_ns[s], r.measured[s], self.before[s], self.refit[s],
                          self.after[s]) for s in r.signals}
 
+    def floor_with(self, stamp_sd_s: float) -> dict[str, float]:
+        """Return the noise floors where the stamps scatter by so much [s], by signal."""
+        less = 1.0 - min(stamp_sd_s / STAMP_SD_S, 1.0) ** 2
+        return {s: math.sqrt(max(self.floor[s] ** 2 - less * float(np.mean(
+            [np.mean(d[s] ** 2) for d in self.drift])), 0.0)) for s in self.floor}
+
     def moved(self, found: Fit, whole: bool) -> dict[str, float]:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
         return moved(self.recording, self.after, self.run(found, whole), self.part)

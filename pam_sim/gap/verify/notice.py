@@ -1,0 +1,301 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Whether a subsystem leaves a gap that its noise cannot make, however its free run drifts.
+
+Means of the errors over half a second are compared with those that noise, stamps and the drift of
+sensors make in the same run. What the numbers of the model may do is taken out before.
+
+A muscle behind on/off valves integrates the errors of its flow. Errors of stamps alone take its
+free run far away, and a gap of the flow hides in that. Its errors count against their own mean
+shortly before, so a test sees the flow and not where it led to. They must not follow the time,
+the pressure, or a number of the valve that changes with either.
+
+A recorded supply pressure is a witness of its own: where it moves, a model with a constant one
+has a gap.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.effects.registry import get_effect
+from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.data.noise import autocorrelation_time, MAD_TO_SD, noise_of, STAMP_SD_S
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.data.supply import supply_scatter
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.verify.own_runs import OwnRuns
+from pam_sim.rig import Rig
+
+MEAN_S = 0.5                 # of the means that are compared with those of noise
+MEMORY_S = 1.0               # of the mean before that errors behind on/off valves count against
+# Of the test that follows them. The errors of stamps add up, and those of the sensor do not;
+# they are as large after some tenths of a second.
+FLOW_MEAN_S, FLOW_MEMORY_S = 0.1, 0.25
+DRAWS = 4
+DRIFT_SD = 0.2               # of a sensor over a recording, in its standard deviations
+LEAST_STAMP_SD_S = 0.05e-3   # stamps as regular as that may be those of a clock, not of the valve
+SPARE = 10                   # means that are left for the noise once all is fitted
+
+
+@dataclass(frozen=True)
+class Notice:
+    """
+    Means of the errors of one signal.
+
+    Parameters
+    ----------
+    subsystem, signal : str
+        Of which.
+    rms, expected : float
+        Of the means, and of those that noise alone makes, in deviations of the sensor.
+    deviations : float
+        By how many standard deviations the errors of a flow follow something; 0 of the others.
+
+    """
+
+    subsystem: str
+    signal: str
+    rms: float
+    expected: float
+    deviations: float = 0.0
+
+    def is_gap(self, criteria: Criteria) -> bool:
+        """Return whether noise cannot have made this."""
+        beyond = math.sqrt(max(self.rms ** 2 - self.expected ** 2, 0.0))
+        return self.deviations > criteria.certain_size or (
+            self.rms > criteria.likely_sd * self.expected and beyond > criteria.greater_part)
+
+
+def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> list[Notice]:
+    """
+    Return what the recordings show of a fit, signal by signal.
+
+    Parameters
+    ----------
+    runs : OwnRuns
+        Each subsystem on its own measured inputs, on the certify data.
+    estimator : Estimator
+        That the fit was made by. Its data count as well where a flow is integrated.
+    found : Fit
+        The model that is tested.
+    seed : int
+        Of the draws of noise.
+
+    """
+    doubt = _doubt(estimator, found)
+    tested = []
+    for (problem, rig, known), searched in zip(runs.at(found), estimator.problems):
+        random = np.random.default_rng(seed)
+        signals = _Certified(runs, problem, rig, known, doubt, random)
+        for signal in problem.signals:
+            followed = 0.0
+            if _integrates(problem, problem.recordings[0]):
+                z = [_followed(problem, rig, known, 0, runs.chosen(problem, signal))]
+                mine = np.isin(searched.part, (FIT, SELECT))
+                z += [_followed(searched, rig, found.known_z[searched.subsystem], index,
+                                mine & (searched.run == index))
+                      for index in range(len(searched.recordings))]
+                told = np.array([one for one in z if one.size])
+                if told.size:
+                    followed = float(max(np.abs(told).max(), np.abs(
+                        told.sum(axis=0)).max() / math.sqrt(len(told))))
+            tested.append(signals.notice(signal, followed))
+    return tested
+
+
+def supply_notice(recording: Recording, rig: Rig, noise_pa: float, least: float
+                  ) -> Notice | None:
+    """
+    Return the Notice of a recorded supply pressure that moves, None where it does not matter.
+
+    Parameters
+    ----------
+    recording : Recording
+        The certify data.
+    rig : pam_sim.Rig
+        The calibrated model, whose supply pressure is constant.
+    noise_pa : float
+        Standard deviation of the pressure sensor [Pa].
+    least : float
+        By how many of them the pressure must move for a gap to matter.
+
+    """
+    found = supply_scatter(recording)
+    if found is None or any('supply' in get_effect(e.name).hooks for e in rig.effects):
+        return None
+    moved_pa, expected_pa, sd = found
+    # The flow of a fill is proportional to the supply pressure, and so is what it moves.
+    matters = moved_pa / rig.parameters['supply_pa'] * float(
+        recording.measured['pressure'].std()) > least * noise_pa
+    return Notice('valve', 'supply_pressure', moved_pa / sd, expected_pa / sd) if matters else None
+
+
+def _integrates(problem: SubsystemProblem, recording: Recording) -> bool:
+    return problem.subsystem == 'valve' and recording.valve == 'hsv'
+
+
+def _doubt(estimator: Estimator, found: Fit) -> dict[str, float]:
+    """Return how uncertain the numbers are, by name, in deviations of their prior."""
+    covariances, _ = estimator.spread(found)
+    names = [k.name for p in estimator.problems for k in p.known]
+    spread = np.max([np.sqrt(np.diag(c)) for c in covariances], axis=0)[len(found.theta):]
+    return {name: float(min(sd, 1.0)) for name, sd in zip(names, spread)}
+
+
+class _Certified:
+    """Means of the errors of a problem on the certify data, and what is expected of them."""
+
+    def __init__(self, runs: OwnRuns, problem: SubsystemProblem, rig: Rig, known: FloatArray,
+                 doubt: Mapping[str, float], random: np.random.Generator) -> None:
+        self._runs, self._problem, self._random = runs, problem, random
+        base = problem.values(rig, known)
+        self._errors, self._slopes = base - problem.measured, _slopes(problem, rig, known, base)
+        self._limits = np.array([doubt.get(k.name, 1.0) if k.of_rig else 1.0
+                                 for k in problem.known])
+        self._draws = []
+        for _ in range(DRAWS):
+            problem.disturb(random, stamp_sd_s(problem.recordings[0]))
+            self._draws.append(problem.values(rig, known) - base)
+        problem.shift_inputs(DRIFT_SD)
+        self._drift = problem.values(rig, known) - base
+        problem.disturb(None)
+
+    def notice(self, signal: str, followed: float) -> Notice:
+        """Return the Notice of a signal."""
+        recording = self._problem.recordings[0]
+        mine = (self._problem.run == 0) & (
+            self._problem.signal == self._problem.signals.index(signal))
+        inside = self._runs.chosen(self._problem, signal)[mine]
+        time_s = self._problem.time_s[mine]
+        noise = noise_of(recording.time_s[signal], recording.measured[signal])
+        integrates = _integrates(self._problem, recording)
+
+        def means(values: FloatArray) -> FloatArray:
+            values = recent(values, time_s, MEMORY_S) if integrates else values
+            return _means(values, time_s, MEAN_S, inside) / max(noise.sd, 1e-12)
+
+        expected = float(np.mean([np.mean(means(
+            d[mine] + noise.draw(time_s, self._random)) ** 2) for d in self._draws]))
+        expected += 0.0 if integrates else float(
+            np.mean(means(self._drift[mine]) ** 2)) + DRIFT_SD ** 2
+        left = _free_of(means(self._errors[mine]), np.column_stack(
+            [means(s[mine]) for s in self._slopes]), self._limits, expected)
+        return Notice(self._problem.subsystem, signal, float(np.sqrt(np.mean(left ** 2))),
+                      math.sqrt(expected), followed)
+
+
+def _slopes(problem: SubsystemProblem, rig: Rig, known: FloatArray, base: FloatArray
+            ) -> list[FloatArray]:
+    """Return the slopes of the values of a problem for its known numbers."""
+    return [(problem.values(rig, known + k.step * (np.arange(known.size) == j)) - base) / k.step
+            for j, k in enumerate(problem.known)]
+
+
+def _followed(problem: SubsystemProblem, rig: Rig, known: FloatArray, index: int,
+              chosen: BoolArray) -> FloatArray:
+    """
+    Return by how many deviations the errors of a flow follow what they should not, one by one.
+
+    Each once alone: a constant, the pressure, the time, and every number of the rig that changes
+    with pressure or time. Empty where there are too few means.
+    """
+    recording = problem.recordings[index]
+    base = problem.values(rig, known)
+    mine = problem.run == index
+    time_s, inside = problem.time_s[mine], chosen[mine]
+    pressure = np.interp(time_s, recording.time_s['pressure'], recording.measured['pressure'])
+
+    def means(values: FloatArray) -> FloatArray:
+        return _means(values, time_s, FLOW_MEAN_S, inside)
+
+    errors = means(recent((base - problem.measured)[mine], time_s, FLOW_MEMORY_S))
+    slopes = [means(recent(s[mine], time_s, FLOW_MEMORY_S))
+              for s in _slopes(problem, rig, known, base)]
+    time, level = (_unit(means(values)) for values in (time_s, pressure))
+    rows = [np.ones(errors.size), level, time]
+    rows += [s * by for s, k in zip(slopes, problem.known) if k.of_rig for by in (time, level)]
+    if errors.size < len(rows) + len(slopes) + SPARE:
+        return np.zeros(0)
+    usual = _basis(np.column_stack(slopes))
+    columns = np.column_stack([_normal(r - usual @ (usual.T @ r)) for r in rows])
+    errors = errors - usual @ (usual.T @ errors)
+    every = _basis(columns)
+    noise = errors - every @ (every.T @ errors)
+    count = errors.size - usual.shape[1] - every.shape[1]
+    sd = math.sqrt(float(noise @ noise) / count * autocorrelation_time(noise))
+    return columns.T @ errors / max(sd, 1e-12)
+
+
+def _normal(row: FloatArray) -> FloatArray:
+    """Return a row of length 1, or of none where hardly anything is left of it."""
+    size = float(np.linalg.norm(row))
+    return row / size if size > 1e-9 else np.zeros_like(row)
+
+
+def _unit(values: FloatArray) -> FloatArray:
+    """Return values about their mean, in their standard deviation."""
+    return (values - values.mean()) / max(float(values.std()), 1e-12)
+
+
+def _basis(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of columns, those left out that depend on others."""
+    sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+    basis, size, _ = np.linalg.svd(columns / sizes, full_matrices=False)
+    return basis[:, size > 1e-6 * size[0]]
+
+
+def stamp_sd_s(recording: Recording) -> float:
+    """
+    Return the standard deviation [s] of the stamps of the valve signal.
+
+    Not more than by how much they scatter about even ones, as those of a loop are.
+    """
+    steps = np.diff(recording.valve_stamps_s)
+    usual = float(np.median(steps))
+    # Of a difference of two; the median is blind to messages that are missing.
+    scatter = MAD_TO_SD * float(np.median(np.abs(steps - usual))) / math.sqrt(2.0)
+    return min(max(scatter, LEAST_STAMP_SD_S), STAMP_SD_S)
+
+
+def recent(values: FloatArray, time_s: FloatArray, memory_s: float) -> FloatArray:
+    """Return values less their own mean before, which forgets within ``memory_s``."""
+    from scipy.signal import lfilter       # slow to import
+    keep = math.exp(-float(np.median(np.diff(time_s))) / memory_s)
+    return values - lfilter([0.0, 1.0 - keep], [1.0, -keep], values)
+
+
+def _means(values: FloatArray, time_s: FloatArray, mean_s: float,
+           inside: BoolArray | None = None) -> FloatArray:
+    """Return means over ``mean_s``, of the spans with nearly all samples inside."""
+    place = (time_s // mean_s).astype(int)
+    count = np.bincount(place)
+    within = count if inside is None else np.bincount(place, inside)
+    full = (count > 0.5 * count.max()) & (within >= 0.9 * count)
+    return np.bincount(place, values)[full] / count[full]
+
+
+def _free_of(means: FloatArray, slopes: FloatArray, limits: FloatArray, variance: float
+             ) -> FloatArray:
+    """Return means less what numbers within their doubt do, by ridge regression."""
+    scaled = slopes * limits
+    normal = scaled.T @ scaled / variance + np.eye(limits.size)
+    return means - scaled @ np.linalg.solve(normal, scaled.T @ means / variance)
