@@ -320,4 +320,6 @@ def _certainty(named: NamedEffect, subsystem: str) -> float:
     behind = [r.t[s] for r in named.rivals
               if r.name not in named.names and subsystem_of(r.name) != subsystem
               and r.share.get(s, 0.0) > 0.5 * best and r.t.get(s, np.nan) == r.t.get(s, np.nan)]
-    return float(np.mean(of_set)) * float(norm.cdf(min(behind, default=6.0) - T_OF_DOUBT))
+    # A rival that explains as much was left behind for its place in the order.
+    return float(np.mean(of_set)) * max(
+        float(norm.cdf(min(behind, default=6.0) - T_OF_DOUBT)), UNTOLD)
